@@ -1,0 +1,24 @@
+"""What a cross-check is: one file in `rules/`, one `RULE`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+
+RuleFunction = Callable[[Constants, Campaign, Mapping[str, float]], Check]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One check of `contract/outputs.md`: `check(constants, campaign, options)` is pure.
+
+    With too little to judge it returns a Check of status not_evaluated that says what is missing.
+    """
+
+    name: str
+    check: RuleFunction
+    options: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,1 @@
+"""One check a file; `pipeline.crosscheck.registry` finds them by their `RULE`."""

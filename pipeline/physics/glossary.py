@@ -1,0 +1,176 @@
+"""Every column and constant once: name, unit, words, range.
+
+The pandera contracts, JSON Schemas, docs and unit checks are built from here. A plug-in that
+publishes a constant of its own declares a `Term` in its own file; the published names of
+`contract/` are all here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.physics.units import SUFFIX_UNITS
+
+TermKind = Literal["column", "constant", "metadata"]
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One name. `low` and `high` [unit] bound what is physically plausible, both inclusive."""
+
+    name: str
+    unit: str
+    words: str
+    kind: TermKind
+    low: float | None = None
+    high: float | None = None
+    integer: bool = False
+
+    def __post_init__(self) -> None:
+        stated = SUFFIX_UNITS.get(suffix_of(self.name))
+        if stated is not None and stated != self.unit:
+            raise ValueError(f"{self.name} ends in the suffix of {stated} but states {self.unit}")
+
+
+def suffix_of(name: str) -> str:
+    """The longest known unit suffix that ends a name, or an empty string."""
+    parts = name.split("_")
+    for start in range(1, len(parts)):
+        tail = "_".join(parts[start:])
+        if tail in SUFFIX_UNITS:
+            return tail
+    return ""
+
+
+def _columns() -> Iterable[Term]:
+    def column(name: str, unit: str, words: str, low: float, high: float) -> Term:
+        return Term(name, unit, words, "column", low, high)
+
+    yield column("t_s", "s", "sampling instant, strictly increasing", -1e9, 1e10)
+    for phase in "abc":
+        yield column(f"v{phase}_v", "V", f"phase {phase} to star point", -2e3, 2e3)
+    for pair in ("ab", "bc", "ca"):
+        yield column(f"v{pair}_v", "V", f"terminal {pair[0]} to {pair[1]}", -4e3, 4e3)
+    for phase in "abc":
+        yield column(
+            f"i{phase}_a", "A", f"line current {phase}, positive into the motor", -5e3, 5e3
+        )
+    for axis, words in (("d", "on the magnet's flux"), ("q", "a quarter turn ahead of d")):
+        yield column(f"v{axis}_v", "V", f"rotor-frame voltage, {axis} {words}", -2e3, 2e3)
+        yield column(f"i{axis}_a", "A", f"rotor-frame current, {axis} {words}", -5e3, 5e3)
+        yield column(f"psi_{axis}_wb", "Wb", f"flux linkage, {axis} {words}", -100.0, 100.0)
+    yield column("vdc_v", "V", "DC link voltage", -10.0, 2e3)
+    yield column("idc_a", "A", "DC link current", -5e3, 5e3)
+    yield column("theta_mech_rad", "rad", "shaft angle, unwrapped", -1e9, 1e9)
+    yield column("theta_elec_rad", "rad", "electrical angle, unwrapped", -1e10, 1e10)
+    yield column("omega_mech_rad_s", "rad/s", "the bench's own shaft speed", -2e4, 2e4)
+    yield column("torque_shaft_nm", "N·m", "what the shaft delivers to the load", -1e5, 1e5)
+    for place in ("winding", "magnet", "case", "ambient"):
+        yield column(f"temp_{place}_degc", "degC", f"temperature of the {place}", -80.0, 400.0)
+    yield column("theta_elec_deg", "deg", "electrical angle of a locked rotor", -1e5, 1e5)
+    for pair in ("ab", "bc", "ca"):
+        yield column(f"l{pair}_h", "H", f"inductance between {pair[0]} and {pair[1]}", 0.0, 10.0)
+    yield column("rab_ohm", "ohm", "resistance between a and b", 0.0, 1e4)
+    yield column("freq_hz", "Hz", "frequency of the LCR meter", 0.0, 1e7)
+
+
+def _constants() -> Iterable[Term]:
+    def constant(
+        name: str, unit: str, words: str, low: float = 0.0, high: float = 1e6, whole: bool = False
+    ) -> Term:
+        return Term(name, unit, words, "constant", low, high, whole)
+
+    yield constant("r_phase_ohm", "ohm", "wye-equivalent phase resistance at 25 degC", 0.0, 1e3)
+    yield constant("r_ll_ohm", "ohm", "mean line-to-line resistance at 25 degC", 0.0, 2e3)
+    yield constant("resistance_imbalance", "1", "largest less smallest phase over their mean", 0, 2)
+    yield constant("temp_coeff_copper_1_k", "1/K", "of the winding resistance, at 25 degC", 0, 0.02)
+    yield constant("ld_h", "H", "incremental d inductance near zero current", 0.0, 10.0)
+    yield constant("lq_h", "H", "incremental q inductance near zero current", 0.0, 10.0)
+    yield constant("ld_rated_h", "H", "apparent d inductance at rated current", 0.0, 10.0)
+    yield constant("lq_rated_h", "H", "apparent q inductance at rated current", 0.0, 10.0)
+    yield constant("saliency_ratio", "1", "lq_h over ld_h", 0.01, 100.0)
+    yield constant("psi_pm_wb", "Wb", "magnet flux linkage, phase peak, at 25 degC", 0.0, 100.0)
+    yield constant("temp_coeff_magnet_1_k", "1/K", "of psi_pm_wb, at 25 degC", -0.02, 0.02)
+    yield constant("ke_phase_peak_v_s_rad", "V·s/rad", "back-EMF, phase peak per mechanical rad/s")
+    yield constant("ke_ll_peak_v_s_rad", "V·s/rad", "back-EMF, line-line peak per rad/s")
+    yield constant("ke_ll_rms_v_s_rad", "V·s/rad", "back-EMF, line-line rms per rad/s")
+    yield constant("ke_ll_peak_v_krpm", "V/krpm", "back-EMF, line-line peak per 1000 rpm")
+    yield constant("kv_ll_peak_rpm_v", "rpm/V", "speed per volt of line-line peak back-EMF")
+    yield constant("kt_peak_nm_a", "N·m/A", "torque per peak q ampere, from the torque test")
+    yield constant("kt_rms_nm_a", "N·m/A", "torque per rms phase ampere, from the torque test")
+    yield constant("kt_from_ke_nm_a", "N·m/A", "1.5 p psi: torque per peak q ampere, from back-EMF")
+    yield constant("motor_constant_nm_sqrt_w", "N·m/sqrt(W)", "torque per root of copper loss")
+    yield constant("pole_pairs", "1", "electrical cycles a mechanical turn", 1, 200, True)
+    yield constant("cogging_peak_nm", "N·m", "half the peak-to-peak of the cogging torque")
+    yield constant("cogging_order", "1", "leading cogging order a mechanical turn", 1, 5000, True)
+    yield constant("cogging_amplitude_nm", "N·m", "amplitude of the leading cogging order")
+    yield constant("j_rotor_kgm2", "kg·m²", "rotor inertia", 0.0, 1e4)
+    yield constant("torque_coulomb_nm", "N·m", "Coulomb friction torque")
+    yield constant("b_visc_nm_s_rad", "N·m·s/rad", "viscous friction coefficient", -1.0, 1e4)
+    yield constant("tau_elec_s", "s", "lq_h over r_phase_ohm", 0.0, 100.0)
+    yield constant("tau_mech_s", "s", "J R over 1.5 (p psi)²", 0.0, 1e5)
+    yield constant("rth_winding_k_w", "K/W", "winding to ambient, steady state", 0.0, 1e4)
+
+
+def _metadata() -> Iterable[Term]:
+    def number(
+        name: str, unit: str, words: str, low: float, high: float, whole: bool = False
+    ) -> Term:
+        return Term(name, unit, words, "metadata", low, high, whole)
+
+    def text(name: str, words: str) -> Term:
+        return Term(name, "text", words, "metadata")
+
+    yield text("contract", "version of the capture contract")
+    yield text("motor_id", "serial number")
+    yield text("test", "which test was done")
+    yield text("motor_type", "the design; lots of one type are compared")
+    yield text("lot", "production lot")
+    yield text("station", "test bench")
+    yield text("operator", "who recorded it")
+    yield text("started_at", "ISO 8601, UTC")
+    yield text("winding", "wye or delta")
+    yield number("pole_pairs", "1", "nameplate pole pairs", 1, 200, True)
+    yield number("slots", "1", "nameplate stator slots", 1, 1000, True)
+    yield number("ambient_degc", "degC", "ambient temperature", -80.0, 200.0)
+    yield text("pair", "ab, bc or ca: terminals of a two-terminal test")
+    yield number("theta_elec_deg", "deg", "where the rotor is locked", -1e5, 1e5)
+    yield text("voltage_kind", "measured or commanded")
+    yield text("voltage_timing", "instant, held or centred")
+    yield number("pwm_hz", "Hz", "switching frequency", 0.0, 1e7)
+    yield number("vdc_v", "V", "DC link voltage", 0.0, 2e3)
+    yield number("u_rel_current", "1", "relative standard uncertainty of the current gain", 0, 1)
+    yield number("u_rel_voltage", "1", "relative standard uncertainty of the voltage gain", 0, 1)
+    yield number("u_rel_torque", "1", "relative standard uncertainty of the torque gain", 0, 1)
+    yield number("u_temp_degc", "degC", "standard uncertainty of the temperatures", 0, 100)
+    yield text("sha256_rows", "HEX/ROWS over the rows of a CSV")
+
+
+def _index(terms: Iterable[Term]) -> dict[str, Term]:
+    index: dict[str, Term] = {}
+    for term in terms:
+        if term.name in index:
+            raise ValueError(f"{term.name} is in the glossary twice")
+        index[term.name] = term
+    return index
+
+
+COLUMNS = _index(_columns())
+CONSTANTS = _index(_constants())
+METADATA = _index(_metadata())
+TESTS: dict[str, str] = {
+    "resistance": "DC steps through one terminal pair, four-wire",
+    "current_step": "rotor locked, voltage step on one terminal pair",
+    "lcr": "LCR meter across a pair at several rotor angles",
+    "open_circuit": "terminals open, shaft driven at several speeds",
+    "hand_turn": "one mechanical turn by hand, terminals open",
+    "cogging": "zero current, slow turn, both directions",
+    "torque_map": "dynamometer holds speed, steps of d and q current",
+    "spin_down": "coasts with terminals open",
+    "heat_run": "current on a locked or slow rotor until it warms",
+    "holding_current": "rotor held at many angles, both directions",
+    "flux_map": "table of currents and flux linkages",
+    "drive": "everyday closed-loop log",
+}

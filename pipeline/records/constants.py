@@ -1,0 +1,42 @@
+"""All estimates of one motor, with the preferred one of each name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from pipeline.records.estimate import Estimate
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """Estimates in order of preference: for each name the first one with a value is `best`."""
+
+    estimates: tuple[Estimate, ...] = ()
+
+    def adding(self, estimates: Iterable[Estimate]) -> Constants:
+        """These constants and further, less preferred ones."""
+        return Constants(self.estimates + tuple(estimates))
+
+    def best(self, name: str) -> Estimate | None:
+        """The preferred estimate of a constant that has a value, or None."""
+        return next((e for e in self.estimates if e.name == name and e.known), None)
+
+    def by(self, method: str, name: str) -> Estimate | None:
+        """What one method found for a constant, if it has a value."""
+        found = (e for e in self.estimates if e.name == name and e.method == method and e.known)
+        return next(found, None)
+
+    def all_of(self, name: str) -> tuple[Estimate, ...]:
+        """Every estimate of a constant, known or not, in order of preference."""
+        return tuple(e for e in self.estimates if e.name == name)
+
+    def chosen(self) -> dict[str, Estimate]:
+        """One estimate a name: the best, or the first reason why there is none."""
+        names = dict.fromkeys(e.name for e in self.estimates)
+        return {name: self.best(name) or self.all_of(name)[0] for name in names}
+
+    def rest(self) -> tuple[Estimate, ...]:
+        """The known estimates that were not chosen: the same constant by another method."""
+        chosen = self.chosen()
+        return tuple(e for e in self.estimates if e.known and chosen[e.name] is not e)

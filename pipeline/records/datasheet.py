@@ -1,0 +1,97 @@
+"""The versioned datasheet of one motor, and the checks on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pipeline.records.estimate import Estimate
+
+CheckStatus = Literal["pass", "marginal", "fail", "not_evaluated"]
+DatasheetStatus = Literal["released", "provisional", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One cross-check. `value` is judged against `limit` [unit]; both None if not evaluated."""
+
+    name: str
+    status: CheckStatus
+    meaning: str
+    value: float | None = None
+    limit: float | None = None
+    unit: str = "1"
+    suspect: str | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`."""
+        return {
+            "name": self.name,
+            "status": self.status,
+            "value": self.value,
+            "limit": self.limit,
+            "unit": self.unit,
+            "meaning": self.meaning,
+            "suspect": self.suspect,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureReference:
+    """Which file a datasheet rests on."""
+
+    path: str
+    sha256: str
+    test: str
+    integrity: str
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`."""
+        return {
+            "path": self.path,
+            "sha256": self.sha256,
+            "test": self.test,
+            "integrity": self.integrity,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Datasheet:
+    """Everything known of one motor, reproducibly: same inputs, configuration, code, bytes."""
+
+    motor_id: str
+    motor_type: str | None
+    lot: str | None
+    version: str
+    status: DatasheetStatus
+    why: tuple[str, ...]
+    captures: tuple[CaptureReference, ...]
+    config_sha256: str
+    code_version: str
+    constants: Mapping[str, Estimate]
+    alternatives: tuple[Estimate, ...]
+    checks: tuple[Check, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`, schema motor-datasheet/1."""
+        return {
+            "schema": "motor-datasheet/1",
+            "motor_id": self.motor_id,
+            "motor_type": self.motor_type,
+            "lot": self.lot,
+            "version": self.version,
+            "status": self.status,
+            "why": list(self.why),
+            "provenance": {
+                "captures": [reference.document() for reference in self.captures],
+                "config_sha256": self.config_sha256,
+                "code_version": self.code_version,
+            },
+            "constants": {name: est.document() for name, est in sorted(self.constants.items())},
+            "alternatives": [
+                {"name": est.name} | est.document()
+                for est in sorted(self.alternatives, key=lambda e: (e.name, e.method))
+            ],
+            "checks": [check.document() for check in self.checks],
+        }

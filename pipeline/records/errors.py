@@ -1,0 +1,50 @@
+"""Errors a user can act on; each carries what happened and what to do about it."""
+
+from __future__ import annotations
+
+
+class PipelineError(Exception):
+    """Base of every error this project raises on purpose; `exit_code` is the command's."""
+
+    exit_code = 5
+
+    def __init__(self, message: str, remedy: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.message}; {self.remedy}" if self.remedy else self.message
+
+
+class UsageError(PipelineError):
+    """A wrong command, key or configuration file."""
+
+    exit_code = 2
+
+
+class MachineError(PipelineError):
+    """The disk, a worker or the operating system failed."""
+
+    exit_code = 5
+
+
+class CaptureError(PipelineError):
+    """One capture cannot be used; the rest of the batch goes on.
+
+    `code` is a short stable word (`truncated`, `missing_column`, ...), `rows` the first and
+    last offending row counted from 0, or None where the fault is not in rows.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self, code: str, message: str, remedy: str, rows: tuple[int, int] | None = None
+    ) -> None:
+        super().__init__(message, remedy)
+        self.code = code
+        self.rows = rows
+
+    def __reduce__(self) -> tuple[type[CaptureError], tuple[object, ...]]:
+        """Cross a process border with every field (exceptions pickle their `args` only)."""
+        return type(self), (self.code, self.message, self.remedy, self.rows)

@@ -1,0 +1,129 @@
+"""An estimated constant: value, uncertainty, conditions and where it came from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from scipy.special import stdtrit
+
+from pipeline.records.uncertainty import (
+    Budget,
+    effective_dof,
+    propagate,
+    standard_uncertainty,
+)
+
+Status = Literal["measured", "derived", "assumed", "not_identifiable"]
+Conditions = Mapping[str, float | int | str]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One constant of one motor. `value` is None exactly when `status` is not_identifiable.
+
+    `method` is the estimator's name, `at` the conditions the value holds for (names from the
+    glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used.
+    """
+
+    name: str
+    value: float | int | None
+    unit: str
+    status: Status
+    method: str
+    budget: Budget = ()
+    at: Conditions = field(default_factory=dict)
+    captures: tuple[str, ...] = ()
+    note: str = ""
+    bounds: tuple[float, float] | None = None
+    at_bound: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.value is None) != (self.status == "not_identifiable"):
+            raise ValueError(f"{self.name}: a value is None exactly when not identifiable")
+        if self.value is not None and not math.isfinite(self.value):
+            raise ValueError(f"{self.name}: value {self.value} is not finite")
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a value."""
+        return self.value is not None
+
+    @property
+    def number(self) -> float:
+        """The value, for callers that have checked `known`."""
+        if self.value is None:
+            raise ValueError(f"{self.name} is not identifiable: {self.note}")
+        return float(self.value)
+
+    @property
+    def u(self) -> float:
+        """Combined standard uncertainty (k=1) [unit]."""
+        return standard_uncertainty(self.budget)
+
+    @property
+    def u_a(self) -> float:
+        """Standard uncertainty from scatter, type A [unit]."""
+        return standard_uncertainty(self.budget, "A")
+
+    @property
+    def u_b(self) -> float:
+        """Standard uncertainty from instruments and assumptions, type B [unit]."""
+        return standard_uncertainty(self.budget, "B")
+
+    @property
+    def dof(self) -> float:
+        """Effective degrees of freedom of `u`."""
+        return effective_dof(self.budget)
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Coverage interval [unit] from Student's t with the effective degrees of freedom."""
+        dof = min(self.dof, 1e9)
+        half = float(stdtrit(dof, 0.5 + level / 2)) * self.u
+        return self.number - half, self.number + half
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`; infinite degrees of freedom become null."""
+        known = self.known
+        return {
+            "value": self.value,
+            "unit": self.unit,
+            "u": self.u if known else None,
+            "u_a": self.u_a if known else None,
+            "u_b": self.u_b if known else None,
+            "dof": self.dof if known and math.isfinite(self.dof) else None,
+            "at": dict(sorted(self.at.items())),
+            "method": self.method,
+            "status": self.status,
+            "captures": list(self.captures),
+            "note": self.note,
+            "bounds": None if self.bounds is None else list(self.bounds),
+            "at_bound": self.at_bound,
+            "budget": [
+                {"source": part.source, "u": part.u, "kind": part.kind}
+                for part in self.budget
+                if known
+            ],
+        }
+
+
+def not_identifiable(name: str, unit: str, method: str, note: str) -> Estimate:
+    """The result that says which experiment is missing; `note` names it."""
+    return Estimate(name, None, unit, "not_identifiable", method, note=note)
+
+
+def derived(
+    name: str,
+    unit: str,
+    value: float,
+    terms: list[tuple[float, Estimate]],
+    method: str,
+    at: Conditions | None = None,
+    note: str = "",
+) -> Estimate:
+    """A constant computed from others; `terms` are (partial derivative, estimate) pairs."""
+    captures = sorted({path for _, source in terms for path in source.captures})
+    budget = propagate((slope, source.budget) for slope, source in terms)
+    return Estimate(name, value, unit, "derived", method, budget, at or {}, tuple(captures), note)

@@ -1,0 +1,77 @@
+"""Uncertainty budgets: named, signed contributions that remember what they share.
+
+Two constants of one motor that were read with one current sensor carry the same contribution
+`current@STATION`; their covariance is the sum over the sources they share, so a ratio in which
+the gain cancels is judged with the gain gone.
+
+References: JCGM 100:2008 (GUM), 5.1-5.2 (propagation, correlation) and G.4 (Welch-Satterthwaite).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["A", "B"]
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """A signed standard uncertainty [unit of the estimate] from one source.
+
+    `source` names the origin: an instrument (`current@rig-1`) or one fit's scatter
+    (`scatter:spin_down:tau`). Equal sources are fully correlated, different ones independent.
+    """
+
+    source: str
+    u: float
+    kind: Kind
+    dof: float = math.inf
+
+
+Budget = tuple[Contribution, ...]
+
+
+def type_a(source: str, u: float, dof: float = math.inf) -> Budget:
+    """A budget of one scatter contribution (GUM 4.2)."""
+    return (Contribution(source, u, "A", dof),)
+
+
+def type_b(source: str, u: float, dof: float = math.inf) -> Budget:
+    """A budget of one contribution known from elsewhere (GUM 4.3), usually an instrument."""
+    return (Contribution(source, u, "B", dof),)
+
+
+def propagate(terms: Iterable[tuple[float, Budget]]) -> Budget:
+    """First-order propagation: the budget of sum(c_i x_i) from (c_i, budget of x_i) pairs.
+
+    Contributions of one source add with their signs; the result is sorted by source so that
+    equal work gives equal bytes. GUM eq. 13 follows because distinct sources are independent.
+    """
+    sums: dict[str, Contribution] = {}
+    for sensitivity, budget in terms:
+        for part in budget:
+            before = sums.get(part.source)
+            u = sensitivity * part.u + (before.u if before else 0.0)
+            sums[part.source] = Contribution(part.source, u, part.kind, part.dof)
+    return tuple(sums[source] for source in sorted(sums))
+
+
+def standard_uncertainty(budget: Budget, kind: Kind | None = None) -> float:
+    """Root sum of squares of the contributions, of one kind or of both."""
+    return math.sqrt(sum(part.u**2 for part in budget if kind in (None, part.kind)))
+
+
+def covariance(one: Budget, other: Budget) -> float:
+    """Covariance of two estimates: products of the contributions they share."""
+    shared = {part.source: part.u for part in other}
+    return sum(part.u * shared.get(part.source, 0.0) for part in one)
+
+
+def effective_dof(budget: Budget) -> float:
+    """Welch-Satterthwaite degrees of freedom (GUM eq. G.2b); infinite without scatter."""
+    total = standard_uncertainty(budget) ** 2
+    spread = sum(part.u**4 / part.dof for part in budget if math.isfinite(part.dof))
+    return math.inf if spread == 0.0 else total**2 / spread

@@ -1,0 +1,1 @@
+"""Pure rendering of datasheets and evidence into text; writing is `io`'s."""
