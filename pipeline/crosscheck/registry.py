@@ -1,0 +1,32 @@
+"""Finds the rules (one file each in `rules/`) and applies them to one motor."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+
+from pipeline.crosscheck import rules as rules_room
+from pipeline.crosscheck.protocol import Rule
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+
+
+@cache
+def rules() -> tuple[Rule, ...]:
+    """Every rule of the room, by name."""
+    names = sorted(module.name for module in pkgutil.iter_modules(rules_room.__path__))
+    modules = [importlib.import_module(f"{rules_room.__name__}.{name}") for name in names]
+    return tuple(sorted((module.RULE for module in modules), key=lambda rule: rule.name))
+
+
+def check_all(
+    constants: Constants, campaign: Campaign, options: Mapping[str, Mapping[str, float]]
+) -> tuple[Check, ...]:
+    """Every check of one motor, in the order of their names."""
+    return tuple(
+        rule.check(constants, campaign, {**rule.options, **options.get(rule.name, {})})
+        for rule in rules()
+    )

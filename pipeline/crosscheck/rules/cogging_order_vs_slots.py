@@ -1,0 +1,43 @@
+"""Whether the leading cogging order is one that the slots and poles make."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from pipeline.crosscheck.judge import not_evaluated
+from pipeline.crosscheck.protocol import Rule
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+
+NAME = "cogging_order_vs_slots"
+
+
+def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
+    """The leading order over LCM(slots, 2p): a whole number in a sound motor.
+
+    Multiples of the slots alone tell of unequal slots, of p or 2p of unequal magnets (Zhu and
+    Howe, IEEE Trans. Energy Conversion 15(4), 2000), once or twice a turn of unbalance: marginal.
+    Any other order is not made by these slots and poles.
+    """
+    order, pairs = constants.best("cogging_order"), constants.best("pole_pairs")
+    slots = campaign.nameplate("slots")
+    if order is None or pairs is None or not isinstance(slots, int):
+        return not_evaluated(NAME, "needs cogging found in a cogging test, pole pairs and slots")
+    found, poles = round(order.number), 2 * round(pairs.number)
+    fundamental = math.lcm(slots, poles)
+    words = f"order {found} a turn; {slots} slots and {poles} poles make multiples of {fundamental}"
+    ratio = found / fundamental
+    if found % fundamental == 0:
+        return Check(NAME, "pass", words, ratio, 0.0, "1")
+    if found % slots == 0:
+        return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal slots or teeth")
+    if found % (poles // 2) == 0:
+        return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal magnets or poles")
+    if found <= 2:
+        return Check(NAME, "marginal", words, ratio, 0.0, "1", "unbalance or an eccentric coupling")
+    return Check(NAME, "fail", words, ratio, 0.0, "1", "not of this motor: a gear, or a wrong slots")
+
+
+RULE = Rule(NAME, check)

@@ -1,0 +1,38 @@
+"""Measured torque constant against the one that the back-EMF promises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pipeline.crosscheck.judge import judge_ratio, not_evaluated, ratio_of
+from pipeline.crosscheck.protocol import Rule
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+
+NAME = "kt_vs_ke"
+
+
+def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
+    """Kt from the dynamometer over 1.5 p psi from the open-circuit spin.
+
+    Energy conservation makes them one number in the amplitude-invariant frame; the allowance
+    covers torque lost in iron, which the back-EMF does not see.
+    """
+    measured, promised = constants.best("kt_peak_nm_a"), constants.best("kt_from_ke_nm_a")
+    if measured is None or promised is None or measured.method == promised.method:
+        return not_evaluated(NAME, "needs a torque_map for Kt and an open_circuit spin for Ke")
+    ratio, u = ratio_of(measured, promised)
+    pairs = constants.best("pole_pairs")
+    return judge_ratio(
+        NAME,
+        ratio,
+        u,
+        options["allowance"],
+        "torque per peak q ampere over 1.5 p psi from the back-EMF",
+        None if pairs is None else round(pairs.number),
+        "gain of the torque, current or voltage sensor",
+    )
+
+
+RULE = Rule(NAME, check, {"allowance": 0.01})

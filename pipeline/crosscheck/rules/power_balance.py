@@ -1,0 +1,89 @@
+"""Whether electrical power less copper loss arrives at the shaft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.protocol import Rule
+from pipeline.physics.conventions import copper_resistance_ohm
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+
+NAME = "power_balance"
+COLUMNS = ("vd_v", "vq_v", "id_a", "iq_a", "omega_mech_rad_s", "torque_shaft_nm")
+BINS = 400
+
+
+def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
+    """Electrical power after losses over mechanical power, over the dynamometer's test.
+
+    The block means of 1.5 (vd id + vq iq) are regressed on shaft power, i² (copper), |i|
+    (inverter drop), |omega| and omega² (friction, iron): the coefficient of shaft power is 1 in any
+    machine, whatever it loses, and lands on a convention's number where one is wrong.
+    """
+    r_phase = constants.best("r_phase_ohm")
+    captures = [c for c in campaign.of("torque_map") if c.has(*COLUMNS)]
+    if not captures:
+        return not_evaluated(NAME, "needs a torque_map with dq voltages, speed and shaft torque")
+    blocks = np.vstack([_blocks(c, None if r_phase is None else r_phase.number) for c in captures])
+    if blocks.shape[0] < 40:
+        return not_evaluated(NAME, "needs longer plateaus in the torque_map")
+    ratio, u_fit = _slope(blocks)
+    meta = captures[0].meta
+    gains = [meta.u_rel_current or 0.0, meta.u_rel_voltage or 0.0, meta.u_rel_torque or 0.0]
+    u = float(np.hypot(u_fit, np.linalg.norm(gains)))
+    pairs = constants.best("pole_pairs")
+    return judge_ratio(
+        NAME,
+        ratio,
+        u,
+        options["allowance"],
+        "electrical power after losses over mechanical power",
+        None if pairs is None else round(pairs.number),
+        "gain of the torque, current, voltage or speed signal",
+    )
+
+
+def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
+    """Block means [n, 7]: net power, shaft power, i², |i|, |omega|, omega², 1; all in SI.
+
+    Copper loss at the winding's temperature is taken off where R and the temperature are known,
+    so that its slow growth is not read as anything else.
+    """
+    wanted = (*COLUMNS, *(n for n in ("temp_winding_degc",) if capture.has(n)))
+    data = capture.arrays(*wanted)
+    i_squared = data["id_a"] ** 2 + data["iq_a"] ** 2
+    power = 1.5 * (data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"])
+    if r_phase_ohm is not None and "temp_winding_degc" in data:
+        r_ohm = copper_resistance_ohm(r_phase_ohm, data["temp_winding_degc"], 25.0)
+        power = power - 1.5 * r_ohm * i_squared
+    omega = data["omega_mech_rad_s"]
+    shaft = data["torque_shaft_nm"] * omega
+    columns = (power, shaft, i_squared, np.sqrt(i_squared), np.abs(omega), omega**2)
+    rows = np.column_stack([*columns, np.ones(omega.size)])
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    size = max(1, rows.shape[0] // BINS)
+    usable = rows[: rows.shape[0] // size * size]
+    means: NDArray[np.float64] = usable.reshape(-1, size, rows.shape[1]).mean(axis=1)
+    return means
+
+
+def _slope(blocks: NDArray[np.float64]) -> tuple[float, float]:
+    """Coefficient of shaft power and its standard uncertainty, robust to unequal scatter."""
+    y, x = blocks[:, 0], blocks[:, 1:]
+    scale = np.maximum(np.abs(x).max(axis=0), 1e-300)
+    scaled = x / scale
+    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10)
+    beta = bread @ (scaled.T @ y)
+    meat = scaled * (y - scaled @ beta)[:, None]
+    lagged = sum((meat[k:].T @ meat[: len(meat) - k] for k in range(1, 6)), np.zeros_like(bread))
+    spread = bread @ (meat.T @ meat + lagged + lagged.T) @ bread
+    return float(beta[0] / scale[0]), float(np.sqrt(max(spread[0, 0], 0.0)) / scale[0])
+
+
+RULE = Rule(NAME, check, {"allowance": 0.02})

@@ -1,0 +1,35 @@
+"""Whether the winding's resistance follows copper as it warms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.protocol import Rule
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+
+NAME = "resistance_temperature"
+
+
+def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
+    """The coefficient found in the heat run over copper's at 25 degC (1/259.5 per kelvin).
+
+    The allowance covers a sensor that reads one spot of a winding with gradients.
+    """
+    alpha = constants.best("temp_coeff_copper_1_k")
+    if alpha is None or alpha.status == "assumed":
+        return not_evaluated(NAME, "needs a heat_run over some tens of kelvin")
+    return judge_ratio(
+        NAME,
+        alpha.number / COPPER_COEFFICIENT_25_1_K,
+        alpha.u / COPPER_COEFFICIENT_25_1_K,
+        options["allowance"],
+        "temperature coefficient of the resistance over copper's",
+        otherwise="a thermometer that lags or sits off the winding, or a winding not of copper",
+    )
+
+
+RULE = Rule(NAME, check, {"allowance": 0.05})

@@ -1,0 +1,47 @@
+"""Writing results: whole or not at all, and the same bytes for the same content."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from pipeline.records.errors import MachineError
+
+
+def canonical_json(document: Any) -> bytes:
+    """JSON bytes [UTF-8] with sorted keys, shortest round-trip numbers and a last newline.
+
+    Raises ValueError for NaN or infinity, which no output may hold.
+    """
+    text = json.dumps(document, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
+    return (text + "\n").encode()
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes a file under a temporary name, syncs and renames it, then syncs the folder.
+
+    Raises MachineError where the disk refuses; the old content, if any, is then untouched.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+        sync_folder(path.parent)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise MachineError(f"cannot write {path.name}: {error.strerror}", "free the disk") from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes renames in a folder survive a power cut."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
