@@ -1,31 +1,61 @@
-"""The shape of `conf/`: plain dataclasses that Hydra merges the YAML files into."""
+"""The shape of `conf/`: plain dataclasses that Hydra merges the YAML files into.
+
+One class a command. `key` gives a field its default and the words that `--help` prints; keys that
+change no result (where to, how fast) are marked so and stay out of the configuration's digest.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any
+
+import pipeline
+from pipeline.records.errors import UsageError
+
+
+def key(default: Any, words: str, *, result: bool = True) -> Any:
+    """A settings field; `result` is False where the value cannot change what is computed."""
+    metadata = {"words": words, "result": result}
+    if isinstance(default, (dict, list)):
+        return field(default_factory=lambda: type(default)(default), metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(kw_only=True)
 class Settings:
     """Keys that every command shares; a command's own are in its subclass."""
 
-    command: str = "run"
-    timings: bool = False
+    timings: bool = key(False, "print the wall time of each stage", result=False)
 
 
 @dataclass(kw_only=True)
 class RunSettings(Settings):
-    """`run`: captures in, datasheets, checks, report and recordings out."""
+    """`run`: captures in; datasheets, checks, report and recordings out."""
 
-    input: str = "data/demo"
-    output: str = "reports/demo"
-    workers: int = 1
-    source: str = "contract"
-    release: str = "manual"
-    limits: str | None = None
-    recordings: bool = True
-    report: bool = True
-    gates: dict[str, Any] = field(default_factory=dict)
-    fit: dict[str, Any] = field(default_factory=dict)
-    crosscheck: dict[str, Any] = field(default_factory=dict)
+    input: str = key("data/demo", "folder of captures, searched with its subfolders", result=False)
+    output: str = key("reports/demo", "folder for everything that is written", result=False)
+    source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
+    release: str = key("manual", "manual, or auto: release a datasheet that meets every condition")
+    limits: str = key("default", "limits file of conf/limits/: constants a release must hold")
+    workers: int = key(0, "motors worked on at once; 0 is one a core", result=False)
+    recordings: bool = key(True, "write a Rerun recording a capture", result=False)
+    report: bool = key(True, "write the HTML report", result=False)
+    fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
+    gates: dict[str, Any] = key({}, "options of a gate: gates.GATE.OPTION=number")
+    crosscheck: dict[str, Any] = key({}, "options of a check: crosscheck.CHECK.OPTION=number")
+
+
+def result_document(settings: Settings) -> dict[str, Any]:
+    """The settings that can change a result, as plain data for a digest."""
+    kept = {f.name for f in fields(settings) if f.metadata.get("result", True)}
+    return {name: value for name, value in sorted(asdict(settings).items()) if name in kept}
+
+
+def configuration_folder() -> Path:
+    """The folder `conf/`: beside the package in a checkout, inside it in a wheel."""
+    package = Path(pipeline.__file__).parent
+    for folder in (package.parent / "conf", package / "conf"):
+        if (folder / "command").is_dir():
+            return folder
+    raise UsageError("the configuration folder conf/ is missing", "reinstall the package")

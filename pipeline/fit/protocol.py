@@ -35,7 +35,7 @@ class Estimator:
     `rank`: preference among estimators that give the same constant; the lowest is published.
     `experiment`: the test to record, in words, when the constant is missing.
     `terms`: glossary entries for constants of its own that `contract/outputs.md` does not name.
-    `options`: its settings with defaults; `fit.options.NAME.KEY=` in the configuration overrides.
+    `options`: its settings with defaults; `fit.NAME.KEY=` in the configuration overrides.
     """
 
     name: str

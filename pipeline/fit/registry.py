@@ -7,6 +7,9 @@ import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from graphlib import TopologicalSorter
+from typing import NamedTuple
+
+import numpy as np
 
 from pipeline.fit import estimators as estimators_room
 from pipeline.fit.protocol import Estimator, Fit
@@ -15,6 +18,17 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence
+
+BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
+REPORT = "the other constants stand; report the capture with this line"
+
+
+class Failure(NamedTuple):
+    """An estimator that broke: the code, message and remedy of a finding."""
+
+    code: str
+    message: str
+    remedy: str
 
 
 @cache
@@ -36,29 +50,36 @@ def estimators() -> tuple[Estimator, ...]:
 
 def fit_all(
     campaign: Campaign, options: Mapping[str, Mapping[str, float]]
-) -> tuple[Constants, tuple[Evidence, ...]]:
+) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
     """Runs every estimator on one motor's campaign.
 
-    Returns all estimates in order of preference (rank, then dependency order) and the evidence.
+    Returns all estimates in order of preference (rank, then dependency order), the evidence, and
+    the estimators that broke on this data: their constants are then not_identifiable.
     """
     found: list[tuple[int, int, Fit]] = []
+    failures: list[Failure] = []
     known = Constants()
     for order, estimator in enumerate(estimators()):
         if campaign.of(*estimator.tests):
             chosen = {**estimator.options, **options.get(estimator.name, {})}
-            result = estimator.fit(campaign, known, chosen)
+            try:
+                result = estimator.fit(campaign, known, chosen)
+            except BROKEN as error:
+                reason = f"{estimator.name} broke on this data: {type(error).__name__}: {error}"
+                failures.append(Failure("estimator_failed", reason, REPORT))
+                result = Fit(_missing(estimator, reason))
         else:
-            result = Fit(_missing(estimator))
+            result = Fit(_missing(estimator, estimator.experiment))
         found.append((estimator.rank, order, result))
         ranked = sorted(found, key=lambda item: item[:2])
         known = Constants(tuple(e for _, _, fit in ranked for e in fit.estimates))
     evidence = tuple(e for _, _, fit in found for e in fit.evidence)
-    return known, evidence
+    return known, evidence, tuple(failures)
 
 
-def _missing(estimator: Estimator) -> tuple[Estimate, ...]:
+def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:
     return tuple(
-        not_identifiable(name, _unit(estimator, name), estimator.name, estimator.experiment)
+        not_identifiable(name, _unit(estimator, name), estimator.name, note)
         for name in estimator.gives
     )
 

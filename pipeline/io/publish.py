@@ -35,7 +35,9 @@ def write_whole(path: Path, content: bytes) -> None:
         sync_folder(path.parent)
     except OSError as error:
         temporary.unlink(missing_ok=True)
-        raise MachineError(f"cannot write {path.name}: {error.strerror}", "free the disk") from error
+        raise MachineError(
+            f"cannot write {path.name}: {error.strerror}", "free the disk"
+        ) from error
 
 
 def sync_folder(folder: Path) -> None:

@@ -36,8 +36,8 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if found % (poles // 2) == 0:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal magnets or poles")
     if found <= 2:
-        return Check(NAME, "marginal", words, ratio, 0.0, "1", "unbalance or an eccentric coupling")
-    return Check(NAME, "fail", words, ratio, 0.0, "1", "not of this motor: a gear, or a wrong slots")
+        return Check(NAME, "marginal", words, ratio, 0.0, "1", "unbalance or eccentricity")
+    return Check(NAME, "fail", words, ratio, 0.0, "1", "another motor's slots, or a gear")
 
 
 RULE = Rule(NAME, check)

@@ -1,0 +1,60 @@
+"""The commands: their stages, their keys and what they say of themselves."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, Field, dataclass, fields
+from typing import Any
+
+from pipeline import settings as s
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """`stage` is a module of `stages/` with `main(settings)`; `words` its one-line description.
+
+    `positional` are keys that may be given without their name, in this order.
+    """
+
+    name: str
+    stage: str
+    settings: type[s.Settings]
+    words: str
+    positional: tuple[str, ...] = ()
+
+
+def _index(*commands: Command) -> dict[str, Command]:
+    return {command.name: command for command in commands}
+
+
+COMMANDS = _index(
+    Command("run", "run", s.RunSettings, "captures in; datasheets, checks, report, recordings out"),
+)
+
+
+def overview() -> str:
+    """What `python -m pipeline` prints: the commands and where to go on."""
+    lines = ["usage: python -m pipeline COMMAND key=value ...", "", "commands"]
+    lines += [f"  {c.name:<10} {c.words}" for c in COMMANDS.values()]
+    lines += ["", "python -m pipeline COMMAND --help lists the keys of a command."]
+    return "\n".join(lines)
+
+
+def usage(command: Command) -> str:
+    """What `--help` prints: every key with its default and its meaning."""
+    places = "".join(f" {name.upper()}" for name in command.positional)
+    lines = [f"usage: python -m pipeline {command.name}{places} key=value ...", ""]
+    lines += [command.words, "", "keys"]
+    for key in fields(command.settings):
+        lines.append(f"  {key.name}={_default(key)}")
+        if words := key.metadata.get("words"):
+            lines.append(f"      {words}")
+    return "\n".join(lines)
+
+
+def _default(key: Field[Any]) -> str:
+    if key.default is not MISSING:
+        return "null" if key.default is None else str(key.default)
+    if key.default_factory is not MISSING:
+        made = key.default_factory()
+        return "{}" if made == {} else str(made).replace("'", "")
+    return "..."

@@ -1,0 +1,86 @@
+"""Hydra, kept at arm's length: `conf/` and overrides in, one settings object out.
+
+Text keys are taken as typed, because an override grammar would turn serial number 00123 into 83
+(YAML 1.1 octal) and `${...}` into a look-up. No resolver and no `_target_` is ever evaluated.
+"""
+
+from __future__ import annotations
+
+import typing
+from typing import Any
+
+from pipeline.commands import Command
+from pipeline.records.errors import UsageError
+from pipeline.settings import Settings, configuration_folder
+
+
+def load_settings(command: Command, words: list[str]) -> Settings:
+    """The settings of a command from its defaults, `conf/command/NAME.yaml` and the overrides.
+
+    Raises UsageError for an unknown key, a value of the wrong type or a word that is no override.
+    """
+    kinds = typing.get_type_hints(command.settings)
+    named = _with_names(command, words)
+    texts: dict[str, str | None] = {}
+    rest: list[str] = []
+    for word in named:
+        key, _, value = word.partition("=")
+        if _is_text(kinds.get(key)):
+            texts[key] = _unquoted(value)
+        else:
+            nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict
+            rest.append(f"++{word}" if nested else word)
+    settings = _composed(command, rest)
+    for key, text in texts.items():
+        setattr(settings, key, None if text == "null" else text)
+    return settings
+
+
+def _with_names(command: Command, words: list[str]) -> list[str]:
+    """Words without `=` take the positional names in their order."""
+    free = list(command.positional)
+    named = []
+    for word in words:
+        if "=" in word and word.split("=", 1)[0].lstrip("+~").replace(".", "_").isidentifier():
+            named.append(word)
+        elif free:
+            named.append(f"{free.pop(0)}={word}")
+        else:
+            raise UsageError(
+                f"{command.name}: {word!r} is no key=value",
+                f"`python -m pipeline {command.name} --help` lists the keys",
+            )
+    return named
+
+
+def _composed(command: Command, overrides: list[str]) -> Settings:
+    from hydra import compose, initialize_config_dir
+    from hydra.core.config_store import ConfigStore
+    from hydra.errors import HydraException
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    if any("${" in word for word in overrides):
+        raise UsageError("overrides hold no ${...}", "write the value itself")
+    store = ConfigStore.instance()
+    store.store(group="schema", name=command.name, node=command.settings, package="_global_")
+    try:
+        with initialize_config_dir(str(configuration_folder()), version_base="1.3"):
+            config = compose(f"command/{command.name}", overrides=overrides)
+        made: Settings = typing.cast(Settings, OmegaConf.to_object(config))
+    except (HydraException, OmegaConfBaseException) as error:
+        reason = str(error).splitlines()[0].rstrip(".")
+        raise UsageError(
+            f"{command.name}: {reason}",
+            f"`python -m pipeline {command.name} --help` lists the keys",
+        ) from error
+    return made
+
+
+def _is_text(kind: Any) -> bool:
+    return kind is str or kind == str | None
+
+
+def _unquoted(value: str) -> str:
+    quoted = len(value) >= 2 and value[0] == value[-1] and value[0] in "'\""
+    return value[1:-1] if quoted else value

@@ -1,0 +1,43 @@
+"""Whether a datasheet is released, provisional or refused, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from pipeline.records.datasheet import CaptureReference, Check, DatasheetStatus
+from pipeline.records.estimate import Estimate
+
+
+def verdict(
+    constants: Mapping[str, Estimate],
+    checks: Sequence[Check],
+    captures: Iterable[CaptureReference],
+    required: Sequence[str],
+    release: str,
+) -> tuple[DatasheetStatus, tuple[str, ...]]:
+    """The status of `contract/outputs.md` and every reason that keeps it from `released`.
+
+    `required` are the constants that the limits file wants measured; `release` is `auto` or
+    `manual` (then a person approves in the registry, and the file stays provisional).
+    """
+    failed = [check for check in checks if check.status == "fail"]
+    if failed:
+        return "refused", tuple(_failure(check) for check in failed)
+    why = [f"unverified: {ref.path}" for ref in captures if ref.integrity != "verified"]
+    for name in required:
+        estimate = constants.get(name)
+        if estimate is None or not estimate.known:
+            reason = "no capture of it" if estimate is None else estimate.note
+            why.append(f"missing: {name} ({reason})")
+        elif estimate.status == "assumed":
+            why.append(f"assumed, not measured: {name}")
+        elif estimate.at_bound:
+            why.append(f"at its bound: {name}")
+    if release != "auto":
+        why.append("not approved: approve it in the registry, or run with release=auto")
+    return ("provisional", tuple(why)) if why else ("released", ())
+
+
+def _failure(check: Check) -> str:
+    suspect = f"; suspect: {check.suspect}" if check.suspect else ""
+    return f"check {check.name} failed: {check.meaning}{suspect}"

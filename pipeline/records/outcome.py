@@ -1,0 +1,46 @@
+"""What a command hands back to the one door: what to print, where, and the exit code."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """`text` goes to standard output, `errors` line by line to standard error."""
+
+    exit_code: int = 0
+    text: str = ""
+    errors: tuple[str, ...] = ()
+    timings: tuple[tuple[str, float], ...] = ()
+
+
+PRECEDENCE = (5, 2, 1, 3, 4, 0)
+
+
+def first_that_applies(*codes: int) -> int:
+    """The exit code that `contract/outputs.md` puts first among those that apply."""
+    return min(codes, key=PRECEDENCE.index, default=0)
+
+
+@dataclass(slots=True)
+class Stopwatch:
+    """Seconds spent in each stage, summed by name, for `timings=true`; never part of an output."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Adds the wall time of the block to a stage [s]."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+    def table(self) -> tuple[tuple[str, float], ...]:
+        """(stage, seconds) in the order in which stages first ran."""
+        return tuple(self.seconds.items())

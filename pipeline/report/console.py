@@ -1,0 +1,75 @@
+"""The summary that a run prints: one line a motor, what failed, where to look."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.estimate import Estimate
+from pipeline.records.finding import Finding
+
+COLUMNS: tuple[tuple[str, str, float], ...] = (
+    ("p", "pole_pairs", 1.0),
+    ("R [mohm]", "r_phase_ohm", 1e3),
+    ("Ld [uH]", "ld_h", 1e6),
+    ("Lq [uH]", "lq_h", 1e6),
+    ("psi [mWb]", "psi_pm_wb", 1e3),
+    ("Kt [mN·m/A]", "kt_peak_nm_a", 1e3),
+    ("J [g·cm²]", "j_rotor_kgm2", 1e7),
+    ("Tc [mN·m]", "torque_coulomb_nm", 1e3),
+    ("cogging", "cogging_order", 1.0),
+)
+NONE = "-"
+
+
+def summary(
+    datasheets: Sequence[Datasheet], findings: Sequence[Finding], output: str, *, report: bool
+) -> str:
+    """The text for a terminal: a table of motors, the failed checks, the counts, the way in."""
+    lines: list[str] = []
+    if datasheets:
+        lines += [*_table(datasheets), ""]
+    for sheet in datasheets:
+        lines += [
+            f"{sheet.motor_id}: {c.name} {c.status}: {c.meaning}"
+            + (f"; suspect: {c.suspect}" if c.suspect else "")
+            for c in sheet.checks
+            if c.status in ("fail", "marginal")
+        ]
+    counts = Counter(sheet.status for sheet in datasheets)
+    states = ", ".join(f"{counts[s]} {s}" for s in ("released", "provisional", "refused"))
+    refused = sum(finding.severity == "refused" for finding in findings)
+    lines.append(f"{len(datasheets)} motors: {states}; {refused} captures refused")
+    if report and datasheets:
+        lines.append(f"open {output}/report/index.html")
+    return "\n".join(lines)
+
+
+def _table(datasheets: Sequence[Datasheet]) -> list[str]:
+    head = ["motor", "lot", "status", *(title for title, *_ in COLUMNS)]
+    rows = [
+        [
+            sheet.motor_id,
+            sheet.lot or NONE,
+            sheet.status,
+            *(_cell(sheet.constants.get(name), scale) for _, name, scale in COLUMNS),
+        ]
+        for sheet in datasheets
+    ]
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    return [
+        "  ".join(
+            text.ljust(width) if column < 3 else text.rjust(width)
+            for column, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [head, *rows]
+    ]
+
+
+def _cell(estimate: Estimate | None, scale: float) -> str:
+    if estimate is None or estimate.value is None:
+        return NONE
+    if isinstance(estimate.value, int):
+        return str(estimate.value)
+    return f"{estimate.value * scale:.4g}"

@@ -1,0 +1,180 @@
+"""`run`: recordings in, motor datasheets out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from pipeline.crosscheck.registry import rules
+from pipeline.fit.registry import estimators
+from pipeline.io.ingest import Entry, survey
+from pipeline.io.limits import limits_file, required_constants
+from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.source_map import SourceMap, load_source_maps
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.errors import MachineError, PipelineError, UsageError
+from pipeline.records.finding import Finding
+from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
+from pipeline.report.console import summary
+from pipeline.settings import RunSettings, configuration_folder, result_document
+from pipeline.stages.motor import MotorJob, MotorResult, process_motor
+
+MANIFEST = "outputs.json"
+
+
+def main(settings: RunSettings) -> Outcome:
+    """Every motor of `input` to `output`; refused captures are named and the rest goes on."""
+    watch = Stopwatch()
+    _known_options(settings)
+    folder = Path(settings.input)
+    if not folder.is_dir():
+        raise UsageError(f"input={settings.input} is no folder", "name the folder of captures")
+    conf = configuration_folder()
+    limits = limits_file(conf / "limits", settings.limits)
+    maps = load_source_maps(conf / "source", settings.source)
+    with watch.stage("survey"):
+        entries, findings = survey(folder, maps)
+    jobs = _jobs(settings, entries, findings, limits, maps)
+    with watch.stage("motors"):
+        results = _process(jobs, settings.workers)
+    findings = tuple(sorted({*findings, *(f for r in results for f in r.findings)}))
+    with watch.stage("fleet"):
+        _publish(settings, results, findings)
+    for result in results:
+        for name, seconds in result.seconds.items():
+            watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
+    return _outcome(settings, results, findings, len(entries), watch)
+
+
+def _known_options(settings: RunSettings) -> None:
+    """Refuses an option of an estimator or check that does not exist: a typo must not be silent."""
+    plugs: tuple[tuple[str, Mapping[str, Any], Mapping[str, Mapping[str, float]]], ...] = (
+        ("fit", settings.fit, {e.name: e.options for e in estimators()}),
+        ("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()}),
+    )
+    for room, given, known in plugs:
+        for name, options in given.items():
+            if name not in known:
+                raise UsageError(f"{room}.{name}: no such plug-in", f"one of {', '.join(known)}")
+            for option in options:
+                if option not in known[name]:
+                    has = ", ".join(known[name]) or "none"
+                    raise UsageError(f"{room}.{name}.{option}: no such option", f"it has {has}")
+
+
+def _jobs(
+    settings: RunSettings,
+    entries: Sequence[Entry],
+    findings: Sequence[Finding],
+    limits: Path,
+    maps: Sequence[SourceMap],
+) -> list[MotorJob]:
+    digest = hashlib.sha256(canonical_json(result_document(settings)))
+    digest.update(limits.read_bytes())
+    for source_map in maps:
+        digest.update(source_map.sha256.encode())
+    motors: dict[str, list[Entry]] = {}
+    for entry in entries:
+        motors.setdefault(entry.meta.motor_id, []).append(entry)
+    return [
+        MotorJob(
+            motor_id=motor_id,
+            entries=tuple(own),
+            input=settings.input,
+            output=settings.output,
+            config_sha256=digest.hexdigest(),
+            required=required_constants(limits),
+            release=settings.release,
+            report=settings.report,
+            recordings=settings.recordings,
+            gates=settings.gates,
+            fit=settings.fit,
+            crosscheck=settings.crosscheck,
+            findings=tuple(f for f in findings if f.file in {e.path for e in own}),
+        )
+        for motor_id, own in sorted(motors.items())
+    ]
+
+
+def _process(jobs: Sequence[MotorJob], workers: int) -> list[MotorResult]:
+    """The results in the order of the jobs; a job that dies leaves the others' results whole."""
+    if not jobs:
+        return []
+    with _executor(min(workers or os.cpu_count() or 1, len(jobs))) as executor:
+        futures = [executor.submit(process_motor, job) for job in jobs]
+        errors = [future.exception() for future in futures]
+    for job, error in zip(jobs, errors, strict=True):
+        if isinstance(error, PipelineError):
+            raise error
+        if error is not None:
+            raise MachineError(
+                f"motor {job.motor_id} could not be finished: {type(error).__name__}: {error}",
+                "the motors before it are written; rerun to go on",
+            ) from error
+    return [future.result() for future in futures]
+
+
+def _executor(workers: int) -> Executor:
+    if workers == 1:
+        return ThreadPoolExecutor(1)
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+
+
+def _publish(
+    settings: RunSettings, results: Sequence[MotorResult], findings: Sequence[Finding]
+) -> None:
+    """Writes what belongs to the batch, then takes away what an earlier run left behind."""
+    output = Path(settings.output)
+    document = {"schema": "findings/1", "findings": [f.document() for f in findings]}
+    write_whole(output / "findings.json", canonical_json(document))
+    files = ["findings.json", *(name for result in results for name in result.files)]
+    if settings.report:
+        from pipeline.report.fleet_page import render_fleet
+
+        files.append("report/index.html")
+        page = render_fleet(_datasheets(results), tuple(findings))
+        write_whole(output / "report/index.html", page.encode())
+    _sweep(output, files)
+
+
+def _sweep(output: Path, files: Sequence[str]) -> None:
+    """Removes the files that the last run listed and this one did not write."""
+    manifest = output / MANIFEST
+    before = json.loads(manifest.read_bytes())["files"] if manifest.is_file() else []
+    for name in sorted(set(before) - set(files)):
+        stale = output / name
+        if stale.resolve().is_relative_to(output.resolve()):
+            stale.unlink(missing_ok=True)
+    write_whole(manifest, canonical_json({"schema": "outputs/1", "files": sorted(files)}))
+
+
+def _datasheets(results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
+    return tuple(r.datasheet for r in results if r.datasheet is not None)
+
+
+def _outcome(
+    settings: RunSettings,
+    results: Sequence[MotorResult],
+    findings: Sequence[Finding],
+    captures: int,
+    watch: Stopwatch,
+) -> Outcome:
+    datasheets = _datasheets(results)
+    statuses = [{check.status for check in sheet.checks} for sheet in datasheets]
+    code = first_that_applies(
+        1 if any("fail" in seen for seen in statuses) else 0,
+        3 if any(finding.severity == "refused" for finding in findings) else 0,
+        4 if not datasheets or any(seen == {"not_evaluated"} for seen in statuses) else 0,
+    )
+    lines = tuple(finding.line() for finding in findings)
+    if not captures:
+        nothing = f"undecided: no captures in {settings.input}; see `pipeline inspect FILE`"
+        lines = (*lines, nothing)
+    text = summary(datasheets, findings, settings.output, report=settings.report)
+    return Outcome(code, text, lines, watch.table())
