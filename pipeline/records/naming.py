@@ -1,0 +1,58 @@
+"""File names for motors: whatever the serial number says, one safe name that no other shares."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+
+MAX_CHARS = 100
+_KEPT = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
+_RESERVED = frozenset(
+    ["con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))]
+)
+_WORD = re.compile("[A-Za-z]+")
+
+
+def file_stem(motor_id: str) -> str:
+    """The file name, without extension, that stands for a motor.
+
+    ASCII letters, digits and `-_.` stay; every other byte of the UTF-8 form becomes `~` and two
+    hex digits, as do a first `-` or `.`, a last `.`, and the first letter of a name that Windows
+    keeps for devices. Two ids that differ in case alone must differ on every file system: words
+    of one or two letters are expected in capitals, longer ones in small letters (`joint-P0`,
+    `SN-12`), and an id written otherwise ends in `~u` and a hex mask of the letters that deviate
+    (bit 0 is the first). What is then longer than `MAX_CHARS` keeps a readable beginning and ends
+    in `~h` and a sha256. The empty id is `~n`. No two ids share a name, whatever the case.
+    """
+    if not motor_id:
+        return "~n"
+    stem = _escaped(motor_id) + _case_mark(motor_id)
+    if len(stem) <= MAX_CHARS:
+        return stem
+    digest = hashlib.sha256(_bytes(motor_id)).hexdigest()
+    return f"{stem[: MAX_CHARS - len(digest) - 2]}~h{digest}"
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "surrogatepass")
+
+
+def _escaped(text: str) -> str:
+    forced = set()
+    if text[0] in "-." or text.split(".", maxsplit=1)[0].lower() in _RESERVED:
+        forced.add(0)
+    if text[-1] == ".":
+        forced.add(len(text) - 1)
+    return "".join(
+        char
+        if char in _KEPT and index not in forced
+        else "".join(f"~{byte:02x}" for byte in _bytes(char))
+        for index, char in enumerate(text)
+    )
+
+
+def _case_mark(text: str) -> str:
+    expected = _WORD.sub(lambda m: m[0].upper() if len(m[0]) <= 2 else m[0].lower(), text)
+    letters = [(a, b) for a, b in zip(text, expected, strict=True) if a.isascii() and a.isalpha()]
+    mask = sum(1 << bit for bit, (was, normal) in enumerate(letters) if was != normal)
+    return f"~u{mask:x}" if mask else ""
