@@ -1,0 +1,97 @@
+"""Where the type B uncertainty of a fit comes from: instruments that every sample shares.
+
+An estimator states its data as a function of a `Shift` of each source; refitting under a shift of
+one standard uncertainty gives that source's signed contribution, correlations and all. Reference:
+GUM 5.1.3 note 2 (numerical sensitivity) and H.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.uncertainty import Budget, Contribution
+
+Array = NDArray[np.float64]
+Shift = Mapping[str, float]
+
+
+def station(meta: CaptureMeta) -> str:
+    """The bench's name, `unknown` where the capture does not say."""
+    return meta.station or "unknown"
+
+
+def voltage_source(meta: CaptureMeta) -> str:
+    """The source of a voltage reading's gain error; a commanded voltage is another instrument."""
+    kind = "voltage" if meta.voltage_kind == "measured" else "voltage_commanded"
+    return f"{kind}@{station(meta)}"
+
+
+def current_source(meta: CaptureMeta) -> str:
+    """The source of a current reading's gain error."""
+    return f"current@{station(meta)}"
+
+
+def temperature_source(meta: CaptureMeta) -> str:
+    """The source of a thermometer's offset."""
+    return f"temperature@{station(meta)}"
+
+
+def instrument_uncertainties(
+    captures: Iterable[Capture], kinds: Iterable[str] = ("voltage", "current", "temperature")
+) -> dict[str, float]:
+    """Standard uncertainty of each source: relative for gains, [K] for temperatures.
+
+    The largest that the captures of a station state; 0 where none states it.
+    """
+    wanted = tuple(kinds)
+    found: dict[str, float] = {}
+    for capture in captures:
+        meta = capture.meta
+        stated = {
+            "voltage": (voltage_source(meta), meta.u_rel_voltage),
+            "current": (current_source(meta), meta.u_rel_current),
+            "temperature": (temperature_source(meta), meta.u_temp_degc),
+        }
+        for kind in wanted:
+            source, u = stated[kind]
+            found[source] = max(found.get(source, 0.0), u or 0.0)
+    return dict(sorted(found.items()))
+
+
+def unstated_note(
+    captures: Iterable[Capture], kinds: Iterable[str] = ("voltage", "current", "temperature")
+) -> str:
+    """Which `u_*` keys no capture states, in words, or an empty string."""
+    keys = {"voltage": "u_rel_voltage", "current": "u_rel_current", "temperature": "u_temp_degc"}
+    metas = [capture.meta for capture in captures]
+    missing = [keys[k] for k in kinds if all(getattr(m, keys[k]) is None for m in metas)]
+    return f"{', '.join(missing)} not stated, taken as 0" if missing else ""
+
+
+def contributions(
+    evaluate: Callable[[Shift], Array], uncertainties: Mapping[str, float]
+) -> list[list[Contribution]]:
+    """For each of the k results of evaluate(shift) [k], the type B contribution of each source.
+
+    `evaluate` refits with each source shifted by the amounts given (a relative gain error, an
+    offset [K], whatever `uncertainties` counts); half the central difference of plus and minus
+    one standard uncertainty is the signed contribution.
+    """
+    size = evaluate({}).size
+    budgets: list[list[Contribution]] = [[] for _ in range(size)]
+    for source, u in sorted(uncertainties.items()):
+        if u == 0.0:
+            continue
+        half = 0.5 * (evaluate({source: u}) - evaluate({source: -u}))
+        for index in range(size):
+            budgets[index].append(Contribution(source, float(half[index]), "B"))
+    return budgets
+
+
+def budget_of(parts: Iterable[Contribution]) -> Budget:
+    """The parts sorted by source, so that equal work gives equal bytes."""
+    return tuple(sorted((p for p in parts if p.u != 0.0), key=lambda part: part.source))
