@@ -35,6 +35,11 @@ def current_source(meta: CaptureMeta) -> str:
     return f"current@{station(meta)}"
 
 
+def torque_source(meta: CaptureMeta) -> str:
+    """The source of a torque transducer's gain error."""
+    return f"torque@{station(meta)}"
+
+
 def temperature_source(meta: CaptureMeta) -> str:
     """The source of a thermometer's offset."""
     return f"temperature@{station(meta)}"
@@ -55,6 +60,7 @@ def instrument_uncertainties(
             "voltage": (voltage_source(meta), meta.u_rel_voltage),
             "current": (current_source(meta), meta.u_rel_current),
             "temperature": (temperature_source(meta), meta.u_temp_degc),
+            "torque": (torque_source(meta), meta.u_rel_torque),
         }
         for kind in wanted:
             source, u = stated[kind]
@@ -66,7 +72,12 @@ def unstated_note(
     captures: Iterable[Capture], kinds: Iterable[str] = ("voltage", "current", "temperature")
 ) -> str:
     """Which `u_*` keys no capture states, in words, or an empty string."""
-    keys = {"voltage": "u_rel_voltage", "current": "u_rel_current", "temperature": "u_temp_degc"}
+    keys = {
+        "voltage": "u_rel_voltage",
+        "current": "u_rel_current",
+        "temperature": "u_temp_degc",
+        "torque": "u_rel_torque",
+    }
     metas = [capture.meta for capture in captures]
     missing = [keys[k] for k in kinds if all(getattr(m, keys[k]) is None for m in metas)]
     return f"{', '.join(missing)} not stated, taken as 0" if missing else ""
