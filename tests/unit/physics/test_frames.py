@@ -1,0 +1,53 @@
+"""Space vectors against sampled three-phase systems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.physics.frames import (
+    phases,
+    space_vector,
+    space_vector_of_lines,
+    to_rotor,
+    to_stator,
+)
+
+VALUE = st.floats(-1e3, 1e3)
+
+
+def _balanced(theta: np.ndarray, amplitude: float) -> list[np.ndarray]:
+    shift = 2.0 * np.pi / 3.0
+    return [amplitude * np.cos(theta - k * shift) for k in range(3)]
+
+
+def test_a_balanced_system_is_one_length_and_turns_forward() -> None:
+    theta = np.linspace(0.0, 6.0, 50)
+    vector = space_vector(*_balanced(theta, 5.0))
+    assert np.abs(vector) == pytest.approx(5.0)
+    assert np.unwrap(np.angle(vector)) == pytest.approx(theta)
+    assert to_rotor(vector, theta) == pytest.approx(np.full(50, 5.0 + 0.0j))
+    assert to_stator(to_rotor(vector, theta), theta) == pytest.approx(vector)
+
+
+@given(a=VALUE, b=VALUE, c=VALUE)
+def test_phases_come_back_without_their_common_part(a: float, b: float, c: float) -> None:
+    mean = (a + b + c) / 3.0
+    back = [float(x) for x in phases(space_vector(a, b, c))]
+    assert back == pytest.approx([a - mean, b - mean, c - mean], abs=1e-9)
+
+
+@given(a=VALUE, b=VALUE, c=VALUE)
+def test_line_voltages_give_the_same_vector(a: float, b: float, c: float) -> None:
+    from_lines = complex(space_vector_of_lines(a - b, b - c))
+    assert from_lines == pytest.approx(complex(space_vector(a, b, c)), abs=1e-9)
+
+
+def test_power_needs_the_factor_three_halves() -> None:
+    """Independent: the sum of the phases' v·i is 1.5 Re(v i*)."""
+    volts, amps = (3.0, -1.0, -2.0), (0.5, 0.25, -0.75)
+    by_phase = sum(v * i for v, i in zip(volts, amps, strict=True))
+    v, i = space_vector(*volts), space_vector(*amps)
+    assert 1.5 * float((v * np.conj(i)).real) == pytest.approx(by_phase)
