@@ -1,0 +1,108 @@
+"""Too little of the turn: angles that the test asks for and the capture does not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed, warning
+from pipeline.contracts.requirements import LINE_VOLTAGES
+from pipeline.contracts.rotation import TURN_RAD, turned_rad, turning
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+
+CODE = "angle_coverage"
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Whether the turn, or the angles of a table, were covered; names what is missing."""
+    return LOOKS[capture.meta.test](capture, options)
+
+
+def _whole_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
+    turned = turned_rad(capture)
+    if capture.meta.test == "holding_current":
+        turned = float(np.nanmax(_angles(capture)) - np.nanmin(_angles(capture)))
+    if turned is None or turned >= options["turns"] * TURN_RAD:
+        return Passed()
+    raise CaptureError(
+        CODE,
+        f"the shaft passes {turned / TURN_RAD:.2f} of a turn",
+        "record at least one mechanical turn",
+    )
+
+
+def _both_directions(capture: Capture, options: Mapping[str, float]) -> Passed:
+    passed = _whole_turn(capture, options)
+    angle = _angles(capture)
+    angle = angle[np.isfinite(angle)]
+    travel = np.diff(angle[:: max(1, angle.size // 500)])
+    back, forth = -travel[travel < 0.0].sum(), travel[travel > 0.0].sum()
+    if min(back, forth) >= options["return_share"] * max(back, forth):
+        return passed
+    words = "the angles were passed in one direction only: friction cannot be told from cogging"
+    remedy = "hold the same angles on the way back as well"
+    return Passed(findings=(*passed.findings, warning(capture, CODE, words, remedy)))
+
+
+def _angles(capture: Capture) -> np.ndarray:
+    return capture.arrays("theta_mech_rad", masked=False)["theta_mech_rad"]
+
+
+def _electrical_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
+    seen = turning(capture)
+    if seen is not None and seen.cycles >= options["cycles"]:
+        return Passed()
+    seen_words = "no back-EMF turns" if seen is None else f"the back-EMF turns {seen.cycles:.2f}"
+    raise CaptureError(
+        CODE,
+        f"{seen_words} where {options['cycles']:g} electrical cycles are needed",
+        "drive the shaft with open terminals, at two speeds or more",
+    )
+
+
+def _hand_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
+    largest = max(
+        float(np.nanmax(np.abs(capture.arrays(n)[n]))) for n in LINE_VOLTAGES if capture.has(n)
+    )
+    if largest == 0.0:
+        raise CaptureError(CODE, "there is no back-EMF", "turn the shaft, terminals open")
+    return _whole_turn(capture, options)
+
+
+def _locked_angles(capture: Capture, options: Mapping[str, float]) -> Passed:
+    angles = capture.arrays("theta_elec_deg")["theta_elec_deg"]
+    folded = np.unique(np.mod(np.round(angles[np.isfinite(angles)], 3), 180.0))
+    if folded.size >= options["rotor_angles"] or capture.has("lab_h", "lbc_h", "lca_h"):
+        return Passed()
+    remedy = "record at least three rotor angles spread over 180° electrical, or all three pairs"
+    words = f"{folded.size} rotor angles (modulo 180° electrical) do not fix L_d, L_q and the axis"
+    if folded.size < 2:
+        raise CaptureError(CODE, words, remedy)
+    return Passed(findings=(warning(capture, CODE, words, remedy),))
+
+
+LOOKS: dict[str, Callable[[Capture, Mapping[str, float]], Passed]] = {
+    "cogging": _whole_turn,
+    "holding_current": _both_directions,
+    "hand_turn": _hand_turn,
+    "open_circuit": _electrical_turn,
+    "lcr": _locked_angles,
+}
+
+GATE = Gate(
+    CODE,
+    tuple(LOOKS),
+    check,
+    {
+        # Orders of a turn are orthogonal over a whole one; a twentieth short costs 5 %.
+        "turns": 0.95,
+        # One cycle is the least that has an amplitude.
+        "cycles": 1.0,
+        # L(theta) = mean + amplitude cos(2 theta + phase): three unknowns.
+        "rotor_angles": 3.0,
+        # Way back over way there.
+        "return_share": 0.5,
+    },
+)

@@ -1,0 +1,101 @@
+"""A clock that skips while the motor does not: time passes, the signal does not move on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import polars as pl
+
+from pipeline.contracts.protocol import Gate, Passed
+from pipeline.contracts.waveform import Array, gaps_of
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+
+NAME = "clock_jump"
+WITNESSES = {
+    "open_circuit": ("theta_mech_rad", "theta_elec_rad"),
+    "hand_turn": ("theta_mech_rad",),
+    "cogging": ("theta_mech_rad",),
+    "torque_map": ("theta_mech_rad", "theta_elec_rad"),
+    "drive": ("theta_mech_rad", "theta_elec_rad"),
+    "spin_down": ("theta_mech_rad", "omega_mech_rad_s"),
+    "current_step": ("ia_a", "ib_a", "ic_a"),
+    "heat_run": ("temp_winding_degc", "theta_mech_rad"),
+}
+GAPS_LOOKED_AT = 200
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Refuses a capture in which a steady signal goes on across a gap as if there were none."""
+    for table in capture.tables:
+        if "t_s" not in table.columns or table.height < 3:
+            continue
+        t_s = table["t_s"].to_numpy()
+        gaps, usual_s = gaps_of(t_s, options["gap_intervals"])
+        names = [n for n in WITNESSES[capture.meta.test] if n in table.columns]
+        for gap in gaps[:GAPS_LOOKED_AT]:
+            for name in names:
+                if _went_on(table, name, int(gap), usual_s, options):
+                    skipped = t_s[gap + 1] - t_s[gap]
+                    raise CaptureError(
+                        NAME,
+                        f"t_s jumps by {skipped:.4g} s between two samples while {name} goes on "
+                        f"as after {usual_s:.3g} s",
+                        "fix the logger's clock, or cut the file at that row",
+                        (int(gap), int(gap) + 1),
+                    )
+    return Passed()
+
+
+def _went_on(
+    table: pl.DataFrame, name: str, gap: int, usual_s: float, options: Mapping[str, float]
+) -> bool:
+    """Whether the signal moved by one usual interval's worth, and clearly not by the gap's.
+
+    Straight lines on either side give the signal and its slope at the gap's ends. The change
+    between them is held against the mean slope times the gap, and times one usual interval.
+    """
+    window = int(options["window"])
+    t_s, values = table["t_s"].to_numpy(), table[name].to_numpy()
+    before = slice(max(0, gap + 1 - window), gap + 1)
+    after = slice(gap + 1, gap + 1 + window)
+    left = _line(t_s[before], values[before], float(t_s[gap]))
+    right = _line(t_s[after], values[after], float(t_s[gap + 1]))
+    if left is None or right is None:
+        return False
+    skipped = t_s[gap + 1] - t_s[gap]
+    slope = 0.5 * (left[1] + right[1])
+    as_stamped = right[0] - left[0] - slope * skipped
+    if_closed = right[0] - left[0] - slope * usual_s
+    sigma = float(np.hypot(left[2], right[2])) + 0.5 * abs(right[1] - left[1]) * usual_s
+    clear = abs(as_stamped) > options["sigmas"] * sigma
+    return bool(clear and abs(if_closed) < 0.25 * abs(as_stamped))
+
+
+def _line(t_s: Array, values: Array, at_s: float) -> tuple[float, float, float] | None:
+    """Value of a straight line at a time, its slope, and the scatter of the samples about it."""
+    good = np.isfinite(values)
+    if np.count_nonzero(good) < 6:
+        return None
+    t_s, values = t_s[good], values[good]
+    centred = t_s - t_s.mean()
+    slope = float(centred @ values / (centred @ centred))
+    left = values - values.mean() - slope * centred
+    scatter = float(np.sqrt(left @ left / (left.size - 2)))
+    return float(values.mean() + slope * (at_s - t_s.mean())), slope, scatter
+
+
+GATE = Gate(
+    NAME,
+    tuple(WITNESSES),
+    check,
+    {
+        # Half way between one interval and two.
+        "gap_intervals": 1.5,
+        # Samples a side: enough for a slope through noise, few enough to be straight.
+        "window": 25.0,
+        # Over the scatter about the lines: never by chance in any fleet.
+        "sigmas": 8.0,
+    },
+)

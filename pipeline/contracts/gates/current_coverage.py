@@ -1,0 +1,113 @@
+"""Too little current, or too few levels of it, for what the test is to show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed, warning
+from pipeline.contracts.requirements import LINE_CURRENTS
+from pipeline.contracts.waveform import Array, noise_of
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+
+CODE = "current_coverage"
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Whether the currents of the test were there; a refusal names the missing experiment."""
+    return LOOKS[capture.meta.test](capture, options)
+
+
+def _finite(capture: Capture, *names: str) -> dict[str, Array]:
+    there = {n: capture.arrays(n)[n] for n in names if capture.has(n)}
+    return {n: v[np.isfinite(v)] for n, v in there.items() if np.isfinite(v).any()}
+
+
+def _clear_of_noise(values: Array, reach: float, times: float) -> bool:
+    return reach > times * noise_of(values)
+
+
+def _resistance(capture: Capture, options: Mapping[str, float]) -> Passed:
+    currents = _finite(capture, *LINE_CURRENTS)
+    times = options["noise_multiple"]
+    flows = [v for v in currents.values() if _clear_of_noise(v, np.abs(v).max(), times)]
+    if not flows:
+        raise CaptureError(
+            CODE,
+            "no current flows in any line",
+            "drive DC steps through the pair: at least two levels, of both signs",
+        )
+    spread = max(np.percentile(v, 95) - np.percentile(v, 5) for v in flows)
+    if all(spread <= max(times * noise_of(v), 0.05 * np.abs(v).max()) for v in flows):
+        words = "all current is at one level: the offset of the leads cannot be told from R"
+        remedy = "record at least two levels, best of both signs"
+        return Passed(findings=(warning(capture, CODE, words, remedy),))
+    return Passed()
+
+
+def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
+    currents = _finite(capture, *LINE_CURRENTS)
+    times = options["noise_multiple"]
+    if any(_clear_of_noise(v, np.ptp(v), 2.0 * times) for v in currents.values()):
+        return Passed()
+    raise CaptureError(
+        CODE,
+        "no line current leaves its noise: there is no step",
+        "record a voltage step on the pair, with the rotor locked",
+    )
+
+
+def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
+    current = _finite(capture, "iq_a")["iq_a"]
+    if _clear_of_noise(current, np.ptp(current), 2.0 * options["noise_multiple"]):
+        return Passed()
+    raise CaptureError(
+        CODE,
+        "iq_a stays at one level: torque against current has no slope",
+        "record steps of q current at held speed, of both signs",
+    )
+
+
+def _heat_run(capture: Capture, options: Mapping[str, float]) -> Passed:
+    temperature = _finite(capture, "temp_winding_degc")["temp_winding_degc"]
+    rise = float(np.ptp(temperature)) - 2.0 * noise_of(temperature)
+    if rise >= options["rise_k"]:
+        return Passed()
+    words = f"the winding warms by {max(rise, 0.0):.2g} K; {options['rise_k']:g} K are needed"
+    return Passed(findings=(warning(capture, CODE, words, "record longer, or with more current"),))
+
+
+def _flux_map(capture: Capture, options: Mapping[str, float]) -> Passed:
+    del options
+    for name in ("id_a", "iq_a"):
+        levels = np.unique(_finite(capture, name)[name].round(9))
+        if levels.size < 2:
+            raise CaptureError(
+                CODE,
+                f"{name} has one level only",
+                "add rows at further levels of both currents",
+            )
+    return Passed()
+
+
+LOOKS: dict[str, Callable[[Capture, Mapping[str, float]], Passed]] = {
+    "resistance": _resistance,
+    "current_step": _step,
+    "torque_map": _torque_map,
+    "heat_run": _heat_run,
+    "flux_map": _flux_map,
+}
+
+GATE = Gate(
+    CODE,
+    tuple(LOOKS),
+    check,
+    {
+        # Over white noise: the largest of a million samples is 5 sigma; twice that is a signal.
+        "noise_multiple": 10.0,
+        # At 0.39 %/K a rise of 5 K moves R by 2 %: ten times what a good meter leaves open.
+        "rise_k": 5.0,
+    },
+)

@@ -1,0 +1,86 @@
+"""Samples that the logger lost: gaps in an otherwise even clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.contracts.protocol import Gate, Passed, warning
+from pipeline.contracts.requirements import LINE_CURRENTS
+from pipeline.contracts.waveform import gaps_of, missing_samples
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+from pipeline.records.finding import Finding
+
+NAME = "dropped_samples"
+TESTS = (
+    "current_step",
+    "open_circuit",
+    "hand_turn",
+    "cogging",
+    "torque_map",
+    "spin_down",
+    "heat_run",
+    "drive",
+)
+REMEDY = "record again with a logger that keeps up, or at a lower rate"
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Warns of lost samples; refuses where too many are lost, or those of the step itself."""
+    findings: list[Finding] = []
+    for table in capture.tables:
+        if table.height < 3 or "t_s" not in table.columns:
+            continue
+        t_s = table["t_s"].to_numpy()
+        gaps, usual_s = gaps_of(t_s, options["gap_intervals"])
+        lost = missing_samples(t_s, gaps, usual_s)
+        if lost < 0.5:
+            continue
+        share = lost / (lost + t_s.size)
+        words = (
+            f"about {lost:.0f} samples are missing in {gaps.size} gaps, {100 * share:.2g} % of "
+            f"the record; the widest is {np.diff(t_s)[gaps].max():.3g} s where {usual_s:.3g} s "
+            "is usual"
+        )
+        rows = (int(gaps[0]), int(gaps[-1]) + 1)
+        if share > options["refuse_share"]:
+            raise CaptureError(NAME, words, REMEDY, rows)
+        if capture.meta.test == "current_step":
+            _refuse_lost_edge(table, gaps, options["edge_share"], words)
+        findings.append(warning(capture, NAME, words, REMEDY, rows))
+    return Passed(findings=tuple(findings))
+
+
+def _refuse_lost_edge(
+    table: pl.DataFrame, gaps: NDArray[np.int64], edge_share: float, words: str
+) -> None:
+    for name in LINE_CURRENTS:
+        if name not in table.columns:
+            continue
+        current = table[name].to_numpy()
+        change = np.abs(current[gaps + 1] - current[gaps])
+        lost = gaps[change > edge_share * (np.nanmax(current) - np.nanmin(current))]
+        if lost.size:
+            after = int(lost[0])
+            words = f"{words}; {name} changes by {change.max():.3g} A inside one gap"
+            raise CaptureError(NAME, words, REMEDY, (after, after + 1))
+
+
+GATE = Gate(
+    NAME,
+    TESTS,
+    check,
+    {
+        # Half way between one interval and two: what lies beyond is nearer to a lost sample.
+        "gap_intervals": 1.5,
+        # Beyond a fifth the record is no longer that of the test it claims to be.
+        "refuse_share": 0.2,
+        # The step is fitted through the integrals of v and i; across a gap these are trapezoids,
+        # off by up to half the gap's area: a tenth of the step lost is a percent of L and more.
+        "edge_share": 0.1,
+    },
+)

@@ -1,0 +1,62 @@
+"""Missing values in a column that the test rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed, span_of, warning
+from pipeline.contracts.requirements import columns_required
+from pipeline.physics.glossary import TESTS
+from pipeline.records.capture import Capture, Mask
+from pipeline.records.errors import CaptureError
+from pipeline.records.finding import Finding
+
+NAME = "missing_values"
+REMEDY = "find out why the channel dropped out, and record again if those rows matter"
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Sets rows without a needed value aside and counts them; refuses if few are left.
+
+    A column with values in fewer than half of the rows is a slow stream written into a fast
+    table, not a fault: its blanks are left as they are.
+    """
+    masks: list[Mask] = []
+    findings: list[Finding] = []
+    meta = capture.meta
+    needed = columns_required(meta.test, meta.pair, capture.columns)
+    for index, table in enumerate(capture.tables):
+        names = [n for n in needed if n in table.columns]
+        good = {name: np.isfinite(table[name].to_numpy()) for name in names}
+        dense = {n: g for n, g in good.items() if g.mean() >= options["dense_share"]}
+        keep = np.all(list(dense.values()), axis=0) if dense else np.ones(table.height, dtype=bool)
+        for name in names:
+            if np.count_nonzero(good[name]) < options["fewest"]:
+                raise CaptureError(
+                    NAME,
+                    f"{name} has {np.count_nonzero(good[name])} values; {meta.test} needs "
+                    f"{options['fewest']:.0f}",
+                    "record for longer, or faster",
+                )
+        if keep.all():
+            continue
+        holes = ", ".join(f"{n} {np.count_nonzero(~g)}" for n, g in dense.items() if not g.all())
+        words = f"{np.count_nonzero(~keep)} of {keep.size} rows miss a value ({holes}); set aside"
+        masks.append(Mask(NAME, index, keep))
+        findings.append(warning(capture, NAME, words, REMEDY, span_of(~keep)))
+    return Passed(tuple(masks), tuple(findings))
+
+
+GATE = Gate(
+    NAME,
+    tuple(TESTS),
+    check,
+    {
+        # Below half, blanks are the rule: two rates in one table.
+        "dense_share": 0.5,
+        # One value makes no fit; what more a test needs its other gates ask for.
+        "fewest": 2.0,
+    },
+)

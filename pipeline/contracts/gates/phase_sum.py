@@ -1,0 +1,78 @@
+"""Three line currents, or three line voltages, that do not sum to zero."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import polars as pl
+
+from pipeline.contracts.protocol import Gate, Passed, warning
+from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
+from pipeline.contracts.waveform import noise_of
+from pipeline.physics.glossary import TESTS
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+from pipeline.records.finding import Finding
+
+CODES = {LINE_CURRENTS: "current_sum", LINE_VOLTAGES: "voltage_sum"}
+REMEDIES = {
+    LINE_CURRENTS: "check the gain, sign and wiring of each current sensor (no neutral is led out)",
+    LINE_VOLTAGES: "check the gain, sign and wiring of each voltage probe",
+}
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Warns of a sum beyond what the instrument's gains explain, refuses a gross one."""
+    stated = {
+        LINE_CURRENTS: capture.meta.u_rel_current,
+        LINE_VOLTAGES: capture.meta.u_rel_voltage,
+    }
+    findings: list[Finding] = []
+    for names, code in CODES.items():
+        u_rel = stated[names]
+        allowed = max(options["warn_share"], options["coverage"] * (u_rel or 0.0))
+        for table in capture.tables:
+            if not set(names) <= set(table.columns):
+                continue
+            share = sum_share(table, names)
+            words = (
+                f"{' + '.join(names)} is {100.0 * share:.3g} % of them (rms), where "
+                f"{100.0 * allowed:.3g} % could be the instruments' gains"
+            )
+            if share > options["refuse_share"]:
+                raise CaptureError(code, words, REMEDIES[names])
+            if share > allowed:
+                findings.append(warning(capture, code, words, REMEDIES[names]))
+    return Passed(findings=tuple(findings))
+
+
+def sum_share(table: pl.DataFrame, names: tuple[str, ...]) -> float:
+    """Root mean square of the sum over that of the three together, noise taken off.
+
+    share² = (mean(s²) - 2 sigma²) / mean(a² + b² + c²), sigma the white noise of s; what noise
+    alone would give cannot reach the sum's own scatter.
+    """
+    three = [table[name].to_numpy() for name in names]
+    total = three[0] + three[1] + three[2]
+    good = np.isfinite(total)
+    power = float(sum(np.mean(column[good] ** 2) for column in three)) if good.any() else 0.0
+    if power == 0.0:
+        return 0.0
+    excess = float(np.mean(total[good] ** 2)) - 2.0 * noise_of(total) ** 2
+    return float(np.sqrt(max(0.0, excess) / power))
+
+
+GATE = Gate(
+    "phase_sum",
+    tuple(TESTS),
+    check,
+    {
+        # A percent is an offset of half a percent of range with the usual margin of two.
+        "warn_share": 0.01,
+        # Three independent gains of relative uncertainty u leave a sum of about u; k = 5.
+        "coverage": 5.0,
+        # No sensor is a tenth off: a channel is swapped, dead, reversed or another motor's.
+        "refuse_share": 0.1,
+    },
+)

@@ -1,0 +1,44 @@
+"""Wrong pole pairs: the back-EMF's cycles a turn against the nameplate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pipeline.contracts.protocol import Gate, Passed, warning
+from pipeline.contracts.rotation import turning
+from pipeline.records.capture import Capture
+
+REMEDY = "correct `pole_pairs`; until then the count from the data is used"
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Warns where the count is no whole number, or another than the nameplate's."""
+    seen = turning(capture)
+    if seen is None or seen.cycles < options["cycles"]:
+        return Passed()
+    count = abs(seen.cycles_per_turn)
+    whole, stated = round(count), capture.meta.pole_pairs
+    off = abs(count - whole)
+    if whole == 0 or off > options["from_whole"] + 2.0 * seen.u:
+        words = f"the back-EMF makes {count:.3f} cycles a turn of the shaft, no whole number"
+        remedy = "check the angle's unit, for slip of its coupling, and for a gear"
+        return Passed(findings=(warning(capture, "pole_pairs_not_whole", words, remedy),))
+    if stated is not None and stated != whole:
+        words = f"the back-EMF makes {count:.3f} cycles a turn; the nameplate says {stated}"
+        if stated == 2 * whole:
+            words = f"{words}, which is the number of poles"
+        return Passed(findings=(warning(capture, "pole_pairs_nameplate", words, REMEDY),))
+    return Passed()
+
+
+GATE = Gate(
+    "pole_pairs",
+    ("open_circuit", "hand_turn"),
+    check,
+    {
+        # Fewer cycles do not tell neighbouring counts apart.
+        "cycles": 3.0,
+        # Physics: p = f_elec / f_mech within 0.02 of a whole number.
+        "from_whole": 0.02,
+    },
+)

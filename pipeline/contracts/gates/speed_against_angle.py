@@ -1,0 +1,85 @@
+"""A speed that is not the angle's derivative: wrong units, a gear, or electrical for mechanical."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed, warning
+from pipeline.contracts.rotation import TURN_RAD, integral
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+
+CODE = "speed_against_angle"
+BLOCKS = 50
+SUSPECTS = {
+    9.5493: "the speed is in rpm",
+    0.10472: "the angle is in rpm·s, or the speed was converted twice",
+    57.296: "the speed is in degrees a second",
+    0.017453: "the angle is in degrees",
+    TURN_RAD: "the angle is in turns",
+    1.0 / TURN_RAD: "the speed is in turns a second",
+    -1.0: "one of them has its sign turned",
+}
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Warns of a speed some percent off the angle's; refuses one that is another quantity."""
+    ratio = speed_over_angle(capture, options["turns"])
+    if ratio is None or abs(ratio - 1.0) <= options["warn"]:
+        return Passed()
+    words = f"omega_mech_rad_s is {ratio:.4g} times the rate of theta_mech_rad"
+    suspect = _suspect(ratio, capture.meta.pole_pairs)
+    words += f": {suspect}" if suspect else ""
+    remedy = "map the unit or sign in conf/source"
+    if abs(ratio - 1.0) > options["refuse"]:
+        raise CaptureError(CODE, words, remedy)
+    return Passed(findings=(warning(capture, CODE, words, "the angle is used; " + remedy),))
+
+
+def speed_over_angle(capture: Capture, turns: float) -> float | None:
+    """Integrated speed over angle, from block increments; None if the shaft hardly turns.
+
+    The regression runs on the larger of the two, so that a channel that stands still reads 0.
+    """
+    for table in capture.tables:
+        if not {"t_s", "theta_mech_rad", "omega_mech_rad_s"} <= set(table.columns):
+            continue
+        rows = table.select("t_s", "theta_mech_rad", "omega_mech_rad_s").to_numpy()
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if rows.shape[0] < 2 * BLOCKS:
+            continue
+        edges = np.linspace(0, rows.shape[0] - 1, BLOCKS + 1).astype(int)
+        by_angle = np.diff(rows[edges, 1])
+        by_speed = np.diff(integral(rows[:, 0], rows[:, 2])[edges])
+        if max(np.abs(by_angle).sum(), np.abs(by_speed).sum()) < turns * TURN_RAD:
+            continue
+        if not np.any(by_angle):
+            return float("inf")
+        return float(by_angle @ by_speed / (by_angle @ by_angle))
+    return None
+
+
+def _suspect(ratio: float, pole_pairs: int | None) -> str:
+    known = dict(SUSPECTS)
+    if pole_pairs and pole_pairs > 1:
+        known[float(pole_pairs)] = "the speed is electrical"
+        known[1.0 / pole_pairs] = "the angle is electrical"
+    near = (words for number, words in known.items() if abs(ratio / number - 1.0) < 0.02)
+    return next(near, "")
+
+
+GATE = Gate(
+    CODE,
+    ("open_circuit", "hand_turn", "cogging", "torque_map", "spin_down", "heat_run", "drive"),
+    check,
+    {
+        # Below a turn, eccentricity of the angle sensor is a large part of the angle.
+        "turns": 1.0,
+        # Lag and smoothing of a speed average out over blocks; a scale error does not.
+        "warn": 0.03,
+        # Nearer to 1 than this lies no unit, gear or pole count.
+        "refuse": 0.2,
+    },
+)

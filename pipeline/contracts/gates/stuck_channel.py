@@ -1,0 +1,105 @@
+"""A channel that stands still while the test must move it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed, span_of, warning
+from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
+from pipeline.contracts.waveform import Array, Rows, longest_likely_run, rows_of_runs, runs_of_equal
+from pipeline.records.capture import Capture, Mask
+from pipeline.records.errors import CaptureError
+from pipeline.records.finding import Finding
+
+NAME = "stuck_channel"
+TERMINALS = (*LINE_VOLTAGES, *LINE_CURRENTS)
+MUST_MOVE: dict[str, tuple[str, ...]] = {
+    "resistance": (),
+    "current_step": TERMINALS,
+    "open_circuit": (*LINE_VOLTAGES, "theta_mech_rad"),
+    "hand_turn": (*LINE_VOLTAGES, "theta_mech_rad"),
+    "cogging": ("theta_mech_rad", "torque_shaft_nm"),
+    "torque_map": ("iq_a", "vq_v", "torque_shaft_nm", "theta_mech_rad"),
+    "spin_down": ("omega_mech_rad_s", "theta_mech_rad"),
+    "heat_run": (),
+    "holding_current": ("theta_mech_rad", "iq_a"),
+    "flux_map": ("psi_d_wb", "psi_q_wb"),
+    "drive": ("iq_a", "vq_v"),
+}
+NOISY = (*TERMINALS, "va_v", "vb_v", "vc_v", "id_a", "iq_a", "torque_shaft_nm")
+REMEDY = "check the sensor and its lead, and record again"
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Refuses a dead channel; sets aside the rows in which a noisy one froze."""
+    masks: list[Mask] = []
+    findings: list[Finding] = []
+    for index, table in enumerate(capture.tables):
+        for name in table.columns:
+            values = table[name].to_numpy()
+            if name in MUST_MOVE[capture.meta.test]:
+                _refuse_dead(name, values)
+            if name not in NOISY:
+                continue
+            frozen = frozen_rows(values, options)
+            count = int(np.count_nonzero(frozen))
+            if count == 0:
+                continue
+            words = f"{name} stands still in {count} of {values.size} rows"
+            if count > options["refuse_share"] * values.size:
+                raise CaptureError(NAME, words, REMEDY, span_of(frozen))
+            masks.append(Mask(NAME, index, ~frozen))
+            findings.append(warning(capture, NAME, f"{words}; set aside", REMEDY, span_of(frozen)))
+    return Passed(tuple(masks), tuple(findings))
+
+
+def _refuse_dead(name: str, values: Array) -> None:
+    finite = values[np.isfinite(values)]
+    if finite.size > 1 and np.all(finite == finite[0]):
+        raise CaptureError(
+            NAME, f"{name} is {finite[0]:g} in every row", REMEDY, (0, values.size - 1)
+        )
+
+
+def frozen_rows(values: Array, options: Mapping[str, float]) -> Rows:
+    """True on rows [n] of runs that a noisy signal does not make by chance.
+
+    Runs at the extremes are the gate `saturation`'s. A run of exact zeros counts only where the
+    signal drops to it from afar: a drive that is switched off logs zero current rightly.
+    """
+    none = np.zeros(values.size, dtype=bool)
+    likely = max(longest_likely_run(values, options["chance"]), options["shortest_run"])
+    if not np.isfinite(likely):
+        return none
+    starts, lengths = runs_of_equal(values)
+    runs = np.flatnonzero(lengths > likely)
+    if runs.size == 0:
+        return none
+    low, high = np.nanmin(values), np.nanmax(values)
+    kept = [r for r in runs if low < values[starts[r]] < high]
+    afar = options["drop_share"] * (high - low)
+    kept = [r for r in kept if values[starts[r]] != 0.0 or _falls_from(values, starts[r], afar)]
+    return rows_of_runs(values.size, starts[kept], lengths[kept]) if kept else none
+
+
+def _falls_from(values: Array, start: int, afar: float) -> bool:
+    return bool(start > 0 and abs(values[start - 1] - values[start]) > afar)
+
+
+GATE = Gate(
+    NAME,
+    tuple(MUST_MOVE),
+    check,
+    {
+        # Expected number of such runs in a healthy capture of any length.
+        "chance": 1e-6,
+        # Shorter stretches cost a fit nothing.
+        "shortest_run": 20.0,
+        # A fifth of the range within one sample is no motor's doing.
+        "drop_share": 0.2,
+        # Beyond a fifth the record is no longer that of the test it claims to be.
+        "refuse_share": 0.2,
+    },
+)

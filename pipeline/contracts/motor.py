@@ -1,0 +1,131 @@
+"""What the captures of one motor say together: contradictions, and regions nobody covered."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from pipeline.contracts.rotation import shaft_angle
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.finding import Finding
+
+NAMEPLATE = ("motor_type", "lot", "winding", "pole_pairs", "slots")
+CONSEQUENCE = {
+    "pole_pairs": "constants that need it take the count from the data, never the nameplate",
+    "winding": "the wye equivalent is published, which holds for both",
+}
+
+
+def agree(campaign: Campaign) -> tuple[Finding, ...]:
+    """Warnings where one motor's captures contradict each other or leave an experiment out.
+
+    Neither of two captures that disagree is refused: which nameplate is wrong is not for one
+    of them to say. The finding stands at the file of the smaller group and names the other.
+    """
+    findings = [finding for key in NAMEPLATE for finding in _contradictions(campaign, key)]
+    findings += _one_test_only(campaign)
+    findings += _cogging_directions(campaign)
+    findings += _torque_signs(campaign)
+    return tuple(findings)
+
+
+def _contradictions(campaign: Campaign, key: str) -> list[Finding]:
+    stated = [(c.path, getattr(c.meta, key)) for c in campaign.captures]
+    stated = [(path, value) for path, value in stated if value is not None]
+    counts = Counter(value for _, value in stated)
+    if len(counts) < 2:
+        return []
+    first: dict[object, str] = {}
+    for path, value in stated:
+        first.setdefault(value, path)
+    usual = min(counts, key=lambda value: (-counts[value], first[value]))
+    consequence = CONSEQUENCE.get(key, "the most frequent one counts")
+    return [
+        Finding(
+            first[value],
+            "warning",
+            f"{key}_contradiction",
+            f"{key} is {value} here and in {counts[value] - 1} more files of {campaign.motor_id}, "
+            f"but {usual} in {first[usual]} and {counts[usual] - 1} more",
+            f"correct the metadata of one of them; {consequence}",
+        )
+        for value in first
+        if value != usual
+    ]
+
+
+def _one_test_only(campaign: Campaign) -> list[Finding]:
+    tests = {c.meta.test for c in campaign.captures}
+    if len(tests) != 1:
+        return []
+    test = next(iter(tests))
+    return [
+        Finding(
+            campaign.captures[0].path,
+            "warning",
+            "one_test_only",
+            f"{campaign.motor_id} has captures of {test} only: no two constants can be "
+            "held against each other",
+            f"see what to record next with `plan motor={campaign.motor_id}`",
+        )
+    ]
+
+
+def _cogging_directions(campaign: Campaign) -> list[Finding]:
+    captures = campaign.of("cogging")
+    turned = [_net_turn(c) for c in captures]
+    if not captures or (min(turned) < 0.0 < max(turned)) or any(_reverses(c) for c in captures):
+        return []
+    return [
+        Finding(
+            captures[0].path,
+            "warning",
+            "direction_coverage",
+            "the slow turn goes one way only: friction cannot be told from cogging",
+            "record the same turn the other way",
+        )
+    ]
+
+
+def _angle(capture: Capture) -> np.ndarray:
+    index = capture.table_of("theta_mech_rad")
+    angle = shaft_angle(capture, capture.tables[index]["t_s"].to_numpy())
+    return np.zeros(1) if angle is None else angle[np.isfinite(angle)]
+
+
+def _net_turn(capture: Capture) -> float:
+    angle = _angle(capture)
+    return float(angle[-1] - angle[0])
+
+
+def _reverses(capture: Capture) -> bool:
+    angle = _angle(capture)
+    there = float(angle.max() - angle[0]), float(angle.max() - angle[-1])
+    back = float(angle[0] - angle.min()), float(angle[-1] - angle.min())
+    return min(there) > np.pi or min(back) > np.pi
+
+
+def _torque_signs(campaign: Campaign) -> list[Finding]:
+    captures = campaign.of("torque_map")
+    if not captures:
+        return []
+    reach = [_extremes(c) for c in captures]
+    low, high = min(r[0] for r in reach), max(r[1] for r in reach)
+    if low < -0.2 * high and high > -0.2 * low:
+        return []
+    return [
+        Finding(
+            captures[0].path,
+            "warning",
+            "current_coverage",
+            f"q current runs from {low:.3g} to {high:.3g} A: only one sign of torque, so friction "
+            "and inverter errors do not cancel",
+            "record steps of q current of the other sign as well",
+        )
+    ]
+
+
+def _extremes(capture: Capture) -> tuple[float, float]:
+    current = capture.arrays("iq_a")["iq_a"]
+    return float(np.nanpercentile(current, 2.0)), float(np.nanpercentile(current, 98.0))

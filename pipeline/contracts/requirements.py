@@ -1,0 +1,99 @@
+"""What a capture of each test holds at least, as data: the table of `contract/capture.md`.
+
+A requirement is met when one of its alternatives is wholly there. `{pair}` stands for the
+terminals of a two-terminal test; without them in the metadata any one pair will do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+PAIRS = ("ab", "bc", "ca")
+LINE_VOLTAGES = tuple(f"v{pair}_v" for pair in PAIRS)
+LINE_CURRENTS = ("ia_a", "ib_a", "ic_a")
+TABLES_WITHOUT_TIME = frozenset({"lcr", "flux_map"})
+
+Alternative = tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """Columns that must be there together: the first alternative is the one asked for."""
+
+    alternatives: tuple[Alternative, ...]
+    words: str = ""
+
+    def met_by(self, columns: frozenset[str]) -> bool:
+        """Whether one alternative is wholly among the columns."""
+        return any(columns.issuperset(alternative) for alternative in self.alternatives)
+
+    def text(self) -> str:
+        """The alternatives in words: `ia_a or ib_a`, `vd_v, vq_v or vq_v alone`."""
+        return self.words or " or ".join(" with ".join(group) for group in self.alternatives)
+
+
+def _all(*columns: str) -> tuple[Requirement, ...]:
+    return tuple(Requirement(((column,),)) for column in columns)
+
+
+def _any(*columns: str) -> Requirement:
+    return Requirement(tuple((column,) for column in columns))
+
+
+def _terminals(pair: str) -> tuple[Alternative, ...]:
+    """Voltage of a pair with the current of either of its two lines (the third is open)."""
+    return tuple((f"v{pair}_v", f"i{phase}_a") for phase in pair)
+
+
+TWO_LINE_VOLTAGES = Requirement(
+    tuple(combinations(LINE_VOLTAGES, 2)), "two of vab_v, vbc_v and vca_v"
+)
+DQ = ("vd_v", "vq_v", "id_a", "iq_a")
+
+_FIXED: dict[str, tuple[Requirement, ...]] = {
+    "resistance": _all("temp_winding_degc"),
+    "current_step": (),
+    "lcr": _all("theta_elec_deg", "lab_h"),
+    "open_circuit": (TWO_LINE_VOLTAGES, _any("theta_mech_rad", "omega_mech_rad_s")),
+    "hand_turn": (_any(*LINE_VOLTAGES),),
+    "cogging": _all("theta_mech_rad", "torque_shaft_nm"),
+    "torque_map": _all(*DQ, "omega_mech_rad_s", "torque_shaft_nm"),
+    "spin_down": _all("omega_mech_rad_s"),
+    "heat_run": _all("temp_winding_degc"),
+    "holding_current": _all("theta_mech_rad", "iq_a"),
+    "flux_map": _all("id_a", "iq_a", "psi_d_wb", "psi_q_wb"),
+    "drive": (
+        Requirement((DQ, ("vq_v", "iq_a")), "vq_v and iq_a, with vd_v and id_a where there"),
+        _any("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad"),
+    ),
+}
+
+
+def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
+    """All requirements of a test, those of its terminal pair and its clock included.
+
+    Raises KeyError for a test that the contract does not know.
+    """
+    fixed = _FIXED[test]
+    pairs = (pair,) if pair in PAIRS else PAIRS
+    terminals = tuple(group for one in pairs for group in _terminals(one))
+    words = f"v{pair}_v and {' or '.join(f'i{p}_a' for p in pair)}" if pair in PAIRS else ""
+    anywhere = words or "the voltage and the line current of one terminal pair"
+    if test in ("resistance", "current_step"):
+        fixed = (Requirement(terminals, anywhere), *fixed)
+    if test == "heat_run":
+        fixed = (Requirement((DQ, *terminals), f"vd_v, vq_v, id_a, iq_a or {anywhere}"), *fixed)
+    clock = () if test in TABLES_WITHOUT_TIME else _all("t_s")
+    return (*clock, *fixed)
+
+
+def columns_required(test: str, pair: str | None, columns: frozenset[str]) -> tuple[str, ...]:
+    """The columns that meet the requirements of a test, sorted: what its estimators rest on."""
+    used: set[str] = set()
+    for requirement in requirements(test, pair):
+        for alternative in requirement.alternatives:
+            if columns.issuperset(alternative):
+                used.update(alternative)
+                break
+    return tuple(sorted(used))

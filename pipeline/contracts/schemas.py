@@ -1,0 +1,231 @@
+"""pandera contracts built from the glossary: one for each set of columns, checked eagerly.
+
+NaN stands for missing and passes everywhere but in time; infinity passes nowhere; nothing is
+coerced. pandera takes most of a second to import, so it is imported on first use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from pipeline.contracts.requirements import TABLES_WITHOUT_TIME, requirements
+from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, Term
+from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.errors import CaptureError
+
+if TYPE_CHECKING:
+    import pandera.polars as pa
+
+EXAMPLES = 3
+
+Rule = Callable[[str], pl.Expr]
+
+
+def _is_time(column: str) -> pl.Expr:
+    return pl.col(column).is_finite()
+
+
+def _increases(column: str) -> pl.Expr:
+    """True on rows whose time is later than the row before; NaN is reported by `is_time`."""
+    step = pl.col(column).diff()
+    return (step > 0.0) | step.is_null() | step.is_nan()
+
+
+def _is_no_infinity(column: str) -> pl.Expr:
+    return ~pl.col(column).is_infinite()
+
+
+def _in_range(column: str) -> pl.Expr:
+    """True inside the glossary's range, both ends in, and where there is nothing to judge."""
+    term, value = COLUMNS[column], pl.col(column)
+    inside = pl.lit(value=True)
+    if term.low is not None:
+        inside &= value >= term.low
+    if term.high is not None:
+        inside &= value <= term.high
+    return inside | value.is_nan() | value.is_infinite() | value.is_null()
+
+
+RULES: dict[str, Rule] = {
+    "time_not_finite": _is_time,
+    "time_not_increasing": _increases,
+    "infinite_value": _is_no_infinity,
+    "implausible_value": _in_range,
+}
+
+
+def _rules_of(column: str) -> tuple[str, ...]:
+    if column == "t_s":
+        return ("time_not_finite", "time_not_increasing", "implausible_value")
+    return ("infinite_value", "implausible_value")
+
+
+@cache
+def table_schema(columns: tuple[str, ...]) -> pa.DataFrameSchema:
+    """The contract of a table with these glossary columns; other columns are let pass.
+
+    Each check is named by the code of the refusal that it leads to.
+    """
+    import pandera.polars as pa
+
+    def check(code: str) -> pa.Check:
+        def holds(data: pa.PolarsData) -> pl.LazyFrame:
+            return data.lazyframe.select(RULES[code](data.key))
+
+        return pa.Check(holds, name=code, n_failure_cases=EXAMPLES)
+
+    return pa.DataFrameSchema(
+        {
+            name: pa.Column(
+                pl.Float64,
+                nullable=True,
+                checks=[check(code) for code in _rules_of(name)],
+                description=COLUMNS[name].words,
+            )
+            for name in columns
+        },
+        strict=False,
+        coerce=False,
+    )
+
+
+def check_tables(capture: Capture) -> None:
+    """Holds every table of a capture against its contract, all failures at once.
+
+    Raises CaptureError with the first fault's code, the rows it spans and a few examples.
+    """
+    faults: list[CaptureError] = []
+    for table in capture.tables:
+        faults.extend(_table_faults(table))
+    if faults:
+        raise merged(faults)
+
+
+def _table_faults(table: pl.DataFrame) -> list[CaptureError]:
+    import pandera.errors
+
+    known = tuple(name for name in table.columns if name in COLUMNS)
+    try:
+        table_schema(known).validate(table, lazy=True)
+    except pandera.errors.SchemaErrors as errors:
+        failed = errors.failure_cases.select("column", "check").unique(maintain_order=True)
+        codes = {(str(column), str(check)) for column, check in failed.iter_rows()}
+        ordered = [(c, code) for c in known for code in _rules_of(c) if (c, code) in codes]
+        typed = [c for c in known if table.schema[c] != pl.Float64]
+        return [_not_numbers(table, c) for c in typed] or [_fault(table, *one) for one in ordered]
+    return []
+
+
+def _not_numbers(table: pl.DataFrame, column: str) -> CaptureError:
+    return CaptureError(
+        "not_numeric",
+        f"{column} holds {table.schema[column]} instead of numbers",
+        "write plain numbers, and NaN or nothing where a value is missing",
+    )
+
+
+REMEDIES = {
+    "time_not_finite": "give every row its sampling instant, or leave the row out",
+    "time_not_increasing": "sort the rows by t_s, drop repeats, or fix the logger's clock",
+    "infinite_value": "write NaN where a value is missing",
+    "implausible_value": "map the column's unit in conf/source, or write NaN where it is missing",
+}
+
+
+def _fault(table: pl.DataFrame, column: str, code: str) -> CaptureError:
+    holds = table.select(RULES[code](column)).to_series().to_numpy()
+    rows = np.flatnonzero(~holds)
+    term, values = COLUMNS[column], table[column].to_numpy()
+    examples = ", ".join(f"{values[row]:g}" for row in rows[:EXAMPLES])
+    what = {
+        "time_not_finite": f"{column} has no finite value",
+        "time_not_increasing": f"{column} does not increase",
+        "infinite_value": f"{column} is infinite",
+        "implausible_value": f"{column} is outside {term.low:g} to {term.high:g} {term.unit}",
+    }[code]
+    message = f"{what} in {rows.size} of {table.height} rows ({examples})"
+    return CaptureError(code, message, REMEDIES[code], (int(rows[0]), int(rows[-1])))
+
+
+def merged(faults: list[CaptureError]) -> CaptureError:
+    """One error that says every fault; the code, rows and remedy are the first one's."""
+    first, rest = faults[0], faults[1:]
+    others = "".join(f"; also [{fault.code}] {fault.message}" for fault in rest)
+    return CaptureError(first.code, first.message + others, first.remedy, first.rows)
+
+
+def check_columns(capture: Capture) -> None:
+    """Whether a capture holds at least what its test asks for; an all-NaN column is not there.
+
+    Raises CaptureError `no_rows` or `missing_column`, naming what is needed and what there is.
+    """
+    test, tables = capture.meta.test, capture.tables
+    if not any(table.height for table in tables):
+        raise CaptureError("no_rows", f"the {test} holds no sample", "record it again")
+    there = frozenset(name for table in tables for name in _filled(table))
+    wanted = requirements(test, capture.meta.pair)
+    missing = [requirement for requirement in wanted if not requirement.met_by(there)]
+    if missing:
+        needs = "; ".join(requirement.text() for requirement in missing)
+        empty = sorted(capture.columns - there)
+        blank = f" (without a value: {', '.join(empty)})" if empty else ""
+        raise CaptureError(
+            "missing_column",
+            f"{test} needs {needs}; the file has {', '.join(sorted(there)) or 'none'}{blank}",
+            "record what is missing, or map it in conf/source",
+        )
+    if test not in TABLES_WITHOUT_TIME:
+        _every_table_has_a_clock(capture)
+
+
+def _filled(table: pl.DataFrame) -> list[str]:
+    numbers = [name for name in table.columns if table.schema[name].is_numeric()]
+    if not numbers or not table.height:
+        return []
+    any_value = table.select(pl.col(numbers).cast(pl.Float64).is_not_nan().any())
+    return [name for name, filled in any_value.row(0, named=True).items() if filled]
+
+
+def _every_table_has_a_clock(capture: Capture) -> None:
+    for table in capture.tables:
+        if table.height and "t_s" not in table.columns:
+            names = ", ".join(table.columns)
+            raise CaptureError(
+                "missing_column", f"the table of {names} has no t_s", "give it a clock"
+            )
+
+
+def check_metadata(meta: CaptureMeta) -> None:
+    """Holds the metadata against the glossary. Raises CaptureError for what cannot be true."""
+    if meta.test not in TESTS:
+        raise CaptureError(
+            "unknown_test",
+            f"test is {meta.test!r}, which is none of {', '.join(TESTS)}",
+            "correct `test`, or map it in conf/source",
+        )
+    for key, allowed in (("pair", ("ab", "bc", "ca")), ("winding", ("wye", "delta"))):
+        value = getattr(meta, key)
+        if value is not None and value not in allowed:
+            raise CaptureError(
+                "unknown_metadata",
+                f"{key} is {value!r}, which is none of {', '.join(allowed)}",
+                f"correct `{key}`",
+            )
+    for term in METADATA.values():
+        _metadata_in_range(term, getattr(meta, term.name, None))
+
+
+def _metadata_in_range(term: Term, value: object) -> None:
+    if not isinstance(value, (int, float)) or term.low is None or term.high is None:
+        return
+    if not term.low <= value <= term.high:
+        raise CaptureError(
+            "implausible_metadata",
+            f"{term.name} is {value:g}, outside {term.low:g} to {term.high:g} {term.unit}",
+            f"correct `{term.name}`, or leave it out",
+        )
