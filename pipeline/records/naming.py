@@ -8,7 +8,8 @@ import re
 MAX_CHARS = 100
 _KEPT = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
 _RESERVED = frozenset(
-    ["con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))]
+    ["con", "prn", "aux", "nul", "index"]
+    + [f"{port}{n}" for port in ("com", "lpt") for n in range(10)]
 )
 _WORD = re.compile("[A-Za-z]+")
 
@@ -18,7 +19,7 @@ def file_stem(motor_id: str) -> str:
 
     ASCII letters, digits and `-_.` stay; every other byte of the UTF-8 form becomes `~` and two
     hex digits, as do a first `-` or `.`, a last `.`, and the first letter of a name that Windows
-    keeps for devices. Two ids that differ in case alone must differ on every file system: words
+    keeps for devices or that a folder of pages keeps for its first page. Two ids that differ in case alone must differ on every file system: words
     of one or two letters are expected in capitals, longer ones in small letters (`joint-P0`,
     `SN-12`), and an id written otherwise ends in `~u` and a hex mask of the letters that deviate
     (bit 0 is the first). What is then longer than `MAX_CHARS` keeps a readable beginning and ends

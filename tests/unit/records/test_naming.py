@@ -71,6 +71,7 @@ def decode(stem: str) -> str:
         ("../../etc", "~2e.~2f..~2fetc"),
         ("-rf", "~2drf~u3"),
         ("nul", "~6eul"),
+        ("index", "~69ndex"),
         ("con.v2", "~63on.v2~u8"),
         ("motor 1", "motor~201"),
         ("é", "~c3~a9"),

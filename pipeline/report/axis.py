@@ -1,0 +1,122 @@
+"""Axes of a chart: range, round ticks, unit with prefix, and the way from data to pixels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.physics.glossary import suffix_of
+from pipeline.physics.units import SUFFIX_UNITS
+from pipeline.report.numbers import MINUS, Scale, scale_for
+
+Array = NDArray[np.float64]
+_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+_ANGLE_STEPS = (5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0)
+_SPOKEN = {"t": "time", "theta": "angle", "omega": "speed", "temp": "temperature"}
+_AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc", "vca", "vdc"}
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A range [data unit] laid over pixels, `start` at `low` and `end` at `high`."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+    ticks: tuple[float, ...]
+    scale: Scale
+    title: str
+
+    def pixels(self, values: Array) -> Array:
+        """Where values [n, data unit] lie [n, px]."""
+        return self.start + (values - self.low) * ((self.end - self.start) / (self.high - self.low))
+
+    def pixel(self, value: float) -> float:
+        """Where one value [data unit] lies [px]."""
+        return float(self.pixels(np.array([value]))[0])
+
+    def labels(self) -> tuple[str, ...]:
+        """Text of the ticks, all with as many decimals as the finest needs."""
+        shown = [self.scale.shown(tick) for tick in self.ticks]
+        places = max((_decimals(number) for number in shown), default=0)
+        return tuple(_tick_text(number, places) for number in shown)
+
+
+def axis_for(name: str, low: float, high: float, start: float, end: float, count: int = 5) -> Axis:
+    """An axis for a quantity named with its unit last, widened to hold a little air.
+
+    `count` is about how many ticks there will be; a range of no width is opened around its value.
+    """
+    low, high = _open(low, high)
+    unit = unit_of(name)
+    step = _step((high - low) / count, degrees=unit == "deg")
+    ticks = tuple(i * step for i in range(math.ceil(low / step - 1e-9), _last(high, step) + 1))
+    scale = scale_for(max(abs(low), abs(high)), unit)
+    return Axis(low, high, start, end, ticks, scale, f"{quantity_words(name)}{_bracket(scale)}")
+
+
+def symmetric_axis(name: str, reach: float, start: float, end: float) -> Axis:
+    """An axis from -reach to reach with three ticks, for residuals."""
+    reach = reach if reach > 0.0 and math.isfinite(reach) else 1.0
+    step = _step(reach, degrees=False)
+    step = step if step <= reach else _step(reach / 2, degrees=False)
+    scale = scale_for(step, unit_of(name))
+    title = f"measured {MINUS} fitted{_bracket(scale)}"
+    return Axis(-reach, reach, start, end, (-step, 0.0, step), scale, title)
+
+
+def padded(low: float, high: float, share: float = 0.05) -> tuple[float, float]:
+    """The range with a share of its width added on both sides."""
+    air = share * (high - low)
+    return low - air, high + air
+
+
+def unit_of(name: str) -> str:
+    """The unit that the suffix of a name stands for; `1` where it has none."""
+    return SUFFIX_UNITS.get(suffix_of(name), "1")
+
+
+def quantity_words(name: str) -> str:
+    """A glossary name without its unit, in words: `temp_winding_degc` is temperature winding."""
+    suffix = suffix_of(name)
+    stem = name[: -len(suffix) - 1] if suffix else name
+    first, *rest = stem.split("_")
+    if first in _AXES and not rest:
+        return f"{first[0]}_{first[1:]}"
+    return " ".join([_SPOKEN.get(first, first), *rest])
+
+
+def _bracket(scale: Scale) -> str:
+    return f" [{scale.unit.removeprefix('×')}]" if scale.unit else ""
+
+
+def _open(low: float, high: float) -> tuple[float, float]:
+    if high > low:
+        return low, high
+    half = 0.05 * abs(low) or 1.0
+    return low - half, high + half
+
+
+def _step(rough: float, *, degrees: bool) -> float:
+    if degrees and rough <= _ANGLE_STEPS[-1] and rough > 1.0:
+        return next(step for step in _ANGLE_STEPS if step >= rough)
+    decade = 10.0 ** math.floor(math.log10(rough))
+    return decade * next(step for step in _STEPS if step * decade >= rough * (1 - 1e-9))
+
+
+def _last(high: float, step: float) -> int:
+    return math.floor(high / step + 1e-9)
+
+
+def _decimals(number: float) -> int:
+    text = f"{number:.6g}"
+    return len(text.partition(".")[2]) if "e" not in text else 0
+
+
+def _tick_text(number: float, places: int) -> str:
+    text = f"{number:.{places}f}" if abs(number) < 1e7 else f"{number:.4g}"
+    return text.replace("-", MINUS) if text.strip("-0.") else text.removeprefix("-")

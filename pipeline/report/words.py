@@ -1,0 +1,119 @@
+"""Which constants stand together on a page, and how each is written for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pipeline.physics.glossary import CONSTANTS
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "Electrical": (
+        "r_phase_ohm",
+        "r_ll_ohm",
+        "resistance_imbalance",
+        "temp_coeff_copper_1_k",
+        "ld_h",
+        "lq_h",
+        "saliency_ratio",
+        "ld_rated_h",
+        "lq_rated_h",
+        "tau_elec_s",
+    ),
+    "Magnet and torque": (
+        "pole_pairs",
+        "psi_pm_wb",
+        "temp_coeff_magnet_1_k",
+        "kt_peak_nm_a",
+        "kt_rms_nm_a",
+        "kt_from_ke_nm_a",
+        "motor_constant_nm_sqrt_w",
+        "ke_phase_peak_v_s_rad",
+        "ke_ll_peak_v_s_rad",
+        "ke_ll_rms_v_s_rad",
+        "ke_ll_peak_v_krpm",
+        "kv_ll_peak_rpm_v",
+    ),
+    "Mechanical": (
+        "j_rotor_kgm2",
+        "torque_coulomb_nm",
+        "b_visc_nm_s_rad",
+        "cogging_order",
+        "cogging_amplitude_nm",
+        "cogging_peak_nm",
+        "tau_mech_s",
+    ),
+    "Thermal": ("rth_winding_k_w",),
+}
+OTHER = "Further constants"
+KEY_CONSTANTS = (
+    "r_phase_ohm",
+    "ld_h",
+    "lq_h",
+    "psi_pm_wb",
+    "pole_pairs",
+    "kt_peak_nm_a",
+    "kv_ll_peak_rpm_v",
+    "cogging_amplitude_nm",
+    "j_rotor_kgm2",
+    "torque_coulomb_nm",
+)
+_SYMBOLS: dict[str, tuple[str, str]] = {
+    "r_phase_ohm": ("R", "phase"),
+    "r_ll_ohm": ("R", "ll"),
+    "resistance_imbalance": ("ΔR/R", ""),
+    "temp_coeff_copper_1_k": ("α", "copper"),
+    "ld_h": ("L", "d"),
+    "lq_h": ("L", "q"),
+    "ld_rated_h": ("L", "d, rated"),
+    "lq_rated_h": ("L", "q, rated"),
+    "saliency_ratio": ("L", "q/d"),
+    "psi_pm_wb": ("ψ", "pm"),
+    "temp_coeff_magnet_1_k": ("α", "magnet"),
+    "ke_phase_peak_v_s_rad": ("K", "e, phase peak"),
+    "ke_ll_peak_v_s_rad": ("K", "e, ll peak"),
+    "ke_ll_rms_v_s_rad": ("K", "e, ll rms"),
+    "ke_ll_peak_v_krpm": ("K", "e, ll peak"),
+    "kv_ll_peak_rpm_v": ("K", "v, ll peak"),
+    "kt_peak_nm_a": ("K", "t, peak"),
+    "kt_rms_nm_a": ("K", "t, rms"),
+    "kt_from_ke_nm_a": ("K", "t, from Ke"),
+    "motor_constant_nm_sqrt_w": ("K", "m"),
+    "pole_pairs": ("p", ""),
+    "cogging_peak_nm": ("T", "cog, peak"),
+    "cogging_order": ("n", "cog"),
+    "cogging_amplitude_nm": ("T", "cog"),
+    "j_rotor_kgm2": ("J", ""),
+    "torque_coulomb_nm": ("T", "C"),
+    "b_visc_nm_s_rad": ("B", ""),
+    "tau_elec_s": ("τ", "e"),
+    "tau_mech_s": ("τ", "m"),
+    "rth_winding_k_w": ("R", "th"),
+}
+
+
+def symbol(name: str) -> tuple[str, str]:
+    """Letter and subscript of a constant; the name itself where it has no usual symbol."""
+    return _SYMBOLS.get(name, (name.replace("_", " "), ""))
+
+
+def constant_words(name: str) -> str:
+    """What a constant is, in the glossary's words; a plug-in's own constant is its name."""
+    term = CONSTANTS.get(name)
+    if term is None:
+        return name.replace("_", " ")
+    return sentence(term.words.replace("degC", "°C"))
+
+
+def grouped(names: Iterable[str]) -> list[tuple[str, list[str]]]:
+    """The names under the headings of a datasheet, known ones in its order, others sorted last."""
+    present = set(names)
+    known = {name for group in GROUPS.values() for name in group}
+    groups = [(title, [n for n in group if n in present]) for title, group in GROUPS.items()]
+    groups.append((OTHER, sorted(present - known)))
+    return [(title, members) for title, members in groups if members]
+
+
+def sentence(text: str) -> str:
+    """The text with a capital first letter, unless its first word is a name such as `lq_h`."""
+    first = text.split(" ", 1)[0]
+    return text if "_" in first or not first.islower() else text[0].upper() + text[1:]
