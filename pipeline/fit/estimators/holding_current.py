@@ -1,0 +1,180 @@
+"""Cogging orders from the current that holds a rotor still at many angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.fit.estimators.cogging import name_orders, part_orders
+from pipeline.fit.protocol import Estimator, Fit
+from pipeline.numerics.harmonics import harmonic_design
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.orders import (
+    TURN_RAD,
+    OrderLine,
+    Spectrum,
+    Turn,
+    detection_limit,
+    half_peak_to_peak,
+    largest_order,
+    orders_present,
+    spectrum,
+    waveform,
+    whole_turns,
+)
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import propagate, type_a
+
+NAME = "holding_current"
+RESIDUAL = Term(
+    "holding_residual_a",
+    "A",
+    "rms of holding current that the cogging orders leave in sectors they were not fitted to",
+    "constant",
+    0.0,
+    5e3,
+)
+TORQUES = ("cogging_amplitude_nm", "cogging_peak_nm")
+GIVES = ("cogging_order", *TORQUES, RESIDUAL.name)
+EXPERIMENT = (
+    "hold the rotor at many angles over a whole turn, once forward and once backward, "
+    "logging theta_mech_rad and iq_a"
+)
+SECTORS = 61
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Orders of i_q(theta) that both directions share; times Kt they are cogging torque.
+
+    At rest Kt i_q = T_cogging(theta) ± what static friction carries, so orders are sure, and
+    amplitudes as good as friction repeats. Reference: numerics.orders.
+    """
+    captures = [c for c in campaign.of("holding_current") if c.has("theta_mech_rad", "iq_a")]
+    turns: list[Turn] = []
+    for capture in captures:
+        data = capture.arrays("theta_mech_rad", "iq_a")
+        turns += whole_turns(data["theta_mech_rad"], data["iq_a"])
+    if len(turns) < 2 or largest_order(turns, int(options["highest_order"])) < 1:
+        note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    spec = spectrum(turns, largest_order(turns, int(options["highest_order"])))
+    lines, slow = part_orders(orders_present(spec, options["level"]), known, campaign)
+    rms_a = held_out_rms(turns, [line.order for line in [*lines, *slow]])
+    estimates = _cogging(captures, spec, lines, rms_a, known, campaign)
+    if rms_a is None:
+        note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
+        residual = not_identifiable(RESIDUAL.name, "A", NAME, note)
+    else:
+        before = float(np.std(np.concatenate([turn.value for turn in turns])))
+        note = f"{before:.3g} A before any order is taken off; half of the turn's sectors held out"
+        paths = tuple(c.path for c in captures)
+        residual = Estimate(RESIDUAL.name, rms_a, "A", "measured", NAME, captures=paths, note=note)
+    return Fit((*estimates, residual), _evidence(turns, spec, lines))
+
+
+def held_out_rms(turns: Sequence[Turn], orders: Sequence[int]) -> float | None:
+    """Rms of the current left in sectors of the turn that the fit did not see; None if too few.
+
+    The turn is cut into `SECTORS` (a prime); the orders, with one offset a direction, are fitted
+    to those whose number is a square modulo the prime and judged on the others, then the other
+    way round. That pattern has a flat spectrum, so it starves no order of its phases.
+    Reference: Schroeder, Number Theory in Science and Communication, 15.
+    """
+    angle = np.concatenate([turn.theta_rad for turn in turns])
+    value = np.concatenate([turn.value for turn in turns])
+    sense = np.concatenate([np.full(turn.value.size, float(turn.sense)) for turn in turns])
+    design = np.column_stack([harmonic_design(angle, list(orders)), sense])
+    squared = np.isin(np.arange(SECTORS), np.arange(SECTORS) ** 2 % SECTORS).astype(np.int64)
+    number = np.floor(np.mod(angle, TURN_RAD) * (SECTORS / TURN_RAD)).astype(np.int64)
+    sector = squared[np.minimum(number, SECTORS - 1)]
+    squares = 0.0
+    for part in (0, 1):
+        seen, unseen = sector == part, sector != part
+        if np.count_nonzero(seen) < 4 * design.shape[1]:
+            return None
+        model = linear_fit(design[seen], value[seen])
+        residual = value[unseen] - design[unseen] @ model.coefficients
+        squares += float(residual @ residual)
+    return float(np.sqrt(squares / value.size))
+
+
+def _cogging(
+    captures: Sequence[Capture],
+    spec: Spectrum,
+    lines: Sequence[OrderLine],
+    rms_a: float | None,
+    known: Constants,
+    campaign: Campaign,
+) -> tuple[Estimate, ...]:
+    names = ("cogging_order", *TORQUES)
+    if not lines:
+        limit = detection_limit(spec)
+        note = f"no order found; an amplitude above {limit:.2g} A would have been"
+        return tuple(not_identifiable(n, _unit(n), NAME, note) for n in names)
+    paths = tuple(c.path for c in captures)
+    note = f"A by order: {name_orders(lines, known, campaign)}"
+    if rms_a is not None:
+        note += f"; {rms_a:.3g} A rms left in held-out sectors"
+    order = Estimate(
+        names[0], lines[0].order, "1", "measured", NAME, captures=paths, note=note,
+        bounds=(1.0, float(spec.orders[-1])),
+    )  # fmt: skip
+    kt = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
+    if kt is None:
+        why = f"{lines[0].amplitude:.4g} A of order {lines[0].order}; a torque constant is missing"
+        return (order, *(not_identifiable(n, _unit(n), NAME, why) for n in TORQUES))
+    peak, u_peak = half_peak_to_peak(lines)
+    sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
+    torques = []
+    for name, (amps, u) in sizes.items():
+        scatter = type_a(f"scatter:{NAME}:{name}", u, lines[0].dof)
+        budget = propagate([(amps, kt.budget), (kt.number, scatter)])
+        torques.append(
+            Estimate(name, amps * kt.number, _unit(name), "measured", NAME, budget, {}, paths, note)
+        )
+    return (order, *torques)
+
+
+def _evidence(
+    turns: Sequence[Turn], spec: Spectrum, lines: Sequence[OrderLine]
+) -> tuple[Evidence, ...]:
+    series = []
+    for index, turn in enumerate(turns):
+        keep = slice(None, None, -(-turn.value.size // 2000))
+        angle = np.mod(turn.theta_rad[keep], TURN_RAD)
+        order = np.argsort(angle, kind="stable")
+        angle = angle[order]
+        label = "forward" if turn.sense > 0 else "backward"
+        fitted = spec.means[index] + waveform(lines, angle)
+        series.append(Series(f"{label} {index + 1}", angle, turn.value[keep][order], fitted))
+    shown = min(spec.orders.size, 1000)
+    heights: NDArray[np.float64] = np.abs(spec.coefficients.mean(axis=0))[:shown]
+    bars = Series("orders", spec.orders[:shown].astype(float), heights, np.array([]))
+    return (
+        Evidence(NAME, "Holding current over one turn", "theta_mech_rad", "iq_a", "scatter",
+                 tuple(series)),
+        Evidence(NAME, "Holding-current spectrum", "cogging_order", "iq_a", "bars", (bars,)),
+    )  # fmt: skip
+
+
+def _unit(name: str) -> str:
+    return RESIDUAL.unit if name == RESIDUAL.name else CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("holding_current",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=("pole_pairs", "kt_peak_nm_a", "kt_from_ke_nm_a"),
+    rank=20,
+    terms=(RESIDUAL,),
+    options={"highest_order": 1000.0, "level": 0.01},
+)
