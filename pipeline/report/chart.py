@@ -115,7 +115,7 @@ def _main_marks(evidence: Evidence, panel: Panel) -> Iterator[str]:
     for index, one in enumerate(evidence.series):
         css = "measured" if fitted or not several else f"c{index % PALETTE}"
         yield _path(
-            f"{css} {_SHAPE[evidence.kind]}",
+            f"{css} {shape}",
             draw(panel, one.x, one.measured, index, len(evidence.series)),
             one.label,
         )
