@@ -1,0 +1,61 @@
+"""Terminal voltages and currents of a capture, whichever of the equivalent columns it holds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records.capture import Capture
+
+Array = NDArray[np.float64]
+PAIRS = ("ab", "bc", "ca")
+PAIR_ANGLE_RAD = {"ab": -np.pi / 6.0, "bc": np.pi / 2.0, "ca": 7.0 * np.pi / 6.0}
+
+
+def pair_of(capture: Capture) -> str | None:
+    """The terminal pair of a two-terminal test: as stated, else the only line voltage there."""
+    if capture.meta.pair in PAIRS:
+        return capture.meta.pair
+    held = [pair for pair in PAIRS if capture.has(f"v{pair}_v")]
+    return held[0] if len(held) == 1 else None
+
+
+def voltage_columns(capture: Capture, pair: str) -> tuple[str, ...]:
+    """The columns that make the pair's voltage: its own, or its two phase voltages."""
+    own = (f"v{pair}_v",)
+    phases = (f"v{pair[0]}_v", f"v{pair[1]}_v")
+    return next((names for names in (own, phases) if capture.has(*names)), ())
+
+
+def current_columns(capture: Capture, pair: str) -> tuple[str, ...]:
+    """The line currents of the pair's terminals that are there, the first terminal's first."""
+    return tuple(n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n))
+
+
+def pair_signals(capture: Capture, pair: str, *others: str) -> dict[str, Array]:
+    """`t_s`, `v_v` and `i_a` [n] of one terminal pair, and `others` that the capture holds.
+
+    The current is positive into the pair's first terminal; where both line currents are there,
+    i = (i_first - i_second) / 2. Rows with a missing value in any of t, v, i are left out.
+    Raises KeyError where a voltage or a current is missing.
+    """
+    volts, amps = voltage_columns(capture, pair), current_columns(capture, pair)
+    if not volts or not amps or not capture.has("t_s"):
+        raise KeyError(f"{capture.path} holds no voltage and current of pair {pair}")
+    extra = tuple(name for name in others if capture.has(name))
+    data = capture.arrays("t_s", *volts, *amps, *extra)
+    v = data[volts[0]] if len(volts) == 1 else data[volts[0]] - data[volts[1]]
+    signs = [1.0 if name == f"i{pair[0]}_a" else -1.0 for name in amps]
+    i = np.mean([sign * data[name] for sign, name in zip(signs, amps, strict=True)], axis=0)
+    keep = np.isfinite(data["t_s"]) & np.isfinite(v) & np.isfinite(i)
+    signals = {"t_s": data["t_s"], "v_v": v, "i_a": i} | {name: data[name] for name in extra}
+    return {name: values[keep] for name, values in signals.items()}
+
+
+def first_temperature(capture: Capture, *places: str) -> str | None:
+    """The first of the temperature columns of these places that holds a finite value."""
+    for place in places:
+        name = f"temp_{place}_degc"
+        if capture.has(name) and np.isfinite(capture.arrays(name)[name]).any():
+            return name
+    return None
