@@ -12,7 +12,8 @@ from pipeline import settings as s
 class Command:
     """`stage` is a module of `stages/` with `main(settings)`; `words` its one-line description.
 
-    `positional` are keys that may be given without their name, in this order.
+    `positional` are keys that may be given without their name, in this order; `free` is the key
+    that collects, as text, every name=value that is no key of the command.
     """
 
     name: str
@@ -20,6 +21,7 @@ class Command:
     settings: type[s.Settings]
     words: str
     positional: tuple[str, ...] = ()
+    free: str | None = None
 
 
 def _index(*commands: Command) -> dict[str, Command]:
@@ -53,8 +55,12 @@ def usage(command: Command) -> str:
 
 def _default(key: Field[Any]) -> str:
     if key.default is not MISSING:
-        return "null" if key.default is None else str(key.default)
+        return "null" if key.default is None else _lower(key.default)
     if key.default_factory is not MISSING:
         made = key.default_factory()
         return "{}" if made == {} else str(made).replace("'", "")
     return "..."
+
+
+def _lower(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -22,17 +22,22 @@ def load_settings(command: Command, words: list[str]) -> Settings:
     kinds = typing.get_type_hints(command.settings)
     named = _with_names(command, words)
     texts: dict[str, str | None] = {}
+    free: dict[str, str] = {}
     rest: list[str] = []
     for word in named:
         key, _, value = word.partition("=")
         if _is_text(kinds.get(key)):
             texts[key] = _unquoted(value)
+        elif command.free and key not in kinds:
+            free[key] = _unquoted(value)
         else:
             nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict
             rest.append(f"++{word}" if nested else word)
     settings = _composed(command, rest)
     for key, text in texts.items():
         setattr(settings, key, None if text == "null" else text)
+    if command.free:
+        setattr(settings, command.free, free)
     return settings
 
 

@@ -1,0 +1,89 @@
+"""The main job on captures of a bench that this project did not write, against its truth."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scipy.special import stdtrit
+
+from pipeline.__main__ import main
+
+RIG = Path(__file__).parents[3] / "shared" / "data" / "rig"
+pytestmark = pytest.mark.skipif(not RIG.is_dir(), reason="../shared/data/rig is not here")
+
+LIMITS = {
+    "r_phase_ohm": 0.003,
+    "ld_h": 0.01,
+    "lq_h": 0.01,
+    "psi_pm_wb": 0.002,
+    "kt_peak_nm_a": 0.003,
+    "j_rotor_kgm2": 0.01,
+    "torque_coulomb_nm": 0.03,
+}
+JUDGED = (*LIMITS, "b_visc_nm_s_rad", "temp_coeff_copper_1_k", "temp_coeff_magnet_1_k")
+
+
+@pytest.fixture(scope="module")
+def sheets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """Datasheet of each rig motor, by folder."""
+    found = {}
+    for folder in ("P0", "P1"):
+        output = tmp_path_factory.mktemp(folder)
+        words = [f"input={RIG / folder}", f"output={output}", "report=false", "recordings=false"]
+        assert main(["run", *words]) in (0, 1)
+        (path,) = (output / "datasheets").iterdir()
+        found[folder] = json.loads(path.read_bytes())
+    return found
+
+
+def truth(folder: str) -> dict[str, Any]:
+    constants: dict[str, Any] = json.loads((RIG / folder / "truth.json").read_bytes())["constants"]
+    return constants
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_relative_error_on_the_motor_with_nothing_hidden(
+    sheets: dict[str, dict[str, Any]], name: str
+) -> None:
+    value = sheets["P0"]["constants"][name]["value"]
+    assert value == pytest.approx(truth("P0")[name], rel=LIMITS[name])
+
+
+@pytest.mark.parametrize("name", JUDGED)
+def test_truth_lies_in_the_interval(sheets: dict[str, dict[str, Any]], name: str) -> None:
+    """Every constant within its own 95 % interval (Student's t with its own dof)."""
+    stated = sheets["P0"]["constants"][name]
+    reach = stdtrit(stated["dof"] or 1e9, 0.975) * stated["u"]
+    assert abs(stated["value"] - truth("P0")[name]) <= reach
+    assert math.isclose(stated["u"], math.hypot(stated["u_a"], stated["u_b"]), rel_tol=1e-9)
+
+
+def test_pole_pairs_are_exact(sheets: dict[str, dict[str, Any]]) -> None:
+    assert [sheets[m]["constants"]["pole_pairs"]["value"] for m in ("P0", "P1")] == [10, 10]
+
+
+def test_no_cogging_is_said_where_there_is_none(sheets: dict[str, dict[str, Any]]) -> None:
+    order = sheets["P0"]["constants"]["cogging_order"]
+    assert (order["status"], order["value"]) == ("not_identifiable", None)
+    assert order["note"]
+
+
+def test_cogging_is_found_where_it_is(sheets: dict[str, dict[str, Any]]) -> None:
+    found, known = sheets["P1"]["constants"], truth("P1")
+    assert found["cogging_order"]["value"] == known["cogging_order"]
+    amplitude = found["cogging_amplitude_nm"]
+    reach = stdtrit(amplitude["dof"] or 1e9, 0.975) * amplitude["u"]
+    assert abs(amplitude["value"] - known["cogging_amplitude_nm"]) <= reach
+    assert amplitude["value"] == pytest.approx(known["cogging_amplitude_nm"], rel=0.02)
+
+
+def test_every_check_of_a_sound_motor_holds(sheets: dict[str, dict[str, Any]]) -> None:
+    """Nothing but the cogging order, which is not there, may stay unjudged on P0."""
+    statuses = {check["name"]: check["status"] for check in sheets["P0"]["checks"]}
+    assert statuses.pop("cogging_order_vs_slots") == "not_evaluated"
+    assert set(statuses.values()) == {"pass"}
+    assert len(statuses) == 9
