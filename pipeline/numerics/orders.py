@@ -168,7 +168,8 @@ def held_out_gain(spec: Spectrum) -> Array:
     total = spec.coefficients.sum(axis=0)
     others = (total - spec.coefficients) / (spec.turns - 1)
     gain = np.abs(spec.coefficients) ** 2 - np.abs(spec.coefficients - others) ** 2
-    return np.mean(gain > 0.0, axis=0)
+    share: Array = np.mean(gain > 0.0, axis=0)
+    return share
 
 
 def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> list[OrderLine]:
@@ -219,7 +220,7 @@ def half_peak_to_peak(lines: Sequence[OrderLine], points: int = 20_000) -> tuple
 
     u² = sum_k u_k² |exp(j k theta_max) - exp(j k theta_min)|² / 4, first order.
     """
-    theta = np.arange(points) * (TURN_RAD / points)
+    theta = np.linspace(0.0, TURN_RAD, points, endpoint=False)
     wave = waveform(lines, theta)
     top, bottom = theta[int(np.argmax(wave))], theta[int(np.argmin(wave))]
     variance = sum(

@@ -27,4 +27,6 @@ SUFFIX_UNITS: dict[str, str] = {
     "rpm_v": "rpm/V",
     "k_w": "K/W",
     "1_k": "1/K",
+    "1_s": "1/s",
+    "nm_a2": "N·m/A²",
 }

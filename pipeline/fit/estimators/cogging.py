@@ -219,7 +219,7 @@ def _evidence(
         count = np.bincount(index, minlength=bins)
         at = np.flatnonzero(count)
         mean = np.bincount(index, weights=torque, minlength=bins)[at] / count[at]
-        where = (at + 0.5) * (TURN_RAD / bins)
+        where = (at.astype(np.float64) + 0.5) * (TURN_RAD / bins)
         level = float(np.mean(spec.means[spec.senses == sense]))
         series.append(Series(label, where, mean, level + waveform(lines, where)))
     shown = min(spec.orders.size, 2000, max(4 * max((n.order for n in lines), default=0), 200))
