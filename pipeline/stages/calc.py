@@ -1,0 +1,46 @@
+"""`calc`: answers with their formula and convention, from the physics the datasheets use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pipeline.records.errors import UsageError
+from pipeline.stages.calculators.coupling import GRIP, KE_KT, KV
+from pipeline.stages.calculators.impedance import COPPER, SALIENCY, WYE_DELTA
+from pipeline.stages.calculators.poles import POLE_PAIRS
+from pipeline.stages.calculators.quantities import Calculator, parse, render, usage
+
+KINDS: dict[str, Calculator] = {
+    "wye-delta": WYE_DELTA,
+    "copper": COPPER,
+    "ke-kt": KE_KT,
+    "kv": KV,
+    "grip": GRIP,
+    "pole-pairs": POLE_PAIRS,
+    "saliency": SALIENCY,
+}
+
+
+def calculate(kind: str, mapping: Mapping[str, str]) -> str:
+    """The printed answer of one calculator for the keys as typed.
+
+    Without a kind, the kinds; without keys, what the kind can be given.
+
+    Raises UsageError for an unknown kind or key, keys that do not suffice or contradict each
+    other, and values without sense or of another unit.
+    """
+    if not kind:
+        return usage(KINDS)
+    calculator = KINDS.get(kind)
+    if calculator is None:
+        raise UsageError(f"calc: no kind {kind!r}", f"known are {', '.join(KINDS)}")
+    if not mapping:
+        return usage(KINDS, kind)
+    given = parse(kind, calculator, mapping)
+    answer = calculator.answer(given)
+    if answer is None:
+        ways = "; or ".join(calculator.ways)
+        raise UsageError(
+            f"calc {kind}: nothing to work out of {', '.join(mapping)}", f"give {ways}"
+        )
+    return render(kind, calculator, given, answer)
