@@ -16,11 +16,11 @@ MAD_TO_SIGMA = 1.4826
 def noise_of(values: Array) -> float:
     """Standard deviation [unit of values] of white noise on a slow signal [n].
 
-    From the median absolute first difference, which edges and turns of the signal do not move:
-    sigma = 1.4826 median|x[k+1] - x[k]| / sqrt(2).
+    From the median absolute second difference, which ramps and edges of the signal do not move:
+    sigma = 1.4826 median|x[k+1] - 2 x[k] + x[k-1]| / sqrt(6).
     """
-    steps = np.abs(np.diff(values[np.isfinite(values)]))
-    return MAD_TO_SIGMA * float(np.median(steps)) / math.sqrt(2.0) if steps.size else 0.0
+    bends = np.abs(np.diff(values[np.isfinite(values)], n=2))
+    return MAD_TO_SIGMA * float(np.median(bends)) / math.sqrt(6.0) if bends.size else 0.0
 
 
 def runs_of_equal(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -33,20 +33,23 @@ def runs_of_equal(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return starts.astype(np.int64), lengths.astype(np.int64)
 
 
+def share_of_repeats(values: Array) -> float:
+    """Share of samples [n] that equal the one before; 1 where there are too few to say."""
+    finite = values[np.isfinite(values)]
+    return float(np.mean(finite[1:] == finite[:-1])) if finite.size > 1 else 1.0
+
+
 def longest_likely_run(values: Array, level: float) -> float:
     """Length that a run of equal samples exceeds by chance with probability `level` at most.
 
     With p the share of samples equal to the one before, n p^(L-1) is the expected number of
     runs of L or more in n samples; infinite where most samples repeat and a run says nothing.
     """
-    finite = values[np.isfinite(values)]
-    if finite.size < 2:
-        return math.inf
-    repeats = float(np.mean(finite[1:] == finite[:-1]))
+    repeats = share_of_repeats(values)
     if repeats > 0.5:
         return math.inf
-    repeats = max(repeats, 1.0 / finite.size)
-    return 1.0 + math.log(level / finite.size) / math.log(repeats)
+    size = float(np.count_nonzero(np.isfinite(values)))
+    return 1.0 + math.log(level / size) / math.log(max(repeats, 1.0 / size))
 
 
 def rows_of_runs(size: int, starts: NDArray[np.int64], lengths: NDArray[np.int64]) -> Rows:

@@ -50,8 +50,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 def sum_share(table: pl.DataFrame, names: tuple[str, ...]) -> float:
     """Root mean square of the sum over that of the three together, noise taken off.
 
-    share² = (mean(s²) - 2 sigma²) / mean(a² + b² + c²), sigma the white noise of s; what noise
-    alone would give cannot reach the sum's own scatter.
+    share² = (mean(s²) - sigma²) / mean(a² + b² + c²), sigma the white noise of the sum s.
     """
     three = [table[name].to_numpy() for name in names]
     total = three[0] + three[1] + three[2]
@@ -59,7 +58,7 @@ def sum_share(table: pl.DataFrame, names: tuple[str, ...]) -> float:
     power = float(sum(np.mean(column[good] ** 2) for column in three)) if good.any() else 0.0
     if power == 0.0:
         return 0.0
-    excess = float(np.mean(total[good] ** 2)) - 2.0 * noise_of(total) ** 2
+    excess = float(np.mean(total[good] ** 2)) - noise_of(total) ** 2
     return float(np.sqrt(max(0.0, excess) / power))
 
 

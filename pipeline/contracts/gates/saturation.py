@@ -24,6 +24,7 @@ NAME = "saturation"
 CURRENTS = (*LINE_CURRENTS, "id_a", "iq_a", "idc_a")
 MEASURED_VOLTAGES = (*LINE_VOLTAGES, "va_v", "vb_v", "vc_v")
 OTHERS = ("torque_shaft_nm",)
+BESIDE = 8
 REMEDY = "record again with a larger range of that channel"
 
 
@@ -54,11 +55,12 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def clipped_rows(values: Array, options: Mapping[str, float]) -> Rows:
-    """True on rows [n] of flat tops: runs of the extreme value that noise would have broken.
+    """True on rows [n] at an extreme value of which some runs are longer than noise allows.
 
     A run counts if it is longer than chance allows for the repeats seen away from the extremes,
-    and if the signal came to it by more than a few steps of its resolution: a decay that
-    settles on one code arrives there slowly, a clipped one at full speed.
+    and if the samples next to it move by more than the converter's resolution: a decay that
+    settles on one code, or a rounded peak, comes to it by single codes, a clipped signal at its
+    full pace or with its full noise. Exact zero is rest, not a stop.
     """
     clipped = np.zeros(values.size, dtype=bool)
     finite = values[np.isfinite(values)]
@@ -68,21 +70,28 @@ def clipped_rows(values: Array, options: Mapping[str, float]) -> Rows:
     inside = finite[(finite != low) & (finite != high)]
     if inside.size < options["inside_share"] * finite.size:
         return clipped
-    steps = np.abs(np.diff(inside))
+    steps = np.abs(np.diff(values))
     resolution = float(np.min(steps[steps > 0.0], initial=np.inf))
     likely = max(longest_likely_run(inside, options["chance"]), options["shortest_run"])
     starts, lengths = runs_of_equal(values)
     for stop in (low, high):
-        runs = np.flatnonzero((values[starts] == stop) & (lengths > likely))
-        if runs.size == 0:
+        runs = (values[starts] == stop) & (lengths > likely)
+        if stop == 0.0 or not runs.any():
             continue
-        arrivals = [abs(stop - values[starts[r] - 1]) for r in runs if starts[r] > 0]
-        after = [r for r in runs if starts[r] + lengths[r] < values.size]
-        arrivals += [abs(stop - values[starts[r] + lengths[r]]) for r in after]
-        fast = [step for step in arrivals if np.isfinite(step)]
-        if fast and np.median(fast) > options["arrival_steps"] * resolution:
-            clipped |= rows_of_runs(values.size, starts[runs], lengths[runs])
+        flat = rows_of_runs(values.size, starts[runs], lengths[runs])
+        if _pace_beside(steps, flat) >= options["pace_steps"] * resolution:
+            clipped |= values == stop
     return clipped
+
+
+def _pace_beside(steps: Array, flat: Rows) -> float:
+    """Median step [n-1] of the samples next to flat stretches, the steps onto them included."""
+    beside = np.zeros(steps.size, dtype=bool)
+    for edge in np.flatnonzero(flat[1:] != flat[:-1]):
+        outward = slice(edge, edge + BESIDE) if flat[edge] else slice(edge + 1 - BESIDE, edge + 1)
+        beside[max(0, outward.start) : outward.stop] = True
+    beside &= ~(flat[1:] & flat[:-1]) & np.isfinite(steps)
+    return float(np.median(steps[beside])) if beside.any() else 0.0
 
 
 GATE = Gate(
@@ -92,12 +101,12 @@ GATE = Gate(
     {
         # Expected number of such runs in a healthy capture of any length.
         "chance": 1e-6,
-        # Two or three equal extremes are what a coarse converter gives at a peak.
-        "shortest_run": 4.0,
+        # Two equal extremes are what any converter gives at a peak now and then.
+        "shortest_run": 2.0,
         # With fewer samples between the extremes the signal has two levels, not a cut top.
         "inside_share": 0.05,
-        # A settled exponential reaches its last code by single steps.
-        "arrival_steps": 3.0,
+        # What settles or turns by itself comes by single codes.
+        "pace_steps": 2.0,
         # A twentieth of the rows can be left out of a fit; more is another experiment.
         "refuse_share": 0.05,
     },

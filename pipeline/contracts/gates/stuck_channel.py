@@ -8,7 +8,14 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, span_of, warning
 from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
-from pipeline.contracts.waveform import Array, Rows, longest_likely_run, rows_of_runs, runs_of_equal
+from pipeline.contracts.waveform import (
+    Array,
+    Rows,
+    longest_likely_run,
+    rows_of_runs,
+    runs_of_equal,
+    share_of_repeats,
+)
 from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
@@ -29,6 +36,7 @@ MUST_MOVE: dict[str, tuple[str, ...]] = {
     "drive": ("iq_a", "vq_v"),
 }
 NOISY = (*TERMINALS, "va_v", "vb_v", "vc_v", "id_a", "iq_a", "torque_shaft_nm")
+BESIDE = 50
 REMEDY = "check the sensor and its lead, and record again"
 
 
@@ -67,7 +75,8 @@ def frozen_rows(values: Array, options: Mapping[str, float]) -> Rows:
     """True on rows [n] of runs that a noisy signal does not make by chance.
 
     Runs at the extremes are the gate `saturation`'s. A run of exact zeros counts only where the
-    signal drops to it from afar: a drive that is switched off logs zero current rightly.
+    signal drops to it from afar: a drive that is switched off logs zero current rightly. A
+    signal that settles on one code repeats more and more before it does; a frozen one does not.
     """
     none = np.zeros(values.size, dtype=bool)
     likely = max(longest_likely_run(values, options["chance"]), options["shortest_run"])
@@ -81,11 +90,18 @@ def frozen_rows(values: Array, options: Mapping[str, float]) -> Rows:
     kept = [r for r in runs if low < values[starts[r]] < high]
     afar = options["drop_share"] * (high - low)
     kept = [r for r in kept if values[starts[r]] != 0.0 or _falls_from(values, starts[r], afar)]
+    kept = [r for r in kept if not _settles(values, starts[r], lengths[r])]
     return rows_of_runs(values.size, starts[kept], lengths[kept]) if kept else none
 
 
 def _falls_from(values: Array, start: int, afar: float) -> bool:
     return bool(start > 0 and abs(values[start - 1] - values[start]) > afar)
+
+
+def _settles(values: Array, start: int, length: int) -> bool:
+    before = values[max(0, start - BESIDE) : start]
+    after = values[start + length : start + length + BESIDE]
+    return any(side.size > 1 and share_of_repeats(side) > 0.5 for side in (before, after))
 
 
 GATE = Gate(
