@@ -25,9 +25,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if ld is None or lq is None:
         return not_evaluated(NAME, "needs current_step or lcr captures on both axes")
     ratio, u = ratio_of(lq, ld)
-    status, suspect = _status(
-        ratio, u, options["largest"], constants.best("reluctance_torque_nm_a2")
-    )
+    status, suspect = _status(ratio, u, options["largest"], constants.best("kt_reluctance_nm_a2"))
     words = (
         f"Lq over Ld is {ratio:.4f} ± {2.0 * u:.4f} (k=2); "
         f"1 with surface magnets, above 1 with interior magnets, at most {options['largest']:g}"

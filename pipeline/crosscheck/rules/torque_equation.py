@@ -1,0 +1,77 @@
+"""Whether flux and inductances, read without torque, predict the dynamometer's torque."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.protocol import Rule
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import propagate, standard_uncertainty
+
+NAME = "torque_equation"
+
+
+def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
+    """Torque per q ampere at the strongest d current: dynamometer over psi, Ld, Lq.
+
+    (Kt + k_r i_d) / (1.5 p [psi + (Ld - Lq) i_d]) with Kt and k_r fitted to the torque map and
+    psi, Ld, Lq from back-EMF and steps: both terms of the torque equation at once, where the
+    reluctance term weighs most. The allowance covers the map's own saturation.
+    """
+    names = ("kt_peak_nm_a", "kt_reluctance_nm_a2", "kt_from_ke_nm_a", "ld_h", "lq_h")
+    known = {name: constants.best(name) for name in (*names, "pole_pairs")}
+    found = {name: estimate for name, estimate in known.items() if estimate is not None}
+    if len(found) < len(known):
+        missing = ", ".join(name for name in known if name not in found)
+        return not_evaluated(NAME, f"needs {missing}: a torque_map with d currents, steps, a spin")
+    id_a = _strongest_d_current_a(campaign)
+    if id_a == 0.0:
+        return not_evaluated(NAME, "needs a torque_map with d currents")
+    pairs = round(found["pole_pairs"].number)
+    ratio, u = _ratio(found, pairs, id_a)
+    return judge_ratio(
+        NAME,
+        ratio,
+        u,
+        options["allowance"],
+        f"torque at i_d = {id_a:.3g} A, dynamometer over magnet and reluctance terms",
+        pairs,
+        "inductances or torque of other conditions, or a sensor's gain",
+    )
+
+
+def _strongest_d_current_a(campaign: Campaign) -> float:
+    """The d current [A] of largest size that a torque map held, 0 where none was."""
+    levels = [
+        float(np.nanpercentile(capture.arrays("id_a")["id_a"], share))
+        for capture in campaign.of("torque_map")
+        if capture.has("id_a")
+        for share in (2.0, 98.0)
+    ]
+    return max(levels, key=abs, default=0.0)
+
+
+def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> tuple[float, float]:
+    """The ratio of torques per q ampere and its standard uncertainty."""
+    reluctance = 1.5 * pairs * id_a
+    measured = found["kt_peak_nm_a"].number + found["kt_reluctance_nm_a2"].number * id_a
+    saliency_h = found["ld_h"].number - found["lq_h"].number
+    predicted = found["kt_from_ke_nm_a"].number + reluctance * saliency_h
+    ratio = measured / predicted
+    terms = [
+        (1.0 / predicted, found["kt_peak_nm_a"].budget),
+        (id_a / predicted, found["kt_reluctance_nm_a2"].budget),
+        (-ratio / predicted, found["kt_from_ke_nm_a"].budget),
+        (-ratio * reluctance / predicted, found["ld_h"].budget),
+        (ratio * reluctance / predicted, found["lq_h"].budget),
+    ]
+    return ratio, standard_uncertainty(propagate(terms))
+
+
+RULE = Rule(NAME, check, {"allowance": 0.02})
