@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.terminals import PAIR_ANGLE_RAD, PAIRS
-from pipeline.numerics.harmonics import whole_cycles
+from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Rows = NDArray[np.intp]
 LEAST_CYCLES = 3
 TURN = 2.0 * math.pi
 
@@ -134,7 +135,7 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
     """The stretches and the number of spinning rows.
 
     The phase of the space vector is averaged over whole cycles, which removes harmonics and
-    offsets, and joined by a spline whose slope is the speed.
+    offsets, and joined by a smooth curve whose slope is the speed.
     """
     vector = spin.vector_v()
     size = np.abs(vector)
@@ -154,10 +155,8 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Array] | None:
+def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Rows] | None:
     """Phase and its rate [n] from means over whole cycles, and the cycle's number of each row."""
-    from scipy.interpolate import CubicSpline
-
     if phase.size < 12 or abs(phase[-1] - phase[0]) < TURN * LEAST_CYCLES:
         return None
     sense = math.copysign(1.0, phase[-1] - phase[0])
@@ -170,16 +169,13 @@ def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Array] | None
     mid_p = np.add.reduceat(phase, cuts[:-1])[: counts.size].copy()
     last = slice(int(cuts[-2]), int(cuts[-1]))
     mid_t[-1], mid_p[-1] = t_s[last].sum(), phase[last].sum()
-    spline = CubicSpline(mid_t / counts, mid_p / counts)
+    value, slope = hermite(mid_t / counts, mid_p / counts, t_s)
     number = np.clip(np.searchsorted(cuts, np.arange(phase.size), side="right") - 1, -1, None)
     number[cuts[-1] :] = -1
-    smooth: tuple[Array, Array, Array] = (spline(t_s), spline(t_s, 1), number)
-    return smooth
+    return value, slope, number
 
 
-def _split(
-    rows: NDArray[np.intp], phase: Array, omega: Array, number: Array, change: float
-) -> list[Stretch]:
+def _split(rows: Rows, phase: Array, omega: Array, number: Rows, change: float) -> list[Stretch]:
     """Cuts a run where the speed leaves a band of ± `change` around its level."""
     cycles = int(number.max()) + 1
     inside = number >= 0

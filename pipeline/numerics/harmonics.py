@@ -89,3 +89,22 @@ def sums_between(values: Array | Complex, cuts: NDArray[np.intp]) -> Array | Com
     """Sums of values [n] over the stretches between consecutive cuts."""
     running = np.concatenate([[0], np.cumsum(values)])
     return np.diff(running[cuts])
+
+
+def hermite(nodes: Array, values: Array, x: Array) -> tuple[Array, Array]:
+    """A smooth curve through values [m] at increasing nodes [m]: its value and slope at x [n].
+
+    Piecewise cubic with the slopes of second-order differences at the nodes; continued by the
+    first and last piece outside them. Reference: Fritsch and Carlson, SIAM J. Numer. Anal. 17,
+    1980, eq. 4 (basis).
+    """
+    slopes = np.gradient(values, nodes)
+    index = np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2)
+    width = np.diff(nodes)[index]
+    u = (x - nodes[index]) / width
+    rise = values[index + 1] - values[index]
+    left, right = slopes[index] * width, slopes[index + 1] * width
+    square, cube = 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise
+    value: Array = values[index] + u * (left + u * (square + u * cube))
+    slope: Array = (left + u * (2.0 * square + 3.0 * u * cube)) / width
+    return value, slope

@@ -284,7 +284,7 @@ def _pole_pairs(groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
 
 
 def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:
-    found = {}
+    found: dict[str, Estimate] = {}
     for name in KE_NAMES:
         unit = COUPLINGS[name].unit
         if not pairs.known:
