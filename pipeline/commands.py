@@ -30,6 +30,14 @@ def _index(*commands: Command) -> dict[str, Command]:
 
 COMMANDS = _index(
     Command("run", "run", s.RunSettings, "captures in; datasheets, checks, report, recordings out"),
+    Command(
+        "calc",
+        "calc",
+        s.CalcSettings,
+        "a conversion between conventions, with its formula",
+        positional=("kind",),
+        free="values",
+    ),
 )
 
 

@@ -46,6 +46,29 @@ class RunSettings(Settings):
     crosscheck: dict[str, Any] = key({}, "options of a check: crosscheck.CHECK.OPTION=number")
 
 
+@dataclass(kw_only=True)
+class CalcSettings(Settings):
+    """`calc`: one conversion with its formula."""
+
+    kind: str = key("", "wye-delta, copper, ke-kt, kv, grip, pole-pairs or saliency")
+    values: dict[str, str] = key({}, "what is given, each as name=number with its unit")
+
+
+@dataclass(kw_only=True)
+class InspectSettings(Settings):
+    """`inspect`: what one file holds."""
+
+    file: str = key("", "any file")
+
+
+@dataclass(kw_only=True)
+class PlanSettings(Settings):
+    """`plan`: which test to record next."""
+
+    output: str = key("reports/demo", "output folder of a run")
+    motor: str | None = key(None, "motor_id; every motor without it")
+
+
 def result_document(settings: Settings) -> dict[str, Any]:
     """The settings that can change a result, as plain data for a digest."""
     kept = {f.name for f in fields(settings) if f.metadata.get("result", True)}

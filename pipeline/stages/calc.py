@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pipeline.records.errors import UsageError
+from pipeline.records.outcome import Outcome
+from pipeline.settings import CalcSettings
 from pipeline.stages.calculators.coupling import GRIP, KE_KT, KV
 from pipeline.stages.calculators.impedance import COPPER, SALIENCY, WYE_DELTA
 from pipeline.stages.calculators.poles import POLE_PAIRS
@@ -19,6 +21,11 @@ KINDS: dict[str, Calculator] = {
     "pole-pairs": POLE_PAIRS,
     "saliency": SALIENCY,
 }
+
+
+def main(settings: CalcSettings) -> Outcome:
+    """Prints one calculator's answer with its formula."""
+    return Outcome(text=calculate(settings.kind, settings.values))
 
 
 def calculate(kind: str, mapping: Mapping[str, str]) -> str:
