@@ -1,0 +1,186 @@
+"""Raw tables into the contract's columns: names, units and signs are settled here, once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.io.raw_table import RawTable
+from pipeline.io.source_map import FieldMap, SourceMap
+from pipeline.io.units import scale_to
+from pipeline.physics.glossary import COLUMNS, suffix_of
+from pipeline.records.errors import CaptureError
+
+JOINT_COLUMNS = {
+    "position": "theta_mech_rad",
+    "velocity": "omega_mech_rad_s",
+    "effort": "torque_shaft_nm",
+}
+_BRACKET = re.compile(r"^(.*?)\s*[(\[](.*)[)\]]$")
+_NANOSECONDS_A_SECOND = 1e9
+
+
+def last_part(name: str) -> str:
+    """A field's name without the messages it is nested in."""
+    return name.rsplit(".", 1)[-1]
+
+
+def foreign_unit(name: str) -> str | None:
+    """The contract column that a name means but for its unit (`ia_ma` means `ia_a`), or None."""
+    bare = last_part(name).lower()
+    bracket = _BRACKET.match(bare)
+    stem = bracket[1].strip() if bracket else bare.rpartition("_")[0]
+    for column in COLUMNS:
+        suffix = suffix_of(column)
+        if stem and bare != column and stem in (column, column.removesuffix(f"_{suffix}")):
+            return column
+    return None
+
+
+def contract_fields(names: Sequence[str], joint_state: bool) -> list[FieldMap]:
+    """The contract's own columns among field names, nested ones by their last part.
+
+    A column that carries a foreign unit, or that two fields claim, is a CaptureError.
+    """
+    found: dict[str, FieldMap] = {}
+    for name in names:
+        column = last_part(name)
+        if joint_state:
+            column = JOINT_COLUMNS.get(name, column)
+        if column not in COLUMNS:
+            meant = foreign_unit(name)
+            if meant is not None and meant not in map(last_part, names):
+                raise CaptureError(
+                    "unknown_unit",
+                    f"the field {name!r} is not in the contract's unit, {COLUMNS[meant].unit}",
+                    f"write {meant} [{COLUMNS[meant].unit}], or add a source map that converts it",
+                )
+            continue
+        if column in found:
+            raise CaptureError(
+                "duplicate_column",
+                f"the fields {found[column].field!r} and {name!r} are both {column}",
+                "choose one of them with a source map",
+            )
+        found[column] = FieldMap(name, column)
+    return list(found.values())
+
+
+def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
+    """The map's fields that are there, each under the name it has in the file."""
+    by_last: dict[str, list[str]] = {}
+    for name in names:
+        by_last.setdefault(last_part(name), []).append(name)
+    found: list[FieldMap] = []
+    for part in source.fields:
+        matches = [part.field] if part.field in names else by_last.get(part.field, [])
+        if len(matches) > 1:
+            raise CaptureError(
+                "duplicate_column",
+                f"{part.field!r} could be {' or '.join(matches)}",
+                "write the full name into the source map",
+            )
+        found += [
+            FieldMap(name, part.column, part.unit, part.sign, part.scale, part.offset)
+            for name in matches
+        ]
+    return found
+
+
+def to_frame(table: RawTable, source: SourceMap | None) -> pl.DataFrame | None:
+    """The contract's columns of one table, t_s first, float64; None if it holds none.
+
+    Raises CaptureError for units, times and duplicate columns that cannot be settled.
+    """
+    names = list(table.fields)
+    if source is None:
+        chosen = contract_fields(names, table.joint_state)
+    else:
+        chosen = mapped_fields(names, source)
+    columns = {
+        part.column: _converted(table.fields[part.field], part, dict(table.units))
+        for part in chosen
+        if part.column != "t_s"
+    }
+    if not columns:
+        return None
+    clock = next((part for part in chosen if part.column == "t_s"), None)
+    time = _time(table, clock, source)
+    if time is not None:
+        columns = {"t_s": time} | columns
+    return pl.DataFrame(columns)
+
+
+def _converted(
+    values: NDArray[Any], part: FieldMap, units: Mapping[str, str]
+) -> NDArray[np.float64]:
+    """Values in the column's unit."""
+    numbers = values.astype(np.float64, copy=False)
+    unit = units.get(part.field, "") if part.unit == "row" else part.unit
+    factor, shift = part.sign * part.scale, part.offset
+    if unit is not None:
+        scale = scale_to(unit, COLUMNS[part.column].unit)
+        shift += factor * scale.shift
+        factor *= scale.factor
+    if factor != 1.0:
+        numbers = numbers * factor
+    return numbers + shift if shift else numbers
+
+
+def _time(
+    table: RawTable, clock: FieldMap | None, source: SourceMap | None
+) -> NDArray[np.float64] | None:
+    origin = "field" if source is None else source.time.origin
+    if origin == "increment" and source is not None:
+        return _counted(table.rows, source.time.start_s, source.time.increment_s)
+    if origin == "field" and clock is not None:
+        return _from_field(table, clock, source)
+    if table.log_time_ns is None:
+        return None
+    time: NDArray[np.float64] = table.log_time_ns / _NANOSECONDS_A_SECOND
+    if not table.blocks:
+        return time
+    increment = None if source is None else source.time.increment_s
+    if increment is None:
+        raise CaptureError(
+            "missing_time",
+            f"the blocks of {table.name} hold no t_s",
+            "write t_s into every block, or state `increment_s` in a source map",
+        )
+    return time + increment * _place_in_block(table.log_time_ns)
+
+
+def _counted(rows: int, start_s: float, increment_s: float | None) -> NDArray[np.float64]:
+    if increment_s is None:
+        raise CaptureError(
+            "missing_time",
+            "no sampling increment is known",
+            "state `increment_s`, or `layout.time_increment` where the file says it",
+        )
+    return start_s + increment_s * np.arange(rows, dtype=np.float64)
+
+
+def _place_in_block(log_time_ns: NDArray[np.uint64]) -> NDArray[np.float64]:
+    """Number of each row within its block [rows]; rows of one block share the log time."""
+    first = np.flatnonzero(np.diff(log_time_ns, prepend=log_time_ns[:1] + np.uint64(1)))
+    size = np.diff(np.append(first, log_time_ns.size))
+    place: NDArray[np.float64] = np.arange(log_time_ns.size, dtype=np.float64)
+    return place - np.repeat(first, size)
+
+
+def _from_field(table: RawTable, clock: FieldMap, source: SourceMap | None) -> NDArray[np.float64]:
+    """Time from a field; whole-number clocks count from the first row, so no digit is lost."""
+    values = table.fields[clock.field]
+    if values.dtype.kind in "iu" and values.size:
+        values = (values - values[0]).astype(np.int64)
+    wraps_at = None if source is None else source.time.wraps_at
+    if wraps_at is not None:
+        numbers = values.astype(np.float64)
+        steps = np.diff(numbers, prepend=numbers[:1])
+        values = numbers + wraps_at * np.cumsum(steps < -wraps_at / 2)
+    return _converted(values, clock, dict(table.units))

@@ -1,0 +1,351 @@
+"""Text tables in: every line has its fields, every field is a number, or the file is refused.
+
+polars parses with an explicit schema; what it would let pass in silence (short rows, a cut last
+line, packed or UTF-16 bytes, overflow to infinity) is checked on the bytes before and after.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
+from pipeline.io.raw_table import RawTable
+from pipeline.records.errors import CaptureError
+
+MAX_HEAD_BYTES = 2**18
+_MAX_COLUMNS = 4096
+_COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
+_LONG_INTEGER = re.compile(r"^-?\d{16,}$")
+_PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh")
+
+
+@dataclass(frozen=True, slots=True)
+class CsvTable:
+    """A parsed text table: its comment lines, its rows, and whether their checksum held."""
+
+    metadata: dict[str, str]
+    table: RawTable
+    verified: bool
+    time_start: float | None = None
+    time_increment: float | None = None
+
+
+def _refuse(
+    code: str, message: str, remedy: str, rows: tuple[int, int] | None = None
+) -> CaptureError:
+    return CaptureError(code, message, remedy, rows)
+
+
+def check_text(data: bytes) -> None:
+    """Refuse bytes that are no plain text table: packed, UTF-16, NUL, or CR line ends."""
+    if data.startswith(_PACKED):
+        raise _refuse("encoding", "the file is packed", "unpack it first")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data:
+        raise _refuse(
+            "encoding",
+            "the file is UTF-16 or binary (it holds NUL bytes)",
+            "save it as UTF-8 text",
+        )
+    if b"\r" in data and data.count(b"\r") != data.count(b"\r\n"):
+        raise _refuse(
+            "encoding", "lines end in a bare carriage return", "save it with LF or CRLF line ends"
+        )
+
+
+def split_comments(data: bytes) -> tuple[dict[str, str], int]:
+    """The `# key: value` lines that begin a file, and where the rest begins [byte].
+
+    A key that appears twice with two values is a CaptureError.
+    """
+    found: dict[str, str] = {}
+    at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
+    while data.startswith(b"#", at) and at < MAX_HEAD_BYTES:
+        stop = data.find(b"\n", at)
+        stop = len(data) if stop < 0 else stop + 1
+        try:
+            line = data[at:stop].decode("utf-8").rstrip("\r\n")
+        except UnicodeDecodeError:
+            raise _refuse("encoding", "a metadata line is not UTF-8", "save it as UTF-8") from None
+        match = _COMMENT.match(line)
+        if match and match[1] and found.setdefault(match[1], match[2]) != match[2]:
+            raise _refuse(
+                "bad_metadata", f"the key {match[1]!r} has two values", "keep one of the two lines"
+            )
+        at = stop
+    return found, at
+
+
+def read_csv(
+    data: bytes,
+    dialect: CsvDialect = CONTRACT_DIALECT,
+    wanted: Callable[[str], bool] = bool,
+    name: str = "csv",
+) -> CsvTable:
+    """Parse a whole text table; columns not `wanted` may hold any text.
+
+    Raises CaptureError with the first offending row, counted from 0.
+    """
+    check_text(data)
+    metadata, begin = split_comments(data) if dialect.comment_lines else ({}, 0)
+    stated = metadata.get("sha256_rows")
+    _check_last_line(data, dialect, stated)
+    body = data[begin:].replace(b"\r\n", b"\n")
+    head, rows = _split_head(body, dialect)
+    names, units = _header(head, dialect)
+    rows = _even_out(rows, dialect)
+    names = _check_shape(rows, names, dialect)
+    fields = _parse(rows, names, dialect, wanted)
+    count = rows.count(b"\n")
+    verified = stated is not None
+    if stated is not None:
+        _check_digest(data, begin, stated, count)
+    table = RawTable(name, fields, units=units)
+    before = _text(b"\n".join(head), dialect)
+    return CsvTable(
+        metadata,
+        table,
+        verified,
+        _number_in(before, dialect.time_start, "start"),
+        _number_in(before, dialect.time_increment, "increment"),
+    )
+
+
+def _check_last_line(data: bytes, dialect: CsvDialect, stated: str | None) -> None:
+    if stated is None and dialect.whole_last_line and data and not data.endswith(b"\n"):
+        last = max(data.count(b"\n") - 1, 0)
+        raise _refuse(
+            "truncated",
+            "the last line does not end in a line break, so its last number may be cut",
+            "copy the file again; if it is whole, end it with a line break",
+            (last, last),
+        )
+
+
+def _check_digest(data: bytes, begin: int, stated: str, rows: int) -> None:
+    """Hold the rows against `sha256_rows`, HEX/ROWS."""
+    digest, _, count = stated.partition("/")
+    if not re.fullmatch(r"[0-9a-fA-F]{64}", digest) or not re.fullmatch(r"\d+", count):
+        raise _refuse("bad_metadata", "sha256_rows is not of the form HEX/ROWS", "write it again")
+    if int(count) != rows:
+        raise _refuse(
+            "truncated",
+            f"the file states {int(count)} rows and holds {rows}",
+            "copy the file again",
+            (min(rows, int(count)), max(rows, int(count)) - 1),
+        )
+    if hashlib.sha256(memoryview(data)[begin:]).hexdigest() != digest.lower():
+        raise _refuse(
+            "corrupt",
+            "the rows fail their checksum sha256_rows",
+            "copy the file again; never edit a recording",
+            (0, max(rows - 1, 0)),
+        )
+
+
+def _text(data: bytes, dialect: CsvDialect) -> str:
+    try:
+        return data.decode(dialect.encoding)
+    except (UnicodeDecodeError, LookupError):
+        raise _refuse(
+            "encoding", f"the header is not {dialect.encoding} text", "state its `encoding`"
+        ) from None
+
+
+def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
+    """Lines before the rows (the header and its followers last), and the rows."""
+    if dialect.names is not None:
+        lines = body.split(b"\n", dialect.skip_lines)
+        return lines[:-1], lines[-1] if len(lines) > dialect.skip_lines else b""
+    head: list[bytes] = []
+    at = 0
+    pattern = re.compile(dialect.header_match) if dialect.header_match else None
+    while at < min(len(body), MAX_HEAD_BYTES):
+        stop = body.find(b"\n", at)
+        stop = len(body) if stop < 0 else stop
+        head.append(body[at:stop])
+        at = stop + 1
+        if len(head) <= dialect.skip_lines:
+            continue
+        if pattern is None or pattern.match(_text(head[-1], dialect)):
+            break
+    else:
+        raise _refuse("no_header", "there is no header line", "name the columns in the first line")
+    for _ in range(dialect.skip_after_header):
+        stop = body.find(b"\n", at)
+        stop = len(body) if stop < 0 else stop
+        head.append(body[at:stop])
+        at = stop + 1
+    return head, body[at:]
+
+
+def _header(
+    head: Sequence[bytes], dialect: CsvDialect
+) -> tuple[list[str], tuple[tuple[str, str], ...]]:
+    """Column names and what a units row says of them."""
+    if dialect.names is not None:
+        return list(dialect.names), ()
+    at = len(head) - 1 - dialect.skip_after_header
+    names = [part.strip().strip('"') for part in _text(head[at], dialect).split(dialect.separator)]
+    if len(names) > _MAX_COLUMNS:
+        raise _refuse("limit", f"the header names {len(names)} columns", "record fewer columns")
+    units: tuple[tuple[str, str], ...] = ()
+    if dialect.units_row:
+        row = _text(head[at + 1], dialect).split(dialect.separator)
+        units = tuple(
+            (name, unit.strip().strip('"')) for name, unit in zip(names, row, strict=False) if name
+        )
+    return names, units
+
+
+def _even_out(rows: bytes, dialect: CsvDialect) -> bytes:
+    """Rows with one line break each, no blanks around fields and a point as decimal sign."""
+    rows = rows.rstrip(b"\n")
+    if not rows:
+        return rows
+    rows += b"\n"
+    mark = dialect.separator.encode()
+    blanks = (b" ",) if dialect.separator == "\t" else (b" ", b"\t")
+    for blank in blanks if dialect.separator != " " else ():
+        for edge in (mark, b"\n"):
+            while blank + edge in rows:
+                rows = rows.replace(blank + edge, edge)
+            while edge + blank in rows:
+                rows = rows.replace(edge + blank, edge)
+        rows = rows.lstrip(blank)
+    if dialect.decimal != ".":
+        rows = rows.replace(dialect.decimal.encode(), b".")
+    return rows.replace(b'"', b"")
+
+
+def _check_shape(rows: bytes, names: list[str], dialect: CsvDialect) -> list[str]:
+    """The names of the fields that every row has; a row with fewer or more is refused."""
+    raw = np.frombuffer(rows, np.uint8)
+    ends = np.flatnonzero(raw == ord("\n"))
+    marks = np.flatnonzero(raw == ord(dialect.separator))
+    per_row = np.diff(np.searchsorted(marks, ends), prepend=0)
+    expected = len(names) - 1
+    if per_row.size and dialect.fewer_columns and per_row[0] < expected:
+        expected = int(per_row[0])
+    wrong = np.flatnonzero(per_row != expected)
+    if wrong.size:
+        row = int(wrong[0])
+        raise _refuse(
+            "ragged_row",
+            f"a row has {int(per_row[row]) + 1} fields where the header names {expected + 1}",
+            "copy the file again, or check the separator",
+            (row, int(wrong[-1])),
+        )
+    names = names[: expected + 1]
+    twice = {name for name in names if name and names.count(name) > 1}
+    if twice:
+        raise _refuse(
+            "duplicate_column", f"the column {min(twice)!r} is there twice", "rename one of them"
+        )
+    return names
+
+
+def _parse(
+    rows: bytes, names: list[str], dialect: CsvDialect, wanted: Callable[[str], bool]
+) -> dict[str, Any]:
+    """Wanted columns as numbers [rows]; an empty field is NaN."""
+    import polars as pl
+
+    keep = {at: name for at, name in enumerate(names) if name and wanted(name)}
+    if not rows:
+        return {name: np.empty(0) for name in keep.values()}
+    first = rows[: rows.find(b"\n")].decode("utf-8", "replace").split(dialect.separator)
+    schema = {
+        f"c{at}": (
+            pl.String
+            if at not in keep
+            else pl.Int64
+            if _LONG_INTEGER.match(first[at])
+            else pl.Float64
+        )
+        for at in range(len(names))
+    }
+    try:
+        frame = _frame(rows, schema, dialect)
+    except pl.exceptions.PolarsError:
+        raise _locate(rows, schema, keep, dialect) from None
+    found: dict[str, Any] = {}
+    for at, name in keep.items():
+        values = frame[f"c{at}"]
+        found[name] = values.to_numpy() if values.null_count() == 0 else _with_nan(values)
+        infinite = np.flatnonzero(np.isinf(found[name]))
+        if infinite.size:
+            row = int(infinite[0])
+            raise _refuse(
+                "infinite",
+                f"the column {name!r} holds an infinite number",
+                "leave the field empty where nothing was measured",
+                (row, int(infinite[-1])),
+            )
+    return found
+
+
+def _frame(rows: bytes, schema: dict[str, Any], dialect: CsvDialect) -> Any:
+    import polars as pl
+
+    return pl.read_csv(
+        rows,
+        has_header=False,
+        schema=schema,
+        separator=dialect.separator,
+        quote_char=None,
+        null_values=list(dialect.missing) or None,
+        encoding="utf8-lossy",
+        glob=False,
+    )
+
+
+def _with_nan(values: Any) -> Any:
+    import polars as pl
+
+    return values.cast(pl.Float64).fill_null(float("nan")).to_numpy()
+
+
+def _locate(
+    rows: bytes, schema: dict[str, Any], keep: dict[int, str], dialect: CsvDialect
+) -> CaptureError:
+    """Which field was no number: read everything as text and try column by column."""
+    import polars as pl
+
+    frame = _frame(rows, dict.fromkeys(schema, pl.String), dialect)
+    for at, name in keep.items():
+        text = frame[f"c{at}"]
+        number = text.cast(schema[f"c{at}"], strict=False)
+        wrong = np.flatnonzero((number.is_null() & text.is_not_null()).to_numpy())
+        if wrong.size:
+            row = int(wrong[0])
+            return _refuse(
+                "bad_number",
+                f"the column {name!r} holds {str(text[row])[:40]!r}, which is no number",
+                "leave the field empty where nothing was measured; check the units row",
+                (row, int(wrong[-1])),
+            )
+    return _refuse("bad_number", "a field is no number", "check the rows")
+
+
+def _number_in(text: str, pattern: str | None, what: str) -> float | None:
+    if pattern is None:
+        return None
+    match = re.search(pattern, text, re.MULTILINE)
+    try:
+        return float(match[1]) if match else _missing_number(what)
+    except (ValueError, IndexError):
+        return _missing_number(what)
+
+
+def _missing_number(what: str) -> float:
+    raise _refuse(
+        "no_header",
+        f"the time {what} is not where the source map says",
+        "check `time` in the source map against the file's first lines",
+    )

@@ -1,0 +1,103 @@
+"""Which files a folder holds, and their bytes: only regular files inside the folder are opened.
+
+Files are read whole and not mapped: the hash is of exactly the bytes that are decoded, and a file
+that shrinks under a map would end the process.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.io.mcap.limits import MAX_FILE_BYTES
+from pipeline.records.errors import CaptureError, MachineError, UsageError
+from pipeline.records.finding import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Relative paths with forward slashes, sorted; and the names that cannot be used."""
+
+    paths: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+
+def list_files(folder: Path) -> Listing:
+    """All regular files below a folder; hidden ones are left out.
+
+    Raises UsageError where the folder is not there.
+    """
+    if not folder.is_dir():
+        raise UsageError(f"there is no folder {folder}", "give input= a folder of captures")
+    paths: list[str] = []
+    findings: list[Finding] = []
+    root = folder.resolve()
+    for where, folders, names in os.walk(folder, onerror=_unreadable):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        links = [name for name in folders if Path(where, name).is_symlink()]
+        for name in sorted(names) + links:
+            if name.startswith("."):
+                continue
+            path = Path(where, name)
+            relative = path.relative_to(folder).as_posix()
+            fault = _fault(path, root, relative)
+            if fault is not None:
+                findings.append(Finding.refusal(_printable(relative), fault))
+            elif name not in links:
+                paths.append(relative)
+    return Listing(tuple(sorted(paths)), tuple(sorted(findings, key=lambda f: f.file)))
+
+
+def _unreadable(fault: OSError) -> None:
+    raise MachineError(f"a folder cannot be listed: {fault}", "check its permissions") from fault
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
+    """Why a directory entry cannot be used, or None."""
+    if _printable(relative) != relative:
+        return CaptureError(
+            "file_name", "the name holds bytes that are no printable text", "rename the file"
+        )
+    try:
+        if path.is_symlink() and not path.resolve(strict=True).is_relative_to(root):
+            return CaptureError(
+                "not_a_file", "it is a link to outside the folder", "copy the file itself here"
+            )
+        mode = path.stat().st_mode
+    except (OSError, RuntimeError):
+        return CaptureError("not_a_file", "it is a link to nothing", "remove it")
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
+        return None
+    return CaptureError(
+        "not_a_file", "it is a pipe, socket or device and no file", "save the data to a file"
+    )
+
+
+def read_whole(path: Path) -> bytes:
+    """All bytes of a regular file; raises CaptureError for anything else or for too many."""
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    except OSError as fault:
+        raise _not_readable(fault) from None
+    with os.fdopen(handle, "rb") as stream:
+        status = os.fstat(stream.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise CaptureError("not_a_file", "it is no regular file", "save the data to a file")
+        if status.st_size > MAX_FILE_BYTES:
+            raise CaptureError(
+                "limit", f"the file has {status.st_size} bytes", "split the recording below 4 GiB"
+            )
+        try:
+            return stream.read(MAX_FILE_BYTES)
+        except OSError as fault:
+            raise _not_readable(fault) from None
+
+
+def _not_readable(fault: OSError) -> CaptureError:
+    return CaptureError("unreadable", f"it cannot be read: {fault.strerror}", "check the disk")

@@ -1,0 +1,208 @@
+"""ROS 2 CDR payloads decoded many messages at a time.
+
+Fields lie in schema order, each aligned to its own size counted from the end of the 4-byte
+encapsulation; only strings and sequences make positions differ from message to message.
+
+Reference: OMG DDSI-RTPS 2.5, 10 (encapsulation); OMG DDS-XTypes 1.3, 7.4 (plain CDR).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.io.mcap.leaf import Leaf, Wanted, spread
+from pipeline.io.mcap.messages import Batch
+from pipeline.io.mcap.ros2msg import Field
+from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
+from pipeline.records.errors import CaptureError
+
+_ENCAPSULATION = 4
+_PADDING = 8
+_SLICES_FROM = 32
+_MAX_ELEMENTS = 100_000
+_KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
+"""Representation identifier: byte order, and the largest alignment (CDR1 8, CDR2 4)."""
+
+
+def _bad(what: str) -> CaptureError:
+    return CaptureError(
+        "bad_message",
+        f"a CDR message {what}",
+        "record the test again, with the schema the messages were written with",
+    )
+
+
+class CdrDecoder:
+    """Decodes messages of one root type; `joint` picks one joint where the type is JointState."""
+
+    def __init__(self, layout: tuple[Field, ...]) -> None:
+        self.layout = layout
+
+    def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
+        """Numeric fields by dotted name; a string[] field gives the places of its strings."""
+        raw: Bytes = np.frombuffer(batch.buffer, np.uint8)
+        if batch.start.size == 0:
+            return {}
+        if np.any(batch.length < _ENCAPSULATION):
+            raise _bad("is shorter than its encapsulation")
+        heads = view_at_every_byte(raw, ">u2")[batch.start]
+        if np.any(heads != heads[0]) or int(heads[0]) not in _KINDS:
+            raise _bad("has an encapsulation other than plain CDR")
+        order, align = _KINDS[int(heads[0])]
+        body = _Pass(batch, raw, order, align, wanted)
+        for part in self.layout:
+            body.field(part, "", None)
+        left = body.size - body.at
+        if np.any(left < 0) or np.any(left >= _PADDING):
+            raise _bad("has another length than its schema gives")
+        return body.collected()
+
+
+class _Pass:
+    """One decoding of one batch. `at` is each message's position after the encapsulation.
+
+    It stays one number while every field so far had a fixed size.
+    """
+
+    def __init__(self, batch: Batch, raw: Bytes, order: str, align: int, wanted: Wanted) -> None:
+        self.buffer = batch.buffer
+        self.raw = raw
+        self.order = order
+        self.align_most = align
+        self.wanted = wanted
+        self.origin = batch.start + _ENCAPSULATION
+        self.size = batch.length - _ENCAPSULATION
+        self.at: Any = 0
+        self.scalars: dict[str, NDArray[Any]] = {}
+        self.arrays: dict[str, list[tuple[Integers, NDArray[Any]]]] = {}
+
+    def collected(self) -> dict[str, Leaf]:
+        """The leaves, pieces of arrays put in message order."""
+        found = {name: Leaf(values) for name, values in self.scalars.items()}
+        for name, pieces in self.arrays.items():
+            owner = np.concatenate([piece[0] for piece in pieces])
+            values = np.concatenate([piece[1] for piece in pieces])
+            if np.any(owner[1:] < owner[:-1]):
+                order = np.argsort(owner, kind="stable")
+                owner, values = owner[order], values[order]
+            counts = np.bincount(owner, minlength=self.origin.size).astype(np.int64)
+            found[name] = Leaf(values, counts)
+        return found
+
+    def field(self, part: Field, prefix: str, rows: Integers | None) -> None:
+        """Take one field of the messages `rows` (None: all) and move their positions past it."""
+        if part.array is None:
+            self.single(part, prefix, rows)
+        elif part.dtype is None or part.dtype == "string":
+            self.elements(part, prefix, rows)
+        else:
+            self.numbers(part, prefix, rows)
+
+    def single(self, part: Field, prefix: str, rows: Integers | None) -> None:
+        if part.dtype is None:
+            for inner in part.parts:
+                self.field(inner, f"{prefix}{part.name}.", rows)
+        elif part.dtype == "string":
+            length = self.count(rows)
+            start = self.places(rows)
+            self.move(length, rows)
+            if self.wanted(prefix + part.name):
+                text = np.stack([start, length], axis=-1)
+                self.keep(prefix + part.name, text, rows)
+        else:
+            self.align(np.dtype(part.dtype).itemsize, rows)
+            start = self.places(rows)
+            self.move(np.dtype(part.dtype).itemsize, rows)
+            if self.wanted(prefix + part.name):
+                values = view_at_every_byte(self.raw, self.order + part.dtype)[start]
+                self.keep(prefix + part.name, values, rows)
+
+    def keep(self, name: str, values: NDArray[Any], rows: Integers | None) -> None:
+        if rows is None:
+            self.scalars[name] = values
+        else:
+            self.arrays.setdefault(name, []).append((rows, values))
+
+    def numbers(self, part: Field, prefix: str, rows: Integers | None) -> None:
+        """An array of numbers."""
+        if rows is not None and self.wanted(prefix + part.name):
+            raise _bad(f"has the array {prefix + part.name!r} inside an array")
+        whose = np.arange(self.origin.size) if rows is None else rows
+        width = np.dtype(str(part.dtype)).itemsize
+        count = self.count(rows) if part.array == 0 else np.full(whose.size, part.array, np.int64)
+        if np.any(count > self.size[whose] // width + 1):
+            raise _bad("has an array that is longer than the message")
+        self.align(width, rows, count > 0)
+        start = self.places(rows)
+        self.move(count * width, rows)
+        if not self.wanted(prefix + part.name):
+            return
+        dtype = self.order + str(part.dtype)
+        if count.sum() >= _SLICES_FROM * max(count.size, 1):
+            values = np.concatenate(
+                [
+                    np.frombuffer(self.buffer, dtype, n, begin)
+                    for n, begin in zip(count.tolist(), start.tolist(), strict=True)
+                    if n
+                ]
+            )
+        else:
+            values = view_at_every_byte(self.raw, dtype)[spread(start, count, width)]
+        self.arrays.setdefault(prefix + part.name, []).append((np.repeat(whose, count), values))
+
+    def elements(self, part: Field, prefix: str, rows: Integers | None) -> None:
+        """An array of messages or strings, element by element over all messages at once."""
+        whose = np.arange(self.origin.size) if rows is None else rows
+        if rows is not None and any(map(self.wanted, part.names(prefix))):
+            raise _bad(f"has the array {prefix + part.name!r} inside an array")
+        count = self.count(rows) if part.array == 0 else np.full(whose.size, part.array, np.int64)
+        if np.any(count > np.minimum(self.size[whose] + 1, _MAX_ELEMENTS)):
+            raise _bad("has an array that is longer than the message")
+        self.at = np.broadcast_to(self.at, self.origin.shape).copy()
+        element = Field(part.name, part.dtype, part.parts, None)
+        for name in part.names(prefix) if self.wanted(prefix + part.name) else ():
+            self.arrays.setdefault(name, [])
+        for number in range(int(count.max(initial=0))):
+            self.single(element, prefix, whose[count > number])
+
+    def places(self, rows: Integers | None) -> Integers:
+        """Byte positions in the buffer of the messages `rows`."""
+        if rows is None:
+            start: Integers = self.origin + self.at
+            return start
+        places: Integers = self.origin[rows] + self.at[rows]
+        return places
+
+    def align(self, width: int, rows: Integers | None, only: Any = True) -> None:
+        to = min(width, self.align_most)
+        if rows is None:
+            if only is True or bool(np.all(only)):
+                self.at = -(-self.at // to) * to
+            else:
+                self.at = np.where(only, -(-self.at // to) * to, self.at)
+        else:
+            here = self.at[rows]
+            self.at[rows] = np.where(only, -(-here // to) * to, here)
+
+    def move(self, by: Any, rows: Integers | None) -> None:
+        """Move past `by` bytes; past the end of a message is a CaptureError."""
+        if rows is None:
+            same = np.ndim(by) == 1 and by.size and bool(np.all(by == by[0]))
+            self.at = self.at + (int(by[0]) if same else by)
+            over = np.any(self.at > self.size)
+        else:
+            self.at[rows] += by
+            over = np.any(self.at[rows] > self.size[rows])
+        if over:
+            raise _bad("ends inside a field")
+
+    def count(self, rows: Integers | None) -> Integers:
+        """The 32-bit length before a string or sequence."""
+        self.align(4, rows)
+        start = self.places(rows)
+        self.move(4, rows)
+        counts: Integers = view_at_every_byte(self.raw, self.order + "u4")[start].astype(np.int64)
+        return counts

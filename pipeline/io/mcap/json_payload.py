@@ -1,0 +1,205 @@
+"""JSON payloads: polars parses a whole batch at once, and only if that is proved to be exact.
+
+The first message is the template. The batch went through the template's schema without loss if
+polars took every line, all quotes are those of the template's keys and texts, and every null was
+written as one. Anything else (keys that come and go, NaN, nested lists) takes the careful way.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import Any
+
+import numpy as np
+
+from pipeline.io.mcap.leaf import Leaf, Wanted
+from pipeline.io.mcap.limits import MAX_DEPTH, MAX_FIELDS, MAX_JSON_BYTES
+from pipeline.io.mcap.messages import Batch
+from pipeline.records.errors import CaptureError
+
+_EXACT_INTEGER = 2**53
+_BREAKS = bytes.maketrans(b"\r\n", b"  ")
+
+
+def _bad(what: str, row: int | None = None) -> CaptureError:
+    rows = None if row is None else (row, row)
+    return CaptureError(
+        "bad_message", f"a JSON message {what}", "write each message as one JSON object", rows
+    )
+
+
+class JsonDecoder:
+    """Decodes messages that are JSON objects of numbers or arrays of numbers."""
+
+    def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
+        """Numeric fields by dotted name; null and absent are NaN."""
+        if batch.start.size == 0:
+            return {}
+        if int(batch.length.max()) > MAX_JSON_BYTES:
+            raise CaptureError(
+                "limit", "a JSON message is larger than 16 MiB", "write shorter blocks"
+            )
+        buffer = batch.buffer
+        payloads = [
+            buffer[at : at + n]
+            for at, n in zip(batch.start.tolist(), batch.length.tolist(), strict=True)
+        ]
+        template = _object(payloads[0], 0)
+        fast = _all_at_once(payloads, template, wanted)
+        return _one_by_one(payloads, wanted) if fast is None else fast
+
+
+def _object(payload: bytes, row: int) -> dict[str, Any]:
+    try:
+        found = json.loads(payload, object_pairs_hook=_unique)
+    except RecursionError:
+        raise _bad("nests too deep", row) from None
+    except ValueError as fault:
+        raise _bad(f"cannot be read: {fault}"[:160], row) from None
+    if not isinstance(found, dict):
+        raise _bad("is no object", row)
+    return found
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        raise ValueError("a key appears twice")
+    return found
+
+
+def _all_at_once(
+    payloads: list[bytes], template: dict[str, Any], wanted: Wanted
+) -> dict[str, Leaf] | None:
+    """The leaves by one pass of polars, or None where that would not be provably exact."""
+    import polars as pl
+
+    quotes = _quotes(template)
+    joined = b"\n".join(payloads)
+    if joined.count(b"\n") != len(payloads) - 1:
+        joined = b"\n".join([payload.translate(_BREAKS) for payload in payloads])
+    if quotes is None or joined.count(b'"') != quotes * len(payloads):
+        return None
+    schema = {name: _dtype(value) for name, value in template.items()}
+    if any(dtype is None for dtype in schema.values()):
+        return None
+    try:
+        table = pl.read_ndjson(io.BytesIO(joined), schema=schema)
+    except pl.exceptions.PolarsError:
+        return None
+    if table.height != len(payloads):
+        return None
+    found: dict[str, Leaf] = {}
+    nulls = 0
+    for series in table.get_columns():
+        nulls += _collect(series, series.name, wanted, found)
+    return found if nulls == joined.count(b"null") else None
+
+
+def _quotes(value: Any) -> int | None:
+    """Quotation marks that a value of this shape is written with."""
+    if isinstance(value, str):
+        return 2 if '"' not in json.dumps(value, ensure_ascii=False)[1:-1] else None
+    if isinstance(value, list):
+        return None if any(isinstance(item, (str, dict, list)) for item in value) else 0
+    if not isinstance(value, dict):
+        return 0
+    parts = [_quotes(part) for part in value.values()]
+    if None in parts or any('"' in key for key in value):
+        return None
+    return 2 * len(parts) + sum(part or 0 for part in parts)
+
+
+def _dtype(value: Any) -> Any:
+    """The polars type for a template value, or None where there is no exact one."""
+    import polars as pl
+
+    if isinstance(value, bool):
+        return pl.Boolean
+    if isinstance(value, int):
+        return pl.Int64 if abs(value) > _EXACT_INTEGER else pl.Float64
+    if value is None or isinstance(value, float):
+        return pl.Float64
+    if isinstance(value, str):
+        return pl.String
+    if isinstance(value, list):
+        large = any(isinstance(n, int) and abs(n) > _EXACT_INTEGER for n in value)
+        return pl.List(pl.Int64 if large else pl.Float64)
+    parts = {key: _dtype(part) for key, part in value.items()}
+    return None if not parts or None in parts.values() else pl.Struct(parts)
+
+
+def _collect(series: Any, name: str, wanted: Wanted, found: dict[str, Leaf]) -> int:
+    """Add the leaves of a column, and return how many nulls it holds."""
+    import polars as pl
+
+    nulls = int(series.null_count())
+    if isinstance(series.dtype, pl.Struct):
+        parts = (_collect(part, f"{name}.{part.name}", wanted, found) for part in series.struct)
+        return sum(parts)
+    counts = None
+    if isinstance(series.dtype, pl.List):
+        counts = series.list.len().fill_null(0).to_numpy().astype(np.int64)
+        series = series.explode(empty_as_null=False, keep_nulls=False)
+        nulls += int(series.null_count())
+    if series.dtype in (pl.Float64, pl.Int64) and wanted(name):
+        values = series.to_numpy()
+        found[name] = Leaf(values, counts)
+    return nulls
+
+
+def _one_by_one(payloads: list[bytes], wanted: Wanted) -> dict[str, Leaf]:
+    """The leaves by reading each message on its own."""
+    rows: list[dict[str, Any]] = []
+    for row, payload in enumerate(payloads):
+        flat: dict[str, Any] = {}
+        _flatten(_object(payload, row), "", flat, row, 0)
+        rows.append(flat)
+    names = list(dict.fromkeys(name for flat in rows for name in flat if wanted(name)))
+    if len(names) > MAX_FIELDS:
+        raise _bad(f"stream has more than {MAX_FIELDS} fields")
+    return {name: _leaf(name, [flat.get(name) for flat in rows]) for name in names}
+
+
+def _flatten(
+    value: dict[str, Any], prefix: str, flat: dict[str, Any], row: int, depth: int
+) -> None:
+    if depth > MAX_DEPTH:
+        raise _bad("nests too deep", row)
+    for key, part in value.items():
+        name = prefix + key
+        if isinstance(part, dict):
+            _flatten(part, f"{name}.", flat, row, depth + 1)
+        elif isinstance(part, list) and part and all(isinstance(item, dict) for item in part):
+            for item in part:
+                inner: dict[str, Any] = {}
+                _flatten(item, f"{name}.", inner, row, depth + 1)
+                for leaf, number in inner.items():
+                    flat.setdefault(leaf, []).append(number)
+        elif part is None or isinstance(part, (int, float, list)):
+            flat[name] = part
+
+
+def _leaf(name: str, values: list[Any]) -> Leaf:
+    if any(isinstance(value, list) for value in values):
+        lists = [[] if value is None else value for value in values]
+        if not all(isinstance(value, list) for value in lists):
+            raise _bad(f"has {name!r} as a number and as an array")
+        counts = np.array([len(value) for value in lists], np.int64)
+        return Leaf(_numbers(name, [n for value in lists for n in value]), counts)
+    return Leaf(_numbers(name, values))
+
+
+def _numbers(name: str, values: list[Any]) -> Any:
+    try:
+        if all(type(value) is int for value in values) and values:
+            whole = np.array(values, np.int64)
+            return whole if np.abs(whole).max() > _EXACT_INTEGER else whole.astype(np.float64)
+        numbers = np.array([np.nan if v is None else float(v) for v in values], np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise _bad(f"has something other than numbers in {name!r}") from None
+    infinite = np.flatnonzero(np.isinf(numbers))
+    if infinite.size:
+        raise _bad(f"has an infinite number in {name!r}")
+    return numbers

@@ -1,0 +1,40 @@
+"""What a decoder hands out: one field of many messages, still with the field's own name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.io.mcap.messages import Batch
+from pipeline.io.mcap.walk import Integers
+
+Wanted = Callable[[str], bool]
+"""Whether a field, by its dotted name, is worth decoding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """Values of one field in message order; `counts` [messages] for arrays, None for scalars."""
+
+    values: NDArray[Any]
+    counts: Integers | None = None
+
+
+class Decoder(Protocol):
+    """Decodes the payloads of one channel; raises CaptureError for payloads that do not fit."""
+
+    def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
+        """Numeric fields by dotted name."""
+        ...
+
+
+def spread(start: Integers, count: Integers, width: int) -> Integers:
+    """Byte positions of `count[i]` consecutive items of `width` bytes from `start[i]`."""
+    total = int(count.sum())
+    first = np.repeat(start - width * (np.cumsum(count) - count), count)
+    positions: Integers = first + width * np.arange(total, dtype=np.int64)
+    return positions

@@ -1,0 +1,216 @@
+"""Messages out of chunks: unpacked within limits, checksummed, and checked against their index."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.io.mcap import records as rec
+from pipeline.io.mcap.container import Definitions, Layout, check_definitions
+from pipeline.io.mcap.unpack import unpack
+from pipeline.io.mcap.walk import HEAD_BYTES, Integers, view_at_every_byte, walk
+from pipeline.io.mcap.wire import Fields, corrupt
+
+_BATCH_BYTES = 8 * 2**20
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Messages [n] in one buffer: payload start and length, channel, log time [ns]."""
+
+    buffer: bytes
+    start: Integers
+    length: Integers
+    channel: NDArray[np.uint16]
+    log_time: NDArray[np.uint64]
+
+    def of(self, channels: list[int]) -> Batch:
+        """The messages of some channels, in file order."""
+        keep = np.isin(self.channel, channels)
+        if keep.all():
+            return self
+        return Batch(
+            self.buffer,
+            self.start[keep],
+            self.length[keep],
+            self.channel[keep],
+            self.log_time[keep],
+        )
+
+
+def batches(layout: Layout) -> Iterator[Batch]:
+    """All messages in batches of several chunks; complete iteration also proves the statistics."""
+    ledger = _Ledger(layout.definitions)
+    for batch in _all(layout):
+        ledger.add(batch)
+        yield batch
+    ledger.close(layout)
+
+
+def _all(layout: Layout) -> Iterator[Batch]:
+    if layout.loose_start.size:
+        yield _batch(layout.data, layout.loose_start, layout.loose_length)
+    pending: list[bytes] = []
+    spans: list[tuple[Integers, Integers]] = []
+    held = 0
+    first = int(layout.loose_start.size)
+    for chunk in layout.chunks:
+        buffer = unpack(layout.data, chunk, first)
+        start, length = _in_chunk(layout, chunk, buffer)
+        first += start.size
+        pending.append(buffer)
+        spans.append((start + held, length))
+        held += len(buffer)
+        if held >= _BATCH_BYTES:
+            yield _join(pending, spans)
+            pending, spans, held = [], [], 0
+    if pending:
+        yield _join(pending, spans)
+
+
+def _join(pending: list[bytes], spans: list[tuple[Integers, Integers]]) -> Batch:
+    buffer = pending[0] if len(pending) == 1 else b"".join(pending)
+    start = np.concatenate([span[0] for span in spans])
+    length = np.concatenate([span[1] for span in spans])
+    return _batch(buffer, start, length)
+
+
+def _batch(buffer: bytes, start: Integers, length: Integers) -> Batch:
+    head = rec.MESSAGE_HEAD_BYTES
+    if start.size == 0:
+        nothing = np.empty(0, np.uint64)
+        return Batch(buffer, start, length, nothing.astype(np.uint16), nothing)
+    channel = view_at_every_byte(buffer, "<u2")[start].astype(np.uint16)
+    log_time = view_at_every_byte(buffer, "<u8")[start + 6].astype(np.uint64)
+    return Batch(buffer, start + head, length - head, channel, log_time)
+
+
+def _in_chunk(layout: Layout, chunk: rec.Chunk, buffer: bytes) -> tuple[Integers, Integers]:
+    """Body start and length [n] of the chunk's messages, in order of their place."""
+    indexes = layout.message_indexes[chunk.offset]
+    if not indexes:
+        start, length = _walked(layout.definitions, buffer, 0, len(buffer), allow_messages=True)
+    else:
+        start, length = _indexed(layout, chunk, buffer, indexes)
+    if np.any(length < rec.MESSAGE_HEAD_BYTES):
+        raise corrupt(f"a message in the chunk at byte {chunk.offset} is shorter than its own head")
+    if start.size:
+        times = view_at_every_byte(buffer, "<u8")[start + 6]
+        if times.min() < chunk.start_time or times.max() > chunk.end_time:
+            raise corrupt(f"the chunk at byte {chunk.offset} holds messages outside its own times")
+    return start, length
+
+
+def _walked(
+    definitions: Definitions, buffer: bytes, begin: int, end: int, *, allow_messages: bool
+) -> tuple[Integers, Integers]:
+    """Step over the records of [begin, end), learn the definitions, return the messages."""
+    spans = walk(buffer, begin, end)
+    if spans.fault is not None:
+        raise corrupt(f"inside a chunk {spans.fault.message}")
+    messages = spans.opcode == rec.MESSAGE
+    if messages.any() and not allow_messages:
+        raise corrupt("a chunk holds a message that its index leaves out")
+    for number in np.flatnonzero(~messages):
+        opcode, start = int(spans.opcode[number]), int(spans.start[number])
+        if opcode in (rec.SCHEMA, rec.CHANNEL):
+            stop = start + int(spans.length[number])
+            definitions.add(opcode, Fields(buffer, start, stop, "a chunk"))
+        elif opcode < rec.FIRST_PRIVATE:
+            raise corrupt(f"a record of opcode {opcode} does not belong in a chunk")
+    return spans.start[messages], spans.length[messages]
+
+
+def _indexed(
+    layout: Layout, chunk: rec.Chunk, buffer: bytes, indexes: list[rec.MessageIndex]
+) -> tuple[Integers, Integers]:
+    """The messages as the index places them, proved: right channel and time, none left out."""
+    entries = [
+        np.frombuffer(layout.data, "<u8", 2 * index.count, index.begin).reshape(-1, 2)
+        for index in indexes
+    ]
+    channel = np.repeat([index.channel_id for index in indexes], [len(e) for e in entries])
+    table = np.concatenate(entries)
+    where = f"the message index of the chunk at byte {chunk.offset}"
+    if np.any(table[:, 1] > max(len(buffer) - HEAD_BYTES - rec.MESSAGE_HEAD_BYTES, 0)):
+        raise corrupt(f"{where} points outside the chunk")
+    order = np.argsort(table[:, 1], kind="stable")
+    offset = table[order, 1].astype(np.int64)
+    if offset.size == 0:
+        return _walked(layout.definitions, buffer, 0, len(buffer), allow_messages=False)
+    words = view_at_every_byte(buffer, "<u8")
+    size = words[offset + 1]
+    if np.any(size > len(buffer)):
+        raise corrupt(f"{where} points to no message")
+    length = size.astype(np.int64)
+    stop = offset + HEAD_BYTES + length
+    begin = np.append(offset, len(buffer))
+    if np.any(stop > begin[1:]):
+        raise corrupt(f"{where} points to messages that overlap")
+    raw = np.frombuffer(buffer, np.uint8)
+    halves = view_at_every_byte(buffer, "<u2")
+    if (
+        np.any(raw[offset] != rec.MESSAGE)
+        or np.any(halves[offset + HEAD_BYTES] != channel[order])
+        or np.any(words[offset + HEAD_BYTES + 6] != table[order, 0])
+    ):
+        raise corrupt(f"{where} contradicts the messages")
+    _walked(layout.definitions, buffer, 0, int(offset[0]), allow_messages=False)
+    for gap in np.flatnonzero(stop != begin[1:]):
+        _walked(
+            layout.definitions, buffer, int(stop[gap]), int(begin[gap + 1]), allow_messages=False
+        )
+    return offset + HEAD_BYTES, length
+
+
+class _Ledger:
+    """Counts what is handed out and holds it against definitions and statistics."""
+
+    def __init__(self, definitions: Definitions) -> None:
+        self.definitions = definitions
+        self.counts: dict[int, int] = {}
+        self.first: int | None = None
+        self.last: int | None = None
+
+    def add(self, batch: Batch) -> None:
+        """Count one batch; a message of an undefined channel is corrupt."""
+        if batch.start.size == 0:
+            return
+        channels, counts = np.unique(batch.channel, return_counts=True)
+        for channel, count in zip(channels.tolist(), counts.tolist(), strict=True):
+            self.definitions.channel(channel)
+            self.counts[channel] = self.counts.get(channel, 0) + count
+        low, high = int(batch.log_time.min()), int(batch.log_time.max())
+        self.first = low if self.first is None else min(self.first, low)
+        self.last = high if self.last is None else max(self.last, high)
+
+    def close(self, layout: Layout) -> None:
+        """Hold the summary's definitions and statistics against what was handed out."""
+        check_definitions(layout)
+        stated = layout.statistics
+        if stated is None:
+            return
+        counted = rec.Statistics(
+            sum(self.counts.values()),
+            len(self.definitions.schemas),
+            len(self.definitions.channels),
+            len(layout.attachments),
+            len(layout.metadata),
+            len(layout.chunks),
+            self.first or 0,
+            self.last or 0,
+            tuple(sorted(self.counts.items())),
+        )
+        nonzero = tuple((channel, count) for channel, count in stated.per_channel if count)
+        if (stated.messages, nonzero) != (counted.messages, counted.per_channel):
+            raise corrupt(
+                f"the statistics name {stated.messages} messages, the file holds {counted.messages}"
+            )
+        for name in ("schemas", "channels", "attachments", "metadata", "chunks"):
+            if getattr(stated, name) != getattr(counted, name):
+                raise corrupt(f"the statistics contradict the file on its {name}")
+        if (stated.start_time, stated.end_time) != (counted.start_time, counted.end_time):
+            raise corrupt("the statistics contradict the file on its first or last time")

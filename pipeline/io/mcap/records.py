@@ -1,0 +1,233 @@
+"""The records of an MCAP file as frozen nouns, each parsed with every length checked."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+from pipeline.io.mcap.limits import (
+    MAX_CHUNK_BYTES,
+    MAX_RATIO,
+    MAX_RATIO_FLOOR_BYTES,
+    MAX_SCHEMA_BYTES,
+)
+from pipeline.io.mcap.wire import Fields, corrupt, too_large
+
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
+ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX = range(9, 14)
+SUMMARY_OFFSET, DATA_END = 14, 15
+FIRST_PRIVATE = 0x80
+MESSAGE_HEAD_BYTES = 22
+"""Channel (2), sequence (4), log time (8) and publish time (8) before a message's payload."""
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """How the messages of a channel are laid out."""
+
+    id: int
+    name: str
+    encoding: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A stream of messages of one encoding; schema 0 means none."""
+
+    id: int
+    schema_id: int
+    topic: str
+    message_encoding: str
+    metadata: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A packed run of records: where it lies and what it claims."""
+
+    offset: int
+    length: int
+    start_time: int
+    end_time: int
+    size: int
+    crc: int
+    compression: str
+    begin: int
+    end: int
+
+    @property
+    def packed(self) -> int:
+        """Packed bytes."""
+        return self.end - self.begin
+
+
+@dataclass(frozen=True, slots=True)
+class MessageIndex:
+    """Where a channel's messages lie in the chunk before: bytes [begin, end) of the file."""
+
+    offset: int
+    length: int
+    channel_id: int
+    begin: int
+    end: int
+
+    @property
+    def count(self) -> int:
+        """How many messages it lists."""
+        return (self.end - self.begin) // 16
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkIndex:
+    """The summary's claim on one chunk."""
+
+    start_time: int
+    end_time: int
+    offset: int
+    length: int
+    message_indexes: tuple[tuple[int, int], ...]
+    message_index_length: int
+    compression: str
+    packed: int
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """An attachment or metadata record: where it lies and what its index must say."""
+
+    offset: int
+    length: int
+    facts: tuple[object, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Metadata:
+    """A named map of text."""
+
+    name: str
+    entries: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """The summary's claim on how much there is."""
+
+    messages: int
+    schemas: int
+    channels: int
+    attachments: int
+    metadata: int
+    chunks: int
+    start_time: int
+    end_time: int
+    per_channel: tuple[tuple[int, int], ...]
+
+
+def schema(fields: Fields) -> Schema:
+    """Parse a Schema record; id 0 is not allowed."""
+    found = Schema(fields.u16(), fields.text(), fields.text(), fields.blob())
+    if found.id == 0:
+        raise corrupt("a schema has the id 0")
+    if len(found.data) > MAX_SCHEMA_BYTES:
+        raise too_large(f"the schema {found.name!r} has {len(found.data)} bytes")
+    return found
+
+
+def channel(fields: Fields) -> Channel:
+    """Parse a Channel record."""
+    number, schema_id = fields.u16(), fields.u16()
+    topic, encoding = fields.text(), fields.text()
+    return Channel(number, schema_id, topic, encoding, tuple(sorted(fields.text_map().items())))
+
+
+def chunk(fields: Fields, offset: int, length: int) -> Chunk:
+    """Parse a Chunk's head; its claims are checked against the limits before anyone unpacks it."""
+    start_time, end_time, size, crc = fields.u64(), fields.u64(), fields.u64(), fields.u32()
+    compression = fields.text()
+    begin, end = fields.span(fields.u64())
+    if size > MAX_CHUNK_BYTES:
+        raise too_large(f"the chunk at byte {offset} claims to unpack to {size} bytes")
+    if size > MAX_RATIO_FLOOR_BYTES and size > MAX_RATIO * max(end - begin, 1):
+        raise too_large(
+            f"the chunk at byte {offset} claims to unpack {end - begin} bytes to {size}"
+        )
+    if start_time > end_time:
+        raise corrupt(f"the chunk at byte {offset} ends before it starts")
+    return Chunk(offset, length, start_time, end_time, size, crc, compression, begin, end)
+
+
+def message_index(fields: Fields, offset: int, length: int) -> MessageIndex:
+    """Parse a MessageIndex's head; its entries stay where they are."""
+    channel_id = fields.u16()
+    begin, end = fields.span(fields.u32())
+    if (end - begin) % 16:
+        raise corrupt(f"the message index at byte {offset} holds a partial entry")
+    return MessageIndex(offset, length, channel_id, begin, end)
+
+
+def chunk_index(fields: Fields) -> ChunkIndex:
+    """Parse a ChunkIndex record."""
+    start_time, end_time, offset, length = (fields.u64() for _ in range(4))
+    places = tuple(sorted(fields.counts()))
+    index_length, compression = fields.u64(), fields.text()
+    return ChunkIndex(
+        start_time,
+        end_time,
+        offset,
+        length,
+        places,
+        index_length,
+        compression,
+        fields.u64(),
+        fields.u64(),
+    )
+
+
+def attachment(fields: Fields, offset: int, length: int) -> Located:
+    """Check an Attachment's CRC and keep what its index must repeat."""
+    begin = fields.position
+    log_time, create_time, name, media = fields.u64(), fields.u64(), fields.text(), fields.text()
+    size = fields.u64()
+    fields.span(size)
+    covered = fields.position
+    crc = fields.u32()
+    if crc and crc != zlib.crc32(memoryview(fields.data)[begin:covered]):
+        raise corrupt(f"the attachment {name!r} at byte {offset} fails its checksum")
+    return Located(offset, length, (log_time, create_time, size, name, media))
+
+
+def attachment_index(fields: Fields) -> Located:
+    """Parse an AttachmentIndex record."""
+    offset, length, log_time, create_time, size = (fields.u64() for _ in range(5))
+    return Located(offset, length, (log_time, create_time, size, fields.text(), fields.text()))
+
+
+def metadata(fields: Fields) -> Metadata:
+    """Parse a Metadata record."""
+    return Metadata(fields.text(), tuple(fields.text_map().items()))
+
+
+def metadata_index(fields: Fields) -> Located:
+    """Parse a MetadataIndex record."""
+    return Located(fields.u64(), fields.u64(), (fields.text(),))
+
+
+def statistics(fields: Fields) -> Statistics:
+    """Parse a Statistics record."""
+    messages, schemas = fields.u64(), fields.u16()
+    channels, attachments, metadata_count, chunks = (fields.u32() for _ in range(4))
+    start_time, end_time = fields.u64(), fields.u64()
+    per_channel = tuple(sorted(fields.counts()))
+    return Statistics(
+        messages,
+        schemas,
+        channels,
+        attachments,
+        metadata_count,
+        chunks,
+        start_time,
+        end_time,
+        per_channel,
+    )

@@ -1,0 +1,67 @@
+"""One chunk unpacked: never more bytes than it declares, and its checksum held against them."""
+
+from __future__ import annotations
+
+import zlib
+
+from pipeline.io.mcap.records import Chunk
+from pipeline.io.mcap.wire import corrupt
+from pipeline.records.errors import CaptureError
+
+_ZSTD_MAX_WINDOW_BYTES = 128 * 2**20
+
+
+def unpack(data: bytes, chunk: Chunk, first_message: int = 0) -> bytes:
+    """The records of a chunk [bytes], exactly as many as declared; raises CaptureError."""
+    packed = memoryview(data)[chunk.begin : chunk.end]
+    if chunk.compression == "":
+        plain = bytes(packed)
+    elif chunk.compression == "zstd":
+        plain = _unzstd(packed, chunk)
+    elif chunk.compression == "lz4":
+        plain = _unlz4(packed, chunk)
+    else:
+        raise CaptureError(
+            "unsupported",
+            f"a chunk is packed with {chunk.compression!r}",
+            "record with lz4, zstd or no compression",
+        )
+    if len(plain) != chunk.size:
+        raise corrupt(f"{_where(chunk)} unpacks to another size than declared")
+    if chunk.crc and zlib.crc32(plain) != chunk.crc:
+        raise corrupt(f"{_where(chunk)} fails its checksum", (first_message, first_message))
+    return plain
+
+
+def _where(chunk: Chunk) -> str:
+    return f"the chunk at byte {chunk.offset}"
+
+
+def _unzstd(packed: memoryview, chunk: Chunk) -> bytes:
+    import zstandard
+
+    try:
+        frame = zstandard.get_frame_parameters(packed)
+        if frame.content_size == chunk.size and frame.window_size <= _ZSTD_MAX_WINDOW_BYTES:
+            plain: bytes = zstandard.ZstdDecompressor().decompress(packed, allow_extra_data=False)
+            return plain
+        reader = zstandard.ZstdDecompressor(max_window_size=_ZSTD_MAX_WINDOW_BYTES).stream_reader(
+            packed, read_across_frames=True
+        )
+        plain = reader.read(chunk.size + 1)
+    except (zstandard.ZstdError, MemoryError) as fault:
+        raise corrupt(f"{_where(chunk)} does not unpack: {fault}") from None
+    return plain
+
+
+def _unlz4(packed: memoryview, chunk: Chunk) -> bytes:
+    import lz4.frame
+
+    unpacker = lz4.frame.LZ4FrameDecompressor()
+    try:
+        plain: bytes = unpacker.decompress(packed, max_length=chunk.size + 1)
+    except (RuntimeError, EOFError, MemoryError) as fault:
+        raise corrupt(f"{_where(chunk)} does not unpack: {fault}") from None
+    if not unpacker.eof or unpacker.unused_data:
+        raise corrupt(f"{_where(chunk)} unpacks to another size than declared")
+    return plain

@@ -1,0 +1,165 @@
+"""What is said of a capture: in the file, beside it, in the manifest, in the source map."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+from pipeline.io.plain_yaml import load_plain
+from pipeline.physics.glossary import METADATA, TESTS
+from pipeline.records.capture import CaptureMeta
+from pipeline.records.errors import CaptureError
+from pipeline.records.finding import Finding
+
+MANIFEST = "manifest.csv"
+SIDECAR_SUFFIX = ".meta.yaml"
+CONTRACT_VERSION = "1"
+_MAX_MANIFEST_BYTES = 2**22
+_CHOICES = {
+    "winding": ("wye", "delta"),
+    "pair": ("ab", "bc", "ca"),
+    "voltage_kind": ("measured", "commanded"),
+    "voltage_timing": ("instant", "held", "centred"),
+}
+
+
+def merge(
+    path: str, sources: Sequence[tuple[str, Mapping[str, str]]]
+) -> tuple[dict[str, str], list[Finding]]:
+    """The statements of all sources, the first one winning; contradictions become warnings.
+
+    `sources` are pairs of a name for messages and key-value texts, the strongest first.
+    """
+    merged: dict[str, str] = {}
+    origin: dict[str, str] = {}
+    findings: list[Finding] = []
+    for name, values in sources:
+        for key, value in values.items():
+            if key not in merged:
+                merged[key], origin[key] = value, name
+            elif not _same(merged[key], value):
+                findings.append(
+                    Finding(
+                        path,
+                        "warning",
+                        "metadata_contradiction",
+                        f"{name} says {key} is {value!r}, {origin[key]} says {merged[key]!r}, "
+                        f"which counts",
+                        "correct one of the two",
+                    )
+                )
+    return merged, findings
+
+
+def _same(one: str, other: str) -> bool:
+    if one.strip() == other.strip():
+        return True
+    try:
+        return float(one) == float(other)
+    except ValueError:
+        return False
+
+
+def sidecar(data: bytes) -> dict[str, str]:
+    """The keys of a NAME.meta.yaml, every value as the text that was written."""
+    found = load_plain(data, "the sidecar")
+    if not isinstance(found, dict):
+        raise CaptureError("bad_metadata", "the sidecar is no list of keys", "write `key: value`")
+    nested = [key for key, value in found.items() if not isinstance(value, str)]
+    if nested:
+        raise CaptureError(
+            "bad_metadata", f"the sidecar's {nested[0]!r} is no single value", "write `key: value`"
+        )
+    return found
+
+
+def manifest(data: bytes, folder: str) -> dict[str, dict[str, str]]:
+    """What a manifest.csv says of each file [path relative to the input folder].
+
+    Raises CaptureError where it is no table with `file` as its first column.
+    """
+    if len(data) > _MAX_MANIFEST_BYTES:
+        raise _bad_manifest("is larger than 4 MiB")
+    try:
+        text = data.decode("utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    except (UnicodeDecodeError, csv.Error) as fault:
+        raise _bad_manifest(f"cannot be read: {fault}") from None
+    rows = [row for row in rows if any(cell.strip() for cell in row)]
+    if not rows or rows[0][0].strip() != "file":
+        raise _bad_manifest("does not have `file` as its first column")
+    keys = [key.strip() for key in rows[0]]
+    if len(set(keys)) != len(keys):
+        raise _bad_manifest("has a column twice")
+    found: dict[str, dict[str, str]] = {}
+    for number, row in enumerate(rows[1:]):
+        if len(row) != len(keys):
+            raise _bad_manifest(f"has {len(row)} fields in row {number}", (number, number))
+        path = (PurePosixPath(folder) / row[0].strip()).as_posix()
+        if path in found:
+            raise _bad_manifest(f"names {row[0]!r} twice", (number, number))
+        cells = zip(keys[1:], row[1:], strict=True)
+        found[path] = {key: cell.strip() for key, cell in cells if cell.strip()}
+    return found
+
+
+def _bad_manifest(what: str, rows: tuple[int, int] | None = None) -> CaptureError:
+    return CaptureError(
+        "bad_manifest", f"the manifest {what}", "write a table with a column `file`", rows
+    )
+
+
+def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
+    """The metadata record; raises CaptureError for what is missing, unknown or no number."""
+    if values.get("contract") != CONTRACT_VERSION:
+        raise CaptureError(
+            "contract_version",
+            f"the capture follows contract {values.get('contract')!r}",
+            f"this pipeline reads contract {CONTRACT_VERSION}",
+        )
+    for key in ("motor_id", "test"):
+        if not values.get(key, "").strip():
+            raise CaptureError(
+                "missing_metadata",
+                f"nothing states {key}",
+                f"write {key} into the file's metadata, NAME{SIDECAR_SUFFIX} or {MANIFEST}",
+            )
+    if values["test"] not in TESTS:
+        raise CaptureError(
+            "unknown_test", f"the test {values['test']!r} is unknown", f"use {', '.join(TESTS)}"
+        )
+    known: dict[str, Any] = {}
+    extra: dict[str, str] = {}
+    for key, value in values.items():
+        if key in METADATA and key != "contract":
+            if value.strip():
+                known[key] = _typed(key, value.strip())
+        elif key != "contract":
+            extra[key] = value
+    return CaptureMeta(**known, extra=dict(sorted(extra.items())))
+
+
+def _typed(key: str, value: str) -> str | int | float:
+    """A metadata value in its type, within the glossary's range."""
+    term = METADATA[key]
+    if term.unit == "text":
+        if value not in _CHOICES.get(key, (value,)):
+            raise _bad_value(key, value, f"use one of {', '.join(_CHOICES[key])}")
+        return value
+    try:
+        number = float(value)
+    except ValueError:
+        raise _bad_value(key, value, f"write a number [{term.unit}]") from None
+    low, high = term.low, term.high
+    if not (low is None or number >= low) or not (high is None or number <= high):
+        raise _bad_value(key, value, f"write a number from {low:g} to {high:g} [{term.unit}]")
+    if term.integer and number != int(number):
+        raise _bad_value(key, value, "write a whole number")
+    return int(number) if term.integer else number
+
+
+def _bad_value(key: str, value: str, remedy: str) -> CaptureError:
+    return CaptureError("bad_metadata", f"{key} is {value[:60]!r}", remedy)

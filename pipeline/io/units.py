@@ -1,0 +1,167 @@
+"""The closed table of foreign units: what a bench may write, and what it is in the glossary's unit.
+
+References: BIPM SI Brochure (9th edition), table 8; NIST SP 811, appendix B (pound-force, ounce).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pipeline.records.errors import CaptureError
+
+_POUND_FORCE_N = 4.4482216152605
+_INCH_M = 0.0254
+_TURN_RAD = 2 * math.pi
+_KILOGRAM_FORCE_N = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """value [glossary unit] = factor * value [foreign unit] + shift."""
+
+    factor: float
+    shift: float = 0.0
+
+
+def _prefixed(unit: str, *prefixes: str) -> dict[str, Scale]:
+    powers = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
+    return {prefix + unit: Scale(powers[prefix]) for prefix in prefixes}
+
+
+_SHARE = {"percent": Scale(0.01), "%": Scale(0.01), "1": Scale(1.0)}
+_ANGLE = {
+    "rad": Scale(1.0),
+    "mrad": Scale(1e-3),
+    "deg": Scale(math.pi / 180),
+    "rev": Scale(_TURN_RAD),
+    "rotation": Scale(_TURN_RAD),
+    "arcmin": Scale(math.pi / 180 / 60),
+}
+_TORQUE = {
+    "N·m": Scale(1.0),
+    "mN·m": Scale(1e-3),
+    "uN·m": Scale(1e-6),
+    "kN·m": Scale(1e3),
+    "N·mm": Scale(1e-3),
+    "N·cm": Scale(1e-2),
+    "ozf·in": Scale(_POUND_FORCE_N / 16 * _INCH_M),
+    "lbf·in": Scale(_POUND_FORCE_N * _INCH_M),
+    "lbf·ft": Scale(_POUND_FORCE_N * _INCH_M * 12),
+    "kgf·cm": Scale(_KILOGRAM_FORCE_N * 1e-2),
+    "gf·cm": Scale(_KILOGRAM_FORCE_N * 1e-5),
+}
+FOREIGN_UNITS: dict[str, dict[str, Scale]] = {
+    "s": _prefixed("s", "", "m", "u", "n") | {"min": Scale(60.0), "h": Scale(3600.0)},
+    "V": _prefixed("V", "", "m", "u", "k") | _SHARE,
+    "A": _prefixed("A", "", "m", "u", "k"),
+    "rad": _ANGLE,
+    "deg": {name: Scale(scale.factor * 180 / math.pi) for name, scale in _ANGLE.items()}
+    | {"deg": Scale(1.0), "rev": Scale(360.0), "rotation": Scale(360.0)},
+    "rad/s": {
+        "rad/s": Scale(1.0),
+        "deg/s": Scale(math.pi / 180),
+        "rpm": Scale(_TURN_RAD / 60),
+        "krpm": Scale(_TURN_RAD / 60 * 1e3),
+        "rev/s": Scale(_TURN_RAD),
+        "Hz": Scale(_TURN_RAD),
+    },
+    "N·m": _TORQUE,
+    "degC": {
+        "degC": Scale(1.0),
+        "K": Scale(1.0, -273.15),
+        "degF": Scale(5 / 9, -160 / 9),
+        "mdegC": Scale(1e-3),
+    },
+    "Wb": {"Wb": Scale(1.0), "mWb": Scale(1e-3), "uWb": Scale(1e-6)},
+    "H": _prefixed("H", "", "m", "u", "n"),
+    "ohm": _prefixed("ohm", "", "m", "u", "k"),
+    "Hz": _prefixed("Hz", "", "k", "M"),
+}
+_SPELLINGS = {
+    "Volt": "V",
+    "Volts": "V",
+    "volt": "V",
+    "volts": "V",
+    "Amp": "A",
+    "Amps": "A",
+    "Ampere": "A",
+    "ampere": "A",
+    "amp": "A",
+    "second": "s",
+    "Second": "s",
+    "seconds": "s",
+    "sec": "s",
+    "msec": "ms",
+    "RPM": "rpm",
+    "kRPM": "krpm",
+    "1/min": "rpm",
+    "r/min": "rpm",
+    "turn": "rev",
+    "turns": "rev",
+    "revs": "rev",
+    "revolution": "rev",
+    "revolutions": "rev",
+    "cycle": "rev",
+    "rps": "rev/s",
+    "turns/s": "rev/s",
+    "turn/s": "rev/s",
+    "degree": "deg",
+    "degrees": "deg",
+    "°": "deg",
+    "dps": "deg/s",
+    "°/s": "deg/s",
+    "radian": "rad",
+    "radians": "rad",
+    "Nm": "N·m",
+    "N.m": "N·m",
+    "N*m": "N·m",
+    "Nmm": "N·mm",
+    "Ncm": "N·cm",
+    "mNm": "mN·m",
+    "uNm": "uN·m",
+    "kNm": "kN·m",
+    "oz-in": "ozf·in",
+    "ozin": "ozf·in",
+    "lb-in": "lbf·in",
+    "lbin": "lbf·in",
+    "lb-ft": "lbf·ft",
+    "lbft": "lbf·ft",
+    "kgcm": "kgf·cm",
+    "gcm": "gf·cm",
+    "C": "degC",
+    "°C": "degC",
+    "℃": "degC",
+    "F": "degF",
+    "°F": "degF",
+    "V·s": "Wb",
+    "Vs": "Wb",
+    "mVs": "mWb",
+    "Ohm": "ohm",
+    "ohms": "ohm",
+    "Ω": "ohm",
+    "mΩ": "mohm",
+    "mOhm": "mohm",
+    "kΩ": "kohm",
+    "pct": "percent",
+}
+
+
+def normal_unit(text: str) -> str:
+    """A unit as the table spells it; brackets, spaces and the two micro signs are evened out."""
+    bare = text.strip().strip("()[]").strip()
+    bare = bare.replace("µ", "u").replace("μ", "u").replace("Ω", "Ω")
+    return _SPELLINGS.get(bare, bare)
+
+
+def scale_to(unit: str, target: str) -> Scale:
+    """The scale from a foreign unit to a glossary unit; CaptureError `unknown_unit` without one."""
+    known = FOREIGN_UNITS.get(target, {target: Scale(1.0)})
+    found = known.get(normal_unit(unit))
+    if found is None:
+        raise CaptureError(
+            "unknown_unit",
+            f"the unit {unit!r} is not one this pipeline converts to {target}",
+            f"use one of: {', '.join(sorted(known))}",
+        )
+    return found
