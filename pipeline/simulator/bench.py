@@ -1,0 +1,105 @@
+"""Recording tests: one by name, or a whole campaign of one motor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.simulator import driven, standing, turning
+from pipeline.simulator.design import Bench, Motor, Recording
+from pipeline.simulator.plant import plant_of
+from pipeline.simulator.protocols import PROTOCOLS
+from pipeline.simulator.sensors import Session
+from pipeline.simulator.truth import truth
+
+__all__ = ["CAMPAIGN", "campaign", "record", "truth"]
+
+_TESTS: Mapping[str, Callable[[Session, Any], Recording]] = {
+    "resistance": standing.resistance,
+    "current_step": standing.current_step,
+    "lcr": standing.lcr,
+    "open_circuit": turning.open_circuit,
+    "hand_turn": turning.hand_turn,
+    "cogging": turning.cogging,
+    "torque_map": driven.torque_map,
+    "spin_down": turning.spin_down,
+    "heat_run": standing.heat_run,
+    "holding_current": standing.holding_current,
+    "flux_map": standing.flux_map,
+    "drive": driven.drive,
+}
+
+CAMPAIGN: tuple[tuple[str, str, Mapping[str, Any]], ...] = (
+    ("resistance_ab", "resistance", {"pair": "ab"}),
+    ("resistance_bc", "resistance", {"pair": "bc"}),
+    ("resistance_ca", "resistance", {"pair": "ca"}),
+    ("resistance_ab_warm", "resistance", {"pair": "ab", "temp_degc": 62.0}),
+    *(
+        (f"current_step_{axis}_{k}", "current_step", {"theta_elec_deg": angle, "level": level})
+        for axis, angle in (("d", -30.0), ("q", 60.0))
+        for k, level in enumerate((0.15, 0.45, 0.9))
+    ),
+    ("lcr", "lcr", {}),
+    ("open_circuit_forward", "open_circuit", {}),
+    (
+        "open_circuit_backward_warm",
+        "open_circuit",
+        {"levels": (-0.25, -0.5, -0.8), "temp_magnet_degc": 58.0},
+    ),
+    ("hand_turn", "hand_turn", {}),
+    ("cogging_cw", "cogging", {"direction": 1}),
+    ("cogging_ccw", "cogging", {"direction": -1}),
+    ("torque_map_slow", "torque_map", {"speed": 0.2}),
+    (
+        "torque_map_fast",
+        "torque_map",
+        {"speed": 0.7, "id_levels": (-0.4, 0.0), "iq_levels": (-0.9, -0.45, 0.0, 0.45, 0.9)},
+    ),
+    (
+        "torque_map_backward",
+        "torque_map",
+        {"speed": -0.45, "id_levels": (-0.4, 0.0), "iq_levels": (-0.8, -0.4, 0.0, 0.4, 0.8)},
+    ),
+    ("spin_down_forward", "spin_down", {"direction": 1}),
+    ("spin_down_backward", "spin_down", {"direction": -1, "level": 0.8}),
+    ("heat_run", "heat_run", {}),
+    ("holding_current", "holding_current", {}),
+    ("flux_map", "flux_map", {}),
+    ("drive_0", "drive", {}),
+    ("drive_1_warm", "drive", {"temp_winding_degc": 55.0, "temp_magnet_degc": 42.0}),
+)
+
+
+def record(
+    test: str, motor: Motor, bench: Bench, rng: np.random.Generator, **protocol: Any
+) -> Recording:
+    """One capture of a test of `contract/capture.md`; `protocol` are fields of its dataclass.
+
+    The station's gains are drawn from `rng` unless `bench.instruments` fixes them. Raises
+    ValueError for an unknown test and TypeError for an unknown protocol field.
+    """
+    if test not in _TESTS:
+        raise ValueError(f"no test {test}; there are {', '.join(_TESTS)}")
+    how = PROTOCOLS[test](**protocol)
+    session = Session(motor, plant_of(motor), bench, bench.drawn(rng), rng)
+    return _TESTS[test](session, how)
+
+
+def campaign(
+    motor: Motor, bench: Bench, seed: int, plan: tuple[tuple[str, str, Mapping[str, Any]], ...] = ()
+) -> list[Recording]:
+    """All captures of one motor on one station, whose gains are drawn once.
+
+    Each capture has a generator of its own, so that leaving one out changes no other.
+    """
+    steps = plan or CAMPAIGN
+    first, *rest = np.random.SeedSequence(seed).spawn(1 + len(steps))
+    fixed = replace(bench, instruments=bench.drawn(np.random.default_rng(first)))
+    done = []
+    for child, (stem, test, protocol) in zip(rest, steps, strict=True):
+        recording = record(test, motor, fixed, np.random.default_rng(child), **protocol)
+        done.append(replace(recording, stem=stem))
+    return done

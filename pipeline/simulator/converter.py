@@ -1,0 +1,427 @@
+"""The motor on a converter: phase equations, current and speed control, compiled.
+
+Each switching period applies one constant phase voltage vector; the phase equations
+v_x - v_n = R_x i_x + drop(i_x) + dpsi_x/dt are integrated by RK4 between the samplings.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipeline.simulator.field import SQRT3, current, magnet, stiffness, torque_of
+from pipeline.simulator.motion import bristle_after, coupling, extra, heat, passive
+from pipeline.simulator.plant import Plant
+
+HISTORY = 256
+COLUMNS = (
+    "i_alpha",
+    "i_beta",
+    "v_alpha",
+    "v_beta",
+    "theta_seen",
+    "omega_seen",
+    "torque_shaft",
+    "temp_winding",
+    "temp_magnet",
+    "theta",
+    "omega",
+    "i_alpha_true",
+    "i_beta_true",
+    "psi_alpha",
+    "psi_beta",
+    "torque_em",
+    "work_in",
+    "work_copper",
+    "work_switches",
+)
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+Mechanics = tuple[float, float, float, float]
+Field = tuple[float, float, float, float, float, float, float, float, float]
+
+
+class Control(NamedTuple):
+    """Controller, inverter and the sensors that are inside the loop."""
+
+    pole_pairs: float
+    period_s: float
+    substeps: int
+    substeps_before: int
+    v_limit: float
+    l_d: float
+    l_q: float
+    psi: float
+    kp_d: float
+    kp_q: float
+    ki: float
+    speed_loop: bool
+    kp_speed: float
+    ki_speed: float
+    i_limit: float
+    held_speed: bool
+    gain_a: float
+    gain_b: float
+    gain_c: float
+    offset_a: float
+    offset_b: float
+    offset_c: float
+    lsb_current: float
+    delay_s: float
+    angle_offset: float
+    angle_wobble: float
+    angle_wobble_phase: float
+    lsb_angle: float
+    speed_lag_s: float
+    ambient: float
+    temp_winding: float
+    temp_magnet: float
+    theta: float
+    omega: float
+
+
+@njit(cache=True)
+def phase_drop(i: float, p: Plant) -> float:
+    """Voltage that dead time and switches take from one phase [V]."""
+    return float(p.dead_v) * i / math.sqrt(i * i + p.dead_knee_a * p.dead_knee_a)
+
+
+@njit(cache=True)
+def resistance_rise(omega: float, degc: float, p: Plant) -> float:
+    """Factor on the phase resistances from temperature and skin effect."""
+    factor = 1.0 + p.alpha_copper * (degc - 25.0)
+    if p.skin != 0.0:
+        u = p.pole_pairs * omega / p.omega_elec_rated
+        factor *= 1.0 + p.skin * u * u / (1.0 + (u / p.skin_knee) ** 2)
+    return float(factor)
+
+
+@njit(cache=True)
+def windings(flux: Pair, mechanics: Mechanics, volt: Pair, warm: Pair, p: Plant) -> Field:
+    """Phase equations: flux rates [V], torque [N·m], powers in, in copper, in switches [W],
+    rotor-frame currents [A] and flux over the magnet's.
+    """
+    theta, omega = mechanics[0], mechanics[1]
+    eps = p.pole_pairs * theta
+    c, s = math.cos(eps), math.sin(eps)
+    psi_d, psi_q = c * flux[0] + s * flux[1], c * flux[1] - s * flux[0]
+    i_d, i_q, w_eps = current(psi_d, psi_q, eps, warm[1], p)
+    i_alpha, i_beta = c * i_d - s * i_q, s * i_d + c * i_q
+    i_a = i_alpha
+    i_b = -0.5 * i_alpha + 0.5 * SQRT3 * i_beta
+    i_c = -0.5 * i_alpha - 0.5 * SQRT3 * i_beta
+    rise = resistance_rise(omega, warm[0], p)
+    u_a, u_b, u_c = rise * p.r_a_ohm * i_a, rise * p.r_b_ohm * i_b, rise * p.r_c_ohm * i_c
+    copper, switches = u_a * i_a + u_b * i_b + u_c * i_c, 0.0
+    if p.dead_v != 0.0:
+        e_a, e_b, e_c = phase_drop(i_a, p), phase_drop(i_b, p), phase_drop(i_c, p)
+        switches = e_a * i_a + e_b * i_b + e_c * i_c
+        u_a, u_b, u_c = u_a + e_a, u_b + e_b, u_c + e_c
+    # The star point takes the mean of the three, which alpha and beta do not see.
+    d_alpha = volt[0] - (2.0 * u_a - u_b - u_c) / 3.0
+    d_beta = volt[1] - (u_b - u_c) / SQRT3
+    if p.extras > 0:
+        u_d = extra(1, omega, theta, i_d, i_q, warm[0], warm[1], p)
+        u_q = extra(2, omega, theta, i_d, i_q, warm[0], warm[1], p)
+        d_alpha -= c * u_d - s * u_q
+        d_beta -= s * u_d + c * u_q
+    torque = torque_of(psi_d, psi_q, i_d, i_q, w_eps, p)
+    ratio = math.sqrt(psi_d * psi_d + psi_q * psi_q) / p.psi_wb if p.psi_wb > 0.0 else 0.0
+    power = 1.5 * (volt[0] * i_alpha + volt[1] * i_beta)
+    return d_alpha, d_beta, torque, power, copper, switches, i_d, i_q, ratio
+
+
+@njit(cache=True)
+def net_torque(
+    mechanics: Mechanics,
+    bristle: float,
+    field: Field,
+    warm: Pair,
+    p: Plant,
+) -> float:
+    """Torque on the rotor, the coupling's and the load's not in, from what `windings` gave."""
+    theta, omega = mechanics[0], mechanics[1]
+    net = field[2] + passive(theta, omega, bristle, field[2], field[8], p)
+    if p.extras > 0:
+        net += extra(0, omega, theta, field[6], field[7], warm[0], warm[1], p)
+    return float(net)
+
+
+@njit(cache=True)
+def accelerations(mechanics: Mechanics, net: float, load: float, held: bool, p: Plant) -> Pair:
+    """Accelerations of the rotor and of the far mass [rad/s²]; a dynamometer holds the far end."""
+    if p.two_mass:
+        through = coupling(mechanics[0] - mechanics[2], mechanics[1] - mechanics[3], p)
+        far = 0.0 if held else (through - load) / p.j_load
+        return (net - through) / p.j_rotor, far
+    if held:
+        return 0.0, 0.0
+    return (net - load) / p.j_rotor, 0.0
+
+
+@njit(cache=True)
+def advance(
+    y: Array, work: Array, volt: Pair, load: float, warm: Pair, h: float, held: bool, p: Plant
+) -> None:
+    """One RK4 step of [psi_alpha, psi_beta, theta, omega, far, far_omega, bristle], in place.
+
+    `work` [3] gathers energy in, in copper and in switches [J].
+    """
+    weights = (1.0, 2.0, 2.0, 1.0)
+    parts = (0.0, 0.5, 0.5, 1.0)
+    total = np.zeros(9)
+    now = np.zeros(6)
+    for stage in range(4):
+        part = parts[stage] * h
+        flux = (y[0] + part * now[0], y[1] + part * now[1])
+        mechanics = (
+            y[2] + part * now[2],
+            y[3] + part * now[3],
+            y[4] + part * now[4],
+            y[5] + part * now[5],
+        )
+        field = windings(flux, mechanics, volt, warm, p)
+        net = net_torque(mechanics, y[6], field, warm, p)
+        near, far = accelerations(mechanics, net, load, held, p)
+        now[0], now[1], now[2], now[3] = field[0], field[1], mechanics[1], near
+        now[4], now[5] = mechanics[3], far
+        share = weights[stage] * h / 6.0
+        for n in range(6):
+            total[n] += share * now[n]
+        for n in range(3):
+            work[n] += share * field[3 + n]
+    for n in range(6):
+        y[n] += total[n]
+    y[6] = bristle_after(y[6], total[2], p)
+
+
+@njit(cache=True)
+def rounded(value: float, lsb: float) -> float:
+    """Nearest multiple of lsb, or the value itself where lsb is 0."""
+    return float(math.floor(value / lsb + 0.5) * lsb) if lsb > 0.0 else value
+
+
+@njit(cache=True)
+def stator_current(y: Array, t_m: float, p: Plant) -> Pair:
+    """Currents in alpha and beta that belong to a state [A]."""
+    eps = p.pole_pairs * y[2]
+    c, s = math.cos(eps), math.sin(eps)
+    i_d, i_q, _ = current(c * y[0] + s * y[1], c * y[1] - s * y[0], eps, t_m, p)
+    return c * i_d - s * i_q, s * i_d + c * i_q
+
+
+@njit(cache=True)
+def sensed_current(true: Pair, noise: Array, c: Control) -> Pair:
+    """What three phase-current sensors report, as alpha and beta [A]."""
+    i_a = c.gain_a * true[0] + c.offset_a + noise[0]
+    i_b = c.gain_b * (-0.5 * true[0] + 0.5 * SQRT3 * true[1]) + c.offset_b + noise[1]
+    i_c = c.gain_c * (-0.5 * true[0] - 0.5 * SQRT3 * true[1]) + c.offset_c + noise[2]
+    i_a, i_b, i_c = (
+        rounded(i_a, c.lsb_current),
+        rounded(i_b, c.lsb_current),
+        rounded(i_c, c.lsb_current),
+    )
+    return (2.0 * i_a - i_b - i_c) / 3.0, (i_b - i_c) / SQRT3
+
+
+@njit(cache=True)
+def sensed_angle(theta: float, noise: float, c: Control) -> float:
+    """What the encoder reports: offset, eccentricity, noise, resolution [rad]."""
+    wobble = c.angle_wobble * math.sin(theta + c.angle_wobble_phase)
+    return rounded(theta + c.angle_offset + wobble + noise, c.lsb_angle)
+
+
+@njit(cache=True)
+def remembered(history: Array, newest: int, back: float) -> Pair:
+    """Currents `back` integration steps ago, linear between steps, from a ring buffer."""
+    whole = int(back)
+    part = back - whole
+    one, two = (newest - whole) % HISTORY, (newest - whole - 1) % HISTORY
+    return (
+        (1.0 - part) * history[one, 0] + part * history[two, 0],
+        (1.0 - part) * history[one, 1] + part * history[two, 1],
+    )
+
+
+@njit(cache=True)
+def command(loop: Array, seen: Pair, eps: float, omega: float, want: Array, c: Control) -> Pair:
+    """Voltage vector for the next period [V]: PI currents, decoupling, speed loop, limits.
+
+    `loop` [3] holds the integrators of d [V], q [V] and speed [A].
+    """
+    ce, se = math.cos(eps), math.sin(eps)
+    i_d, i_q = ce * seen[0] + se * seen[1], ce * seen[1] - se * seen[0]
+    want_q = want[1]
+    if c.speed_loop:
+        slip = want[1] - omega
+        want_q = c.kp_speed * slip + loop[2]
+        if abs(want_q) < c.i_limit or want_q * slip < 0.0:
+            loop[2] += c.ki_speed * slip * c.period_s
+        want_q = min(max(want_q, -c.i_limit), c.i_limit)
+    error_d, error_q = want[0] - i_d, want_q - i_q
+    omega_e = c.pole_pairs * omega
+    v_d = c.kp_d * error_d + loop[0] - omega_e * c.l_q * i_q
+    v_q = c.kp_q * error_q + loop[1] + omega_e * (c.psi + c.l_d * i_d)
+    size = math.sqrt(v_d * v_d + v_q * v_q)
+    if size > c.v_limit:
+        v_d, v_q = v_d * c.v_limit / size, v_q * c.v_limit / size
+    else:
+        loop[0] += c.ki * error_d * c.period_s
+        loop[1] += c.ki * error_q * c.period_s
+    lead = eps + omega_e * c.period_s * (1.5 - c.substeps_before / c.substeps)
+    cl, sl = math.cos(lead), math.sin(lead)
+    return cl * v_d - sl * v_q, sl * v_d + cl * v_q
+
+
+@njit(cache=True)
+def beginning(c: Control, p: Plant) -> Array:
+    """State at the start: no current, the magnet's flux, friction already bent."""
+    y = np.zeros(7)
+    y[2], y[3], y[4], y[5] = c.theta, c.omega, c.theta, c.omega
+    y[6] = math.copysign(p.bristle, c.omega) if c.omega != 0.0 else 0.0
+    eps = p.pole_pairs * c.theta
+    md, mq, _, _ = magnet(eps, c.temp_magnet, p)
+    y[0] = math.cos(eps) * md - math.sin(eps) * mq
+    y[1] = math.sin(eps) * md + math.cos(eps) * mq
+    return y
+
+
+@njit(cache=True)
+def shaft_torque(y: Array, load: float, volt: Pair, warm: Pair, c: Control, p: Plant) -> Pair:
+    """Torque the transducer sees, and the electromagnetic torque [N·m]."""
+    mechanics = (y[2], y[3], y[4], y[5])
+    field = windings((y[0], y[1]), mechanics, volt, warm, p)
+    if not c.held_speed:
+        return load, field[2]
+    if p.two_mass:
+        return coupling(y[2] - y[4], y[3] - y[5], p), field[2]
+    return net_torque(mechanics, y[6], field, warm, p), field[2]
+
+
+@njit(cache=True)
+def run_on(
+    y: Array,
+    work: Array,
+    volt: Pair,
+    want: Array,
+    warm: Pair,
+    steps: int,
+    history: Array,
+    newest: int,
+    c: Control,
+    p: Plant,
+) -> int:
+    """Integrate some steps with one voltage vector; returns the newest place in the history."""
+    h = c.period_s / c.substeps
+    for _ in range(steps):
+        if c.held_speed:
+            y[5 if p.two_mass else 3] = want[3]
+        advance(y, work, volt, want[2], warm, h, c.held_speed, p)
+        if c.delay_s > 0.0:
+            newest += 1
+            i_alpha, i_beta = stator_current(y, warm[1], p)
+            history[newest % HISTORY, 0], history[newest % HISTORY, 1] = i_alpha, i_beta
+    return newest
+
+
+@njit(cache=True)
+def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
+    """Field-oriented control over n periods: rows of `COLUMNS` at the sampling instants.
+
+    `reference` [n, 4]: d current [A], q current [A] or speed [rad/s], load torque [N·m],
+    speed the dynamometer holds [rad/s]. `noise` [n, 4]: phase currents [A], angle [rad].
+    """
+    out = np.empty((reference.shape[0], len(COLUMNS)))
+    y, work, loop = beginning(c, p), np.zeros(3), np.zeros(3)
+    warm = (c.temp_winding, c.temp_magnet)
+    history, newest = np.zeros((HISTORY, 2)), 0
+    delay = c.delay_s * c.substeps / c.period_s
+    blend = 1.0 - math.exp(-c.period_s / c.speed_lag_s) if c.speed_lag_s > 0.0 else 1.0
+    start = sensed_angle(c.theta, 0.0, c)
+    volt = command(loop, (0.0, 0.0), c.pole_pairs * start, c.omega, np.zeros(4), c)
+    loop[:] = 0.0
+    omega, before = c.omega, start
+    for k in range(reference.shape[0]):
+        want, copper = reference[k], work[1]
+        newest = run_on(y, work, volt, want, warm, c.substeps_before, history, newest, c, p)
+        true = stator_current(y, warm[1], p)
+        late = true
+        if c.delay_s > 0.0:
+            late = remembered(history, newest, min(delay, max(0.0, newest - 1.001)))
+        seen = sensed_current(late, noise[k], c)
+        angle = sensed_angle(y[2], noise[k, 3], c)
+        if k > 0:
+            omega += blend * ((angle - before) / c.period_s - omega)
+        before = angle
+        shaft, torque = shaft_torque(y, want[2], volt, warm, c, p)
+        out[k, 0:9] = (seen[0], seen[1], volt[0], volt[1], angle, omega, shaft, warm[0], warm[1])
+        out[k, 9:16] = (y[2], y[3], true[0], true[1], y[0], y[1], torque)
+        out[k, 16:19] = work
+        ahead = command(loop, seen, c.pole_pairs * angle, omega, want, c)
+        rest = c.substeps - c.substeps_before
+        newest = run_on(y, work, volt, want, warm, rest, history, newest, c, p)
+        volt = ahead
+        warm = heat(warm[0], warm[1], (work[1] - copper) / c.period_s, c.ambient, c.period_s, p)
+    return out
+
+
+@njit(cache=True)
+def pair_step(
+    source: Array,
+    step_s: float,
+    substeps: int,
+    pair: tuple[float, float, float],
+    source_ohm: float,
+    eps: float,
+    t_w: float,
+    t_m: float,
+    p: Plant,
+) -> Array:
+    """Voltage and current [n, 2] of one terminal pair, rotor locked at eps, third open.
+
+    `source` [n + 1] is the open voltage of the supply, linear between its points except that a
+    jump of more than half its largest value is an edge on the later point. `pair` holds the
+    current direction in alpha and beta and the pair's resistance at 25 degC. The state is the
+    flux vector; the open terminal's voltage is what keeps its current zero.
+    """
+    count = source.size - 1
+    out = np.empty((count, 2))
+    w_alpha, w_beta, ohm = pair
+    ohm *= resistance_rise(0.0, t_w, p)
+    c, s = math.cos(eps), math.sin(eps)
+    w_d, w_q = c * w_alpha + s * w_beta, c * w_beta - s * w_alpha
+    d, q, _, _ = magnet(eps, t_m, p)
+    edge = 0.5 * np.max(np.abs(source))
+    h = step_s / substeps
+    y = np.empty(2)
+    k1 = np.empty((4, 2))
+    for n in range(count):
+        i_d, i_q, _ = current(d, q, eps, t_m, p)
+        i = 0.75 * (w_d * i_d + w_q * i_q)
+        out[n, 0], out[n, 1] = source[n] - source_ohm * i, i
+        slope = (source[n + 1] - source[n]) / step_s
+        if abs(source[n + 1] - source[n]) > edge:
+            slope = 0.0
+        for m in range(substeps):
+            for stage in range(4):
+                part = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+                y[0], y[1] = d, q
+                if stage > 0:
+                    y[0] += part * h * k1[stage - 1, 0]
+                    y[1] += part * h * k1[stage - 1, 1]
+                i_d, i_q, _ = current(y[0], y[1], eps, t_m, p)
+                g_dd, g_qq, g_dq = stiffness(y[0], y[1], eps, t_m, p)
+                det = g_dd * g_qq - g_dq * g_dq
+                l_d = (g_qq * w_d - g_dq * w_q) / det
+                l_q = (g_dd * w_q - g_dq * w_d) / det
+                i = 0.75 * (w_d * i_d + w_q * i_q)
+                v = source[n] + slope * (m + part) * h
+                rate = (v - (ohm + source_ohm) * i) / (1.5 * (w_d * l_d + w_q * l_q))
+                k1[stage, 0], k1[stage, 1] = l_d * rate, l_q * rate
+            d += h * (k1[0, 0] + 2.0 * k1[1, 0] + 2.0 * k1[2, 0] + k1[3, 0]) / 6.0
+            q += h * (k1[0, 1] + 2.0 * k1[1, 1] + 2.0 * k1[2, 1] + k1[3, 1]) / 6.0
+    return out

@@ -1,0 +1,196 @@
+"""What is simulated: a motor's truths, a bench's instruments, and effects by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+Size = float | Mapping[str, float]
+Effects = Mapping[str, Size]
+
+EXTRA_SIGNALS = ("torque", "vd", "vq")
+EXTRA_VARIABLES = (
+    "one",
+    "omega_mech_rad_s",
+    "theta_mech_rad",
+    "theta_elec_rad",
+    "id_a",
+    "iq_a",
+    "i_a",
+    "temp_winding_degc",
+    "temp_magnet_degc",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Extra:
+    """A term that is in nobody's library: `signal += table(variable) * times`.
+
+    `x`, `y` [n each] tabulate the term, linear between points and constant outside; an angle is
+    taken modulo one turn. `signal` is `torque` [N·m] on the rotor, or `vd`, `vq` [V] taken from
+    the motor's terminals. `times` is a second variable that multiplies, `one` for none.
+    """
+
+    signal: str
+    variable: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    times: str = "one"
+
+    def __post_init__(self) -> None:
+        if self.signal not in EXTRA_SIGNALS:
+            raise ValueError(f"an extra enters {', '.join(EXTRA_SIGNALS)}, not {self.signal}")
+        for name in (self.variable, self.times):
+            if name not in EXTRA_VARIABLES:
+                raise ValueError(f"an extra depends on {', '.join(EXTRA_VARIABLES)}, not {name}")
+        if len(self.x) != len(self.y) or len(self.x) < 2 or np.any(np.diff(self.x) <= 0):
+            raise ValueError("an extra needs two or more increasing x and as many y")
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """One motor: wye-equivalent phase constants at 25 degC, ratings, thermal network, effects.
+
+    Currents and fluxes are phase peaks. `speed_rated_rad_s` is mechanical. `rth_*` [K/W] and
+    `cth_*` [J/K] are winding to ambient (wa), winding to magnet (wm) and magnet to ambient (ma).
+    `effects` are those of `contract/effects.md` on top of copper, magnet and Coulomb friction,
+    which are here because every motor has them. `nameplate` overrides what the metadata claims.
+    """
+
+    motor_type: str
+    pole_pairs: int
+    slots: int
+    r_phase_ohm: float
+    ld_h: float
+    lq_h: float
+    psi_pm_wb: float
+    j_rotor_kgm2: float
+    b_visc_nm_s_rad: float
+    torque_coulomb_nm: float
+    current_rated_a: float
+    speed_rated_rad_s: float
+    vdc_v: float
+    rth_wa_k_w: float
+    rth_wm_k_w: float
+    rth_ma_k_w: float
+    cth_winding_j_k: float
+    cth_magnet_j_k: float
+    temp_coeff_copper_1_k: float = 0.003854
+    temp_coeff_magnet_1_k: float = -0.0011
+    winding: str = "wye"
+    ambient_degc: float = 25.0
+    motor_id: str = "sim-0001"
+    lot: str = "A"
+    nameplate: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    effects: Effects = field(default_factory=lambda: MappingProxyType({}))
+    extras: tuple[Extra, ...] = ()
+
+    def __post_init__(self) -> None:
+        positive = (
+            "pole_pairs slots r_phase_ohm ld_h lq_h j_rotor_kgm2 current_rated_a "
+            "speed_rated_rad_s vdc_v rth_wa_k_w rth_wm_k_w rth_ma_k_w cth_winding_j_k "
+            "cth_magnet_j_k"
+        )
+        for name in positive.split():
+            if not getattr(self, name) > 0:
+                raise ValueError(f"{self.motor_type}: {name} must be positive")
+        for name in ("psi_pm_wb", "b_visc_nm_s_rad", "torque_coulomb_nm"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"{self.motor_type}: {name} must not be negative")
+        if self.winding not in {"wye", "delta"}:
+            raise ValueError(f"{self.motor_type}: winding is wye or delta, not {self.winding}")
+
+    def having(self, **effects: Size) -> Motor:
+        """This motor with further effects; `name=size` or `name={parameter: value}`."""
+        return replace(self, effects=MappingProxyType({**self.effects, **effects}))
+
+    @property
+    def torque_rated_nm(self) -> float:
+        """Magnet torque at rated current, 1.5 p psi I [N·m]."""
+        return 1.5 * self.pole_pairs * self.psi_pm_wb * self.current_rated_a
+
+    @property
+    def tau_elec_s(self) -> float:
+        """Slower electrical time constant, max(Ld, Lq) / R [s]."""
+        return max(self.ld_h, self.lq_h) / self.r_phase_ohm
+
+
+@dataclass(frozen=True, slots=True)
+class Instruments:
+    """The gains and offsets one station really has: common to all its samples."""
+
+    current: float = 1.0
+    voltage: float = 1.0
+    voltage_commanded: float = 1.0
+    torque: float = 1.0
+    lcr: float = 1.0
+    temperature_degc: float = 0.0
+
+
+EXACT = Instruments()
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """One test station: rates, noise, resolution and stated uncertainties.
+
+    Noise and resolution are relative to the motor's ratings (rated current, DC link, rated
+    torque, rated speed), so that one bench suits any size. `instruments` None draws the gains
+    from the stated uncertainties; `EXACT` is a perfect station. `drift_rel`, `hum_rel` are the
+    size of a random walk at the end of a capture and of a mains pick-up, in units of the
+    channel's noise. `jitter_s` scatters the time stamps only.
+    """
+
+    station: str = "sim-1"
+    operator: str = "simulator"
+    started_at: str = "2026-01-05T08:00:00Z"
+    pwm_hz: float = 10_000.0
+    current_noise_rel: float = 4e-4
+    voltage_noise_rel: float = 2e-4
+    torque_noise_rel: float = 6e-4
+    speed_noise_rel: float = 1.5e-4
+    temperature_noise_degc: float = 0.04
+    lcr_noise_rel: float = 2e-3
+    flux_noise_rel: float = 5e-4
+    adc_bits: int = 16
+    encoder_bits: int = 17
+    encoder_noise_rad: float = 0.0
+    speed_lag_s: float = 1e-3
+    u_rel_current: float = 2e-3
+    u_rel_voltage: float = 1e-3
+    u_rel_torque: float = 2e-3
+    u_rel_lcr: float = 2e-3
+    u_temp_degc: float = 0.5
+    noise_scale: float = 1.0
+    drift_rel: float = 0.0
+    hum_rel: float = 0.0
+    hum_hz: float = 50.0
+    jitter_s: float = 0.0
+    instruments: Instruments | None = None
+
+    def drawn(self, rng: np.random.Generator) -> Instruments:
+        """The instruments of this station, drawn once from the stated uncertainties."""
+        if self.instruments is not None:
+            return self.instruments
+        draw = rng.standard_normal(6)
+        return Instruments(
+            current=1.0 + self.u_rel_current * float(draw[0]),
+            voltage=1.0 + self.u_rel_voltage * float(draw[1]),
+            voltage_commanded=1.0 + self.u_rel_voltage * float(draw[2]),
+            torque=1.0 + self.u_rel_torque * float(draw[3]),
+            lcr=1.0 + self.u_rel_lcr * float(draw[4]),
+            temperature_degc=self.u_temp_degc * float(draw[5]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One capture before it is written: a file stem, metadata, and tables of one clock each."""
+
+    stem: str
+    meta: Mapping[str, str]
+    tables: tuple[dict[str, NDArray[np.float64]], ...]

@@ -1,0 +1,217 @@
+"""Every effect of `contract/effects.md` with its parameters and a typical size for any motor.
+
+The first parameter, `size`, is the one that is zero where the effect is absent; the others shape
+it. Forms are deliberately not those of the usual textbook model, see `docs/simulator.md`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from pipeline.simulator.design import Motor, Size
+
+Defaults = Callable[[Motor], dict[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """One effect: the unit of its size, what it does in words, and its typical parameters."""
+
+    unit: str
+    words: str
+    typical: Defaults
+
+
+def cogging_order(motor: Motor) -> int:
+    """Fundamental order of the cogging torque a turn, LCM(slots, 2p)."""
+    return math.lcm(motor.slots, 2 * motor.pole_pairs)
+
+
+def speed_elec_rad_s(motor: Motor) -> float:
+    """Electrical angular speed at rated speed, p omega [rad/s]."""
+    return motor.pole_pairs * motor.speed_rated_rad_s
+
+
+def _harmonics(_: Motor) -> dict[str, float]:
+    return {
+        "size": 0.012,
+        "seventh": 0.6,
+        "eleventh": 0.2,
+        "thirteenth": 0.12,
+        "phase5_rad": math.pi,
+        "phase7_rad": 0.2,
+        "phase11_rad": 0.4,
+        "phase13_rad": 2.9,
+    }
+
+
+def _compliance(motor: Motor) -> dict[str, float]:
+    """Stiffness that puts the free-free resonance of two equal halves at 80 Hz."""
+    fraction = 0.5
+    reduced = motor.j_rotor_kgm2 * fraction * (1.0 - fraction)
+    stiffness = reduced * (2.0 * math.pi * 80.0) ** 2
+    return {"size": 1.0 / stiffness, "load_fraction": fraction, "damping_ratio": 0.03}
+
+
+FORMS: dict[str, Form] = {
+    "copper_temperature": Form(
+        "1/K", "R (1 + size (T_w - 25))", lambda m: {"size": m.temp_coeff_copper_1_k}
+    ),
+    "magnet_temperature": Form(
+        "1/K", "psi (1 + size (T_m - 25))", lambda m: {"size": m.temp_coeff_magnet_1_k}
+    ),
+    "skin_effect": Form(
+        "1",
+        "R (1 + size u²/(1 + (u/knee)²)), u the electrical speed over rated",
+        lambda _: {"size": 0.08, "knee": 3.0},
+    ),
+    "phase_imbalance": Form(
+        "1",
+        "R_x = R (1 + size cos(120° x - angle_deg)), x = 0, 1, 2 for a, b, c",
+        lambda _: {"size": 0.04, "angle_deg": 20.0},
+    ),
+    "dead_time": Form(
+        "V",
+        "each phase loses size * i/sqrt(i² + knee_a²)",
+        lambda m: {"size": 0.005 * m.vdc_v, "knee_a": 0.01 * m.current_rated_a},
+    ),
+    "voltage_scale": Form("1", "recorded voltages times 1 + size", lambda _: {"size": 0.02}),
+    "sample_delay": Form(
+        "s",
+        "dq voltages are logged in the frame of the rotor `size` earlier than they act",
+        lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
+    ),
+    "current_delay": Form(
+        "s",
+        "phase currents are sampled `size` late",
+        lambda m: {"size": 0.03 / speed_elec_rad_s(m)},
+    ),
+    "torque_lag": Form("s", "first-order lag of the transducer", lambda _: {"size": 2e-3}),
+    "current_scale": Form("1", "all current sensors times 1 + size", lambda _: {"size": 0.02}),
+    "current_gain": Form(
+        "1", "the sensor of one phase times 1 + size", lambda _: {"size": 0.02, "phase": 0.0}
+    ),
+    "current_offset": Form(
+        "A",
+        "the sensor of one phase plus size",
+        lambda m: {"size": 0.008 * m.current_rated_a, "phase": 1.0},
+    ),
+    "angle_offset": Form("rad", "electrical angle plus size", lambda _: {"size": 0.03}),
+    "angle_eccentricity": Form(
+        "rad",
+        "mechanical angle plus size * sin(theta + phase_rad)",
+        lambda m: {"size": 0.04 / m.pole_pairs, "phase_rad": 0.6},
+    ),
+    "saturation": Form(
+        "1",
+        "apparent Lq falls by size at rated q current (power law of flux), Ld by size_d at rated "
+        "d current along the magnet (root form); form 1 is a sinh of flux instead of the power",
+        lambda _: {"size": 0.18, "size_d": math.nan, "exponent": 3.0, "form": 0.0},
+    ),
+    "cross_saturation": Form(
+        "1",
+        "apparent Lq falls by size at rated d current along the magnet; reciprocal",
+        lambda _: {"size": 0.08},
+    ),
+    "bemf_harmonics": Form("1", "5th, 7th, 11th, 13th of the phase flux linkage", _harmonics),
+    "inductance_harmonics": Form(
+        "1",
+        "1/Lq times 1 + size cos(6 eps + phase_rad), 1/Ld with size * ratio_d",
+        lambda _: {"size": 0.05, "ratio_d": 0.4, "phase_rad": 0.3},
+    ),
+    "iron_eddy": Form(
+        "N·m·s/rad",
+        "drag size * omega (psi/psi_pm)²/(1 + (omega/knee_rad_s)²)",
+        lambda m: {
+            "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s,
+            "knee_rad_s": 5.0 * m.speed_rated_rad_s,
+        },
+    ),
+    "iron_hysteresis": Form(
+        "N·m",
+        "drag size * (psi/psi_pm)^1.6 against the direction of rotation",
+        lambda m: {"size": 0.008 * m.torque_rated_nm},
+    ),
+    "coulomb_friction": Form(
+        "N·m", "size against the direction", lambda m: {"size": m.torque_coulomb_nm}
+    ),
+    "stribeck": Form(
+        "N·m",
+        "extra size/(1 + (omega/omega_s)²) against the direction",
+        lambda m: {
+            "size": 0.008 * m.torque_rated_nm,
+            "omega_s_rad_s": 0.03 * m.speed_rated_rad_s,
+        },
+    ),
+    "windage": Form(
+        "N·m·(s/rad)²",
+        "size * omega_rated² * |omega/omega_rated|^exponent against the direction",
+        lambda m: {
+            "size": 0.012 * m.torque_rated_nm / m.speed_rated_rad_s**2,
+            "exponent": 2.0,
+        },
+    ),
+    "load_dependent_friction": Form(
+        "1", "size * |electromagnetic torque| against the direction", lambda _: {"size": 0.02}
+    ),
+    "presliding": Form(
+        "rad",
+        "Dahl bristle: friction builds up over size of travel after a reversal",
+        lambda m: {"size": 0.05 * 2.0 * math.pi / cogging_order(m)},
+    ),
+    "cogging": Form(
+        "N·m",
+        "orders LCM(slots, 2p) and twice it, and by request `slots` and 2p",
+        lambda m: {
+            "size": 0.015 * m.torque_rated_nm,
+            "second": 0.15,
+            "order_slots": 0.0,
+            "order_poles": 0.0,
+            "phase_rad": 0.7,
+        },
+    ),
+    "unbalance": Form(
+        "N·m",
+        "size * sin(theta + phase_rad)",
+        lambda m: {"size": 0.01 * m.torque_rated_nm, "phase_rad": 1.1},
+    ),
+    "compliance": Form(
+        "rad/(N·m)", "two masses, shaft compliance size, load_fraction of J far", _compliance
+    ),
+    "backlash": Form("rad", "total gap of the coupling", lambda m: {"size": 0.05 / m.pole_pairs}),
+    "torque_scale": Form("1", "transducer times 1 + size", lambda _: {"size": 0.02}),
+    "torque_offset": Form(
+        "N·m", "transducer plus size", lambda m: {"size": 0.006 * m.torque_rated_nm}
+    ),
+}
+
+ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
+
+
+def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, float]:
+    """All parameters of an effect on this motor, `size` a number or a mapping of some of them.
+
+    Raises ValueError for an effect or a parameter that does not exist.
+    """
+    form = FORMS.get(name)
+    if form is None:
+        raise ValueError(f"no effect {name}; there are {', '.join(sorted(FORMS))}")
+    full = form.typical(motor)
+    if size is None:
+        return full
+    given: Mapping[str, float] = size if isinstance(size, Mapping) else {"size": float(size)}
+    strange = set(given) - set(full)
+    if strange:
+        raise ValueError(
+            f"{name} has no parameter {', '.join(sorted(strange))}; it has {', '.join(full)}"
+        )
+    return {**full, **{key: float(value) for key, value in given.items()}}
+
+
+def active(motor: Motor) -> dict[str, dict[str, float]]:
+    """The effects of a motor with every parameter, those that every motor has included."""
+    named: dict[str, Size | None] = dict.fromkeys(ALWAYS)
+    named.update(motor.effects)
+    return {name: parameters(name, motor, size) for name, size in named.items()}

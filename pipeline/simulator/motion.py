@@ -1,0 +1,254 @@
+"""Mechanics and heat of the motor, compiled: friction, coupling, coasting, thermal network."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipeline.simulator.field import cogging
+from pipeline.simulator.plant import Plant
+
+TURN = 2.0 * math.pi
+
+
+@njit(cache=True)
+def grip(omega: float, torque: float, flux_ratio: float, p: Plant) -> float:
+    """Size of the friction that opposes the direction of motion [N·m]."""
+    size = p.coulomb + p.load_friction * abs(torque)
+    if p.stribeck != 0.0:
+        size += p.stribeck / (1.0 + (omega / p.stribeck_w) ** 2)
+    if p.hysteresis != 0.0:
+        size += p.hysteresis * flux_ratio**1.6
+    return float(size)
+
+
+@njit(cache=True)
+def fluid(omega: float, flux_ratio: float, p: Plant) -> float:
+    """Friction that grows with speed: viscous, windage, eddy currents [N·m]."""
+    drag = p.b_visc * omega
+    if p.windage != 0.0:
+        u = abs(omega) / p.omega_rated
+        drag += math.copysign(p.windage * u**p.windage_exponent, omega)
+    if p.eddy != 0.0:
+        drag += p.eddy * omega * flux_ratio * flux_ratio / (1.0 + (omega / p.eddy_knee) ** 2)
+    return float(drag)
+
+
+@njit(cache=True)
+def direction(omega: float, bristle: float, p: Plant) -> float:
+    """Sense of the friction, -1 to 1: a narrow tanh of speed, or the bristle's deflection."""
+    if p.bristle > 0.0:
+        return float(bristle / p.bristle)
+    return math.tanh(omega / p.omega_eps)
+
+
+@njit(cache=True)
+def bristle_after(bristle: float, travel: float, p: Plant) -> float:
+    """Bristle deflection after a travel, dz = dx (1 - sign(dx) z/z0), solved exactly [rad]."""
+    if p.bristle <= 0.0 or travel == 0.0:
+        return bristle
+    end = math.copysign(p.bristle, travel)
+    return end + (bristle - end) * math.exp(-abs(travel) / p.bristle)
+
+
+@njit(cache=True)
+def coupling(twist: float, rate: float, p: Plant) -> float:
+    """Torque through the coupling, zero inside the gap; it never pulls the gap shut [N·m]."""
+    if twist > p.half_gap:
+        return float(max(0.0, p.stiffness * (twist - p.half_gap) + p.damping * rate))
+    if twist < -p.half_gap:
+        return float(min(0.0, p.stiffness * (twist + p.half_gap) + p.damping * rate))
+    return 0.0
+
+
+@njit(cache=True)
+def lookup(x: float, xs: NDArray[np.float64], ys: NDArray[np.float64], n: int) -> float:
+    """Linear table, constant outside."""
+    if x <= xs[0]:
+        return float(ys[0])
+    if x >= xs[n - 1]:
+        return float(ys[n - 1])
+    low, high = 0, n - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if xs[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    share = (x - xs[low]) / (xs[high] - xs[low])
+    return float(ys[low] + share * (ys[high] - ys[low]))
+
+
+@njit(cache=True)
+def variable(
+    code: int, omega: float, theta: float, i_d: float, i_q: float, t_w: float, t_m: float, p: Plant
+) -> float:
+    """The value of one of `design.EXTRA_VARIABLES`."""
+    values = (
+        1.0,
+        omega,
+        theta % TURN,
+        (p.pole_pairs * theta) % TURN,
+        i_d,
+        i_q,
+        math.hypot(i_d, i_q),
+        t_w,
+        t_m,
+    )
+    return float(values[code])
+
+
+@njit(cache=True)
+def extra(
+    signal: int,
+    omega: float,
+    theta: float,
+    i_d: float,
+    i_q: float,
+    t_w: float,
+    t_m: float,
+    p: Plant,
+) -> float:
+    """Sum of the extra terms that enter one signal."""
+    total = 0.0
+    for k in range(p.extras):
+        if p.extra_signal[k] == signal:
+            x = variable(p.extra_variable[k], omega, theta, i_d, i_q, t_w, t_m, p)
+            times = variable(p.extra_times[k], omega, theta, i_d, i_q, t_w, t_m, p)
+            total += times * lookup(x, p.extra_x[k], p.extra_y[k], p.extra_points[k])
+    return total
+
+
+@njit(cache=True)
+def passive(
+    theta: float, omega: float, bristle: float, torque: float, flux_ratio: float, p: Plant
+) -> float:
+    """Torque on the rotor from everything but the windings: cogging, weight, friction [N·m]."""
+    total = -fluid(omega, flux_ratio, p)
+    total -= grip(omega, torque, flux_ratio, p) * direction(omega, bristle, p)
+    if p.lines > 0:
+        total += cogging(theta, p)
+    if p.unbalance != 0.0:
+        total += p.unbalance * math.sin(theta + p.unbalance_phase)
+    return total
+
+
+@njit(cache=True)
+def free_torque(theta: float, omega: float, bristle: float, t_m: float, p: Plant) -> float:
+    """Torque on an open-circuit rotor [N·m]."""
+    ratio = 1.0 + p.alpha_magnet * (t_m - 25.0)
+    total = passive(theta, omega, bristle, 0.0, ratio, p)
+    if p.extras > 0:
+        total += extra(0, omega, theta, 0.0, 0.0, t_m, t_m, p)
+    return total
+
+
+@njit(cache=True)
+def free_rates(
+    theta: float, omega: float, far: float, far_omega: float, bristle: float, t_m: float, p: Plant
+) -> tuple[float, float]:
+    """Accelerations of rotor and far mass of an open-circuit motor [rad/s²]."""
+    torque = free_torque(theta, omega, bristle, t_m, p)
+    if not p.two_mass:
+        return torque / p.j_rotor, 0.0
+    through = coupling(theta - far, omega - far_omega, p)
+    return (torque - through) / p.j_rotor, through / p.j_load
+
+
+@njit(cache=True)
+def coast(
+    theta: float, omega: float, step_s: float, substeps: int, count: int, t_m: float, p: Plant
+) -> NDArray[np.float64]:
+    """Angle and speed [count, 2] of a coasting rotor with open terminals, RK4."""
+    out = np.empty((count, 2))
+    h = step_s / substeps
+    far, far_omega = theta, omega
+    bristle = math.copysign(p.bristle, omega)
+    for k in range(count):
+        out[k, 0], out[k, 1] = theta, omega
+        for _ in range(substeps):
+            a1, b1 = free_rates(theta, omega, far, far_omega, bristle, t_m, p)
+            w2, f2 = omega + 0.5 * h * a1, far_omega + 0.5 * h * b1
+            a2, b2 = free_rates(
+                theta + 0.5 * h * omega, w2, far + 0.5 * h * far_omega, f2, bristle, t_m, p
+            )
+            w3, f3 = omega + 0.5 * h * a2, far_omega + 0.5 * h * b2
+            a3, b3 = free_rates(theta + 0.5 * h * w2, w3, far + 0.5 * h * f2, f3, bristle, t_m, p)
+            w4, f4 = omega + h * a3, far_omega + h * b3
+            a4, b4 = free_rates(theta + h * w3, w4, far + h * f3, f4, bristle, t_m, p)
+            travel = h * (omega + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
+            theta += travel
+            far += h * (far_omega + 2.0 * f2 + 2.0 * f3 + f4) / 6.0
+            omega += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+            far_omega += h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
+            bristle = bristle_after(bristle, travel, p)
+    return out
+
+
+@njit(cache=True)
+def turned(
+    theta: NDArray[np.float64], omega: NDArray[np.float64], t_m: float, p: Plant
+) -> NDArray[np.float64]:
+    """Shaft torque [n] of an open-circuit motor that a drive turns slowly and steadily."""
+    out = np.empty(theta.size)
+    bristle = math.copysign(p.bristle, omega[0])
+    for k in range(theta.size):
+        if k > 0:
+            bristle = bristle_after(bristle, theta[k] - theta[k - 1], p)
+        out[k] = free_torque(theta[k], omega[k], bristle, t_m, p)
+    return out
+
+
+@njit(cache=True)
+def heat(
+    t_w: float, t_m: float, watt: float, ambient: float, h: float, p: Plant
+) -> tuple[float, float]:
+    """Winding and magnet temperature a time h later, midpoint rule [degC]."""
+    across = (t_w - t_m) / p.rth_wm
+    rate_w = (watt - across - (t_w - ambient) / p.rth_wa) / p.cth_w
+    rate_m = (across - (t_m - ambient) / p.rth_ma) / p.cth_m
+    mid_w, mid_m = t_w + 0.5 * h * rate_w, t_m + 0.5 * h * rate_m
+    across = (mid_w - mid_m) / p.rth_wm
+    t_w += h * (watt - across - (mid_w - ambient) / p.rth_wa) / p.cth_w
+    t_m += h * (across - (mid_m - ambient) / p.rth_ma) / p.cth_m
+    return t_w, t_m
+
+
+@njit(cache=True)
+def warmed(
+    watt_25: NDArray[np.float64], start: tuple[float, float], ambient: float, h: float, p: Plant
+) -> NDArray[np.float64]:
+    """Temperatures [n, 2] of winding and magnet under copper losses [n] stated at 25 degC."""
+    out = np.empty((watt_25.size, 2))
+    t_w, t_m = start
+    for k in range(watt_25.size):
+        out[k, 0], out[k, 1] = t_w, t_m
+        watt = watt_25[k] * (1.0 + p.alpha_copper * (t_w - 25.0))
+        t_w, t_m = heat(t_w, t_m, watt, ambient, h, p)
+    return out
+
+
+@njit(cache=True)
+def lagged(x: NDArray[np.float64], blend: float) -> NDArray[np.float64]:
+    """First-order lag [n] that starts settled: y += blend (x - y)."""
+    out = np.empty(x.size)
+    y = x[0] if x.size else 0.0
+    for k in range(x.size):
+        y += blend * (x[k] - y)
+        out[k] = y
+    return out
+
+
+@njit(cache=True)
+def passives(
+    theta: NDArray[np.float64], omega: NDArray[np.float64], torque: NDArray[np.float64], p: Plant
+) -> NDArray[np.float64]:
+    """Torque [n] of everything but the windings in steady creep, bristle fully bent."""
+    out = np.empty(theta.size)
+    for k in range(theta.size):
+        bristle = math.copysign(p.bristle, omega[k])
+        out[k] = passive(theta[k], omega[k], bristle, torque[k], 1.0, p)
+    return out

@@ -1,0 +1,173 @@
+"""What the instruments make of the truth: gains, faults, noise, resolution, drift, hum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulator.design import Bench, Instruments, Motor
+from pipeline.simulator.effects import active
+from pipeline.simulator.plant import Plant
+
+Array = NDArray[np.float64]
+TEMPERATURE_STEP_DEGC = 2.0**-6
+
+
+def grid(span: float, bits: int) -> float:
+    """Resolution of a converter over a span: a power of two, so that values are exact."""
+    return float(2.0 ** math.floor(math.log2(span / 2.0**bits)))
+
+
+def to_grid(values: Array, step: float) -> Array:
+    """Values rounded to a resolution."""
+    rounded: Array = np.round(values / step) * step
+    return rounded
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """One motor on one station with its instruments as they really are, and its randomness."""
+
+    motor: Motor
+    plant: Plant
+    bench: Bench
+    instruments: Instruments
+    rng: np.random.Generator
+
+    def fault(self, name: str, key: str = "size") -> float:
+        """Parameter of a sensor effect, 0 where the effect is absent."""
+        return active(self.motor).get(name, {}).get(key, 0.0)
+
+    def noise(self, n: int, sigma: float, t_s: Array | None = None) -> Array:
+        """White noise [n] of one channel, with the station's drift and mains pick-up on top."""
+        bench = self.bench
+        sigma = sigma * bench.noise_scale
+        out = sigma * self.rng.standard_normal(n)
+        if bench.drift_rel > 0.0 and n > 1:
+            walk = np.cumsum(self.rng.standard_normal(n)) / math.sqrt(n)
+            out += bench.drift_rel * sigma * walk
+        if bench.hum_rel > 0.0 and t_s is not None:
+            phase = self.rng.uniform(0.0, 2.0 * math.pi)
+            out += bench.hum_rel * sigma * np.sin(2.0 * math.pi * bench.hum_hz * t_s + phase)
+        return out
+
+    @property
+    def current_step_a(self) -> float:
+        """Resolution of a current channel, over plus and minus 2.5 rated currents [A]."""
+        return grid(5.0 * self.motor.current_rated_a, self.bench.adc_bits)
+
+    @property
+    def voltage_step_v(self) -> float:
+        """Resolution of a voltage channel, over plus and minus twice the link [V]."""
+        return grid(4.0 * self.motor.vdc_v, self.bench.adc_bits)
+
+    @property
+    def current_sigma_a(self) -> float:
+        """Noise of a current channel [A]."""
+        return self.bench.current_noise_rel * self.motor.current_rated_a
+
+    def phase_gain(self, phase: int) -> float:
+        """Gain of one phase's current sensor: station, common fault, its own fault."""
+        gain = self.instruments.current * (1.0 + self.fault("current_scale"))
+        if int(self.fault("current_gain", "phase")) == phase:
+            gain *= 1.0 + self.fault("current_gain")
+        return gain
+
+    def phase_offset_a(self, phase: int) -> float:
+        """Offset of one phase's current sensor [A]."""
+        if int(self.fault("current_offset", "phase")) == phase:
+            return self.fault("current_offset")
+        return 0.0
+
+    def clock(self, n: int, rate_hz: float) -> tuple[Array, Array]:
+        """Sampling instants and the stamps written for them [n each, s]."""
+        t_s = np.arange(n) / rate_hz
+        if self.bench.jitter_s <= 0.0:
+            return t_s, t_s
+        limit = 0.45 / rate_hz
+        scatter = self.bench.jitter_s * self.rng.standard_normal(n)
+        return t_s, t_s + np.clip(scatter, -limit, limit)
+
+    def line_current(self, i_a: Array, phase: int, t_s: Array) -> Array:
+        """A line current [n] as measured."""
+        delay = self.fault("current_delay")
+        late = np.interp(t_s - delay, t_s, i_a) if delay > 0.0 else i_a
+        seen = self.phase_gain(phase) * late + self.phase_offset_a(phase)
+        return to_grid(seen + self.noise(i_a.size, self.current_sigma_a, t_s), self.current_step_a)
+
+    def voltage(self, v: Array, t_s: Array) -> Array:
+        """A measured voltage [n]."""
+        gain = self.instruments.voltage * (1.0 + self.fault("voltage_scale"))
+        sigma = self.bench.voltage_noise_rel * self.motor.vdc_v
+        return to_grid(gain * v + self.noise(v.size, sigma, t_s), self.voltage_step_v)
+
+    def angle(self, theta: Array) -> Array:
+        """Mechanical angle [n] by the encoder, with its faults."""
+        bench = self.bench
+        seen = theta + self.fault("angle_offset") / self.motor.pole_pairs
+        wobble = self.fault("angle_eccentricity")
+        if wobble != 0.0:
+            seen = seen + wobble * np.sin(theta + self.fault("angle_eccentricity", "phase_rad"))
+        if bench.encoder_noise_rad > 0.0:
+            seen = seen + self.noise(theta.size, bench.encoder_noise_rad)
+        return to_grid(seen, 2.0 * math.pi / 2.0**bench.encoder_bits)
+
+    def speed(self, omega: Array, rate_hz: float) -> Array:
+        """The bench's own speed estimate [n]: it lags and is noisy."""
+        from pipeline.simulator.motion import lagged
+
+        rated = self.motor.speed_rated_rad_s
+        lag = self.bench.speed_lag_s
+        blend = 1.0 - math.exp(-1.0 / (rate_hz * lag)) if lag > 0.0 else 1.0
+        seen = lagged(np.ascontiguousarray(omega), blend)
+        seen = seen + self.noise(omega.size, self.bench.speed_noise_rel * rated)
+        return to_grid(seen, grid(rated, 17))
+
+    def torque(self, torque: Array, t_s: Array) -> Array:
+        """Shaft torque [n] by the transducer, with lag, gain, offset."""
+        from pipeline.simulator.motion import lagged
+
+        lag = self.fault("torque_lag")
+        if lag > 0.0 and torque.size > 1:
+            blend = 1.0 - math.exp(-(t_s[1] - t_s[0]) / lag)
+            torque = lagged(np.ascontiguousarray(torque), blend)
+        gain = self.instruments.torque * (1.0 + self.fault("torque_scale"))
+        sigma = self.bench.torque_noise_rel * self.motor.torque_rated_nm
+        seen = gain * torque + self.fault("torque_offset") + self.noise(torque.size, sigma, t_s)
+        return to_grid(seen, grid(8.0 * self.motor.torque_rated_nm, self.bench.adc_bits))
+
+    def temperature(self, degc: Array) -> Array:
+        """A thermometer [n] with its offset."""
+        seen = degc + self.instruments.temperature_degc
+        seen = seen + self.noise(degc.size, self.bench.temperature_noise_degc)
+        return to_grid(seen, TEMPERATURE_STEP_DEGC)
+
+    def meta(self, test: str, **further: str) -> dict[str, str]:
+        """Metadata of one capture, in the contract's words."""
+        motor, bench = self.motor, self.bench
+        words = {
+            "contract": "1",
+            "motor_id": motor.motor_id,
+            "motor_type": motor.motor_type,
+            "lot": motor.lot,
+            "station": bench.station,
+            "operator": bench.operator,
+            "started_at": bench.started_at,
+            "test": test,
+            "winding": motor.winding,
+            "pole_pairs": str(motor.pole_pairs),
+            "slots": str(motor.slots),
+            "ambient_degc": repr(motor.ambient_degc),
+            "voltage_kind": "measured",
+            "voltage_timing": "instant",
+            "pwm_hz": f"{bench.pwm_hz:g}",
+            "vdc_v": f"{motor.vdc_v:g}",
+            "u_rel_current": f"{bench.u_rel_current:g}",
+            "u_rel_voltage": f"{bench.u_rel_voltage:g}",
+            "u_rel_torque": f"{bench.u_rel_torque:g}",
+            "u_temp_degc": f"{bench.u_temp_degc:g}",
+        }
+        return {**words, **further, **motor.nameplate}
