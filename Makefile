@@ -1,0 +1,42 @@
+# Needs python3 (3.11 to 3.13) and make; everything else comes from requirements.lock into .venv.
+VENV := .venv
+PY := $(VENV)/bin/python
+READY := $(VENV)/requirements.lock
+export OPENBLAS_NUM_THREADS := 1
+
+.PHONY: demo test test-slow lint recovery lock clean help
+
+help:
+	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
+	@echo "make test      the default tests"
+	@echo "make test-slow the long sweeps as well"
+	@echo "make lint      style, types, import direction"
+	@echo "make lock      resolve requirements.lock anew (needs uv)"
+	@echo "make clean     remove .venv and caches"
+
+demo: $(READY)
+	$(PY) -m pipeline run input=data/demo output=reports/demo
+
+test: $(READY)
+	$(PY) -m pytest -n logical --dist loadfile
+
+test-slow: $(READY)
+	$(PY) -m pytest -n logical --dist loadfile -m "slow or not slow"
+
+lint: $(READY)
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
+
+# The copy of the lock in .venv is the proof of what is installed: same content, nothing to do.
+$(READY): requirements.lock
+	@if cmp -s requirements.lock $@; then touch $@; else ./.ci/environment $(VENV); fi
+
+lock:
+	uv pip compile pyproject.toml --group dev --universal --python-version 3.11 \
+	  --fork-strategy fewest --generate-hashes --no-annotate --no-header \
+	  --no-emit-index-url --no-emit-find-links --output-file requirements.lock --quiet
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
