@@ -1,0 +1,280 @@
+"""Current of a locked machine under voltage levels, and its fit to many captures at once.
+
+    dI/dt = (v - R I)/L(I)
+    L(I)  = 2 [cos²g Ld(i_d) + sin²g Lq(i_q)],  i_d + j i_q = (2/√3) I e^{jg}
+
+g is the angle from the d axis to the pair's current. Ld and Lq are incremental and saturate as
+L0/(1 + a i + b i²), on q with |i|, for there both senses are alike. Every step of the integration
+is an exact exponential with L frozen at its midpoint: exact for a constant L, else second order.
+
+References: IEEE Std 1812-2014, 8 (step response at standstill); Hairer, Norsett and Wanner,
+Solving Ordinary Differential Equations I, II.1 (midpoint rule).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.fit.step_record import StepRecord
+
+Array = NDArray[np.float64]
+SHARED = ("ld_h", "d_odd", "d_even", "lq_h", "q_odd", "q_even")
+SPACE = 2.0 / math.sqrt(3.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the parameters sit: six shared ones, then each capture's own.
+
+    Own ones in order: R, current offset where the voltage has two levels or more, the edges to
+    place, the first current where the capture starts unsettled, the inverter's drop where
+    commanded.
+    """
+
+    starts: tuple[int, ...]
+    sizes: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """How many parameters in all."""
+        return self.starts[-1] + self.sizes[-1]
+
+
+def layout_of(records: Sequence[StepRecord]) -> Layout:
+    """The layout for these captures."""
+    sizes = [
+        1 + (r.wave.levels_v.size > 1) + len(r.wave.free) + (not r.starts_settled) + r.commanded
+        for r in records
+    ]
+    starts = np.cumsum([len(SHARED), *sizes[:-1]])
+    return Layout(tuple(int(s) for s in starts), tuple(sizes))
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """One capture's own parameters for m variants at once [m each]; edges are [m, s + 1]."""
+
+    r_ohm: Array
+    offset_a: Array
+    edges_s: Array
+    first_a: Array
+    drop_v: Array
+
+
+def unpack(record: StepRecord, own: Array) -> Own:
+    """The own parameters of a capture from their columns [m, size]."""
+    count = own.shape[0]
+    at = 1
+    offset = np.zeros(count)
+    if record.wave.levels_v.size > 1:
+        offset, at = own[:, at], at + 1
+    edges = np.tile(record.wave.edges_s, (count, 1))
+    for index in record.wave.free:
+        edges[:, index] = record.wave.edges_s[index] + own[:, at] * record.wave.period_s
+        at += 1
+    first = record.wave.levels_v[0] / own[:, 0]
+    if not record.starts_settled:
+        first, at = own[:, at], at + 1
+    drop = own[:, at] if record.commanded else np.zeros(count)
+    return Own(own[:, 0], offset, edges, first, drop)
+
+
+def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
+    """Starting values: the integrated form's L split over the axes, its R; no saturation."""
+    cos2 = np.array([math.cos(r.axis_rad) ** 2 for r in records])
+    mixing = 2.0 * np.column_stack([cos2, 1.0 - cos2])
+    l_total = np.array([r.l_start_h for r in records])
+    ridge = 1e-3 * np.eye(2)
+    both = np.linalg.solve(
+        mixing.T @ mixing + ridge, mixing.T @ l_total + ridge.sum(0) * l_total.mean() / 2
+    )
+    start = np.zeros(layout.size)
+    start[[0, 3]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
+    for record, at in zip(records, layout.starts, strict=True):
+        start[at] = record.r_start_ohm
+    return start
+
+
+def inductance(shared: Array, cos_g: Array, current_a: Array) -> Array:
+    """Incremental inductance [m] between the terminals; shared [m, 6], cos_g and current [m]."""
+    sin2 = 1.0 - cos_g**2
+    i_d = SPACE * cos_g * current_a
+    i_q = SPACE * np.sqrt(sin2) * np.abs(current_a)
+    d_part = shared[:, 0] / np.maximum(1.0 + i_d * (shared[:, 1] + shared[:, 2] * i_d), 0.05)
+    q_part = shared[:, 3] / np.maximum(1.0 + i_q * (shared[:, 4] + shared[:, 5] * i_q), 0.05)
+    total: Array = 2.0 * (cos_g**2 * d_part + sin2 * q_part)
+    return total
+
+
+def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
+    """Segment of each integration step and the shares of the segment where it begins and ends."""
+    tau = record.l_start_h / record.r_start_ohm
+    segments, begin, end = [], [], []
+    sampled = record.wave.levels_v.size > 20
+    for index, length in enumerate(np.diff(record.wave.edges_s)):
+        if sampled:
+            nodes = np.array([0.0, 1.0])
+        else:
+            reach = min(8.0 * tau, length)
+            fine = np.linspace(0.0, reach, max(int(reach / tau * 12), 4) + 1)
+            coarse = np.linspace(reach, length, 8)[1:] if length > reach else np.zeros(0)
+            nodes = np.concatenate([fine, coarse]) / length
+            nodes[-1] = 1.0
+        segments += [index] * (nodes.size - 1)
+        begin.append(nodes[:-1])
+        end.append(nodes[1:])
+    return np.array(segments, dtype=np.intp), np.concatenate(begin), np.concatenate(end)
+
+
+class StepModel:
+    """Predicts the current of every capture for every variant of the parameters in one sweep."""
+
+    def __init__(self, records: Sequence[StepRecord]) -> None:
+        self.records = tuple(records)
+        self.layout = layout_of(records)
+        self._grids = [_steps(record) for record in records]
+        self._count = max(grid[0].size for grid in self._grids)
+
+    def predict(self, variants: Sequence[Array]) -> list[Array]:
+        """Currents [n, m] of each capture; variants[c] [m, size] are full parameter vectors."""
+        shared, cos_g, width, volts, own = [], [], [], [], []
+        for record, grid, rows, at, size in zip(
+            self.records,
+            self._grids,
+            variants,
+            self.layout.starts,
+            self.layout.sizes,
+            strict=True,
+        ):
+            mine = unpack(record, rows[:, at : at + size])
+            segment, begin, end = grid
+            lengths = np.diff(mine.edges_s, axis=1)[:, segment]
+            pad = self._count - segment.size
+            width.append(np.pad(lengths * (end - begin), ((0, 0), (0, pad))))
+            levels = np.pad(record.wave.levels_v[segment], (0, pad), mode="edge")
+            volts.append(np.broadcast_to(levels, (rows.shape[0], self._count)))
+            shared.append(rows[:, : len(SHARED)])
+            cos_g.append(np.full(rows.shape[0], math.cos(record.axis_rad)))
+            own.append(mine)
+        nodes, l_mid, target = self._sweep(
+            np.vstack(shared),
+            np.concatenate(cos_g),
+            np.vstack(width).T.copy(),
+            np.vstack(volts).T.copy(),
+            own,
+        )
+        currents, first = [], 0
+        for record, grid, mine in zip(self.records, self._grids, own, strict=True):
+            block = slice(first, first + mine.r_ohm.size)
+            trace = (nodes[:, block], l_mid[:, block], target[:, block])
+            currents.append(_at_samples(record, grid, mine, trace))
+            first += mine.r_ohm.size
+        return currents
+
+    def _sweep(
+        self, shared: Array, cos_g: Array, width: Array, volts: Array, own: Sequence[Own]
+    ) -> tuple[Array, Array, Array]:
+        """Currents at the nodes [k + 1, m]; inductance and final current of each step [k, m]."""
+        r = np.concatenate([o.r_ohm for o in own])
+        drop = np.concatenate([o.drop_v for o in own])
+        knee = np.concatenate(
+            [
+                np.full(o.r_ohm.size, 0.02 * c.largest_a)
+                for o, c in zip(own, self.records, strict=True)
+            ]
+        )
+        current = np.concatenate([o.first_a for o in own])
+        nodes = np.empty((self._count + 1, r.size))
+        l_mid, target = np.empty((self._count, r.size)), np.empty((self._count, r.size))
+        nodes[0] = current
+        dropping = bool(np.any(drop))
+        for k in range(self._count):
+            goal = volts[k] / r
+            if dropping:
+                goal = goal - drop / r * np.clip(current / knee, -1.0, 1.0)
+            here = inductance(shared, cos_g, current)
+            half = goal + (current - goal) * np.exp(-0.5 * width[k] * r / here)
+            here = inductance(shared, cos_g, half)
+            current = goal + (current - goal) * np.exp(-width[k] * r / here)
+            nodes[k + 1], l_mid[k], target[k] = current, here, goal
+        return nodes, l_mid, target
+
+    def residuals(
+        self, parameters: Array, sigmas: Sequence[float], jacobian: NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """Weighted residuals [n] and their Jacobian [n, k] over the parameters that are free.
+
+        One-sided differences of width 1e-6 of each parameter's natural scale.
+        """
+        widths = self._widths(parameters)
+        free = np.flatnonzero(jacobian)
+        columns = [self._columns_of(c, free) for c in range(len(self.records))]
+        variants = []
+        for mine in columns:
+            rows = np.tile(parameters, (mine.size + 1, 1))
+            rows[np.arange(1, mine.size + 1), mine] += widths[mine]
+            variants.append(rows)
+        blocks, slopes = [], []
+        for c, current in enumerate(self.predict(variants)):
+            record, mine = self.records[c], columns[c]
+            weight = np.sqrt(record.count) / sigmas[c]
+            blocks.append((current[:, 0] - record.i_a) * weight)
+            slope = np.zeros((record.i_a.size, free.size))
+            place = np.searchsorted(free, mine)
+            slope[:, place] = (current[:, 1:] - current[:, :1]) / widths[mine] * weight[:, None]
+            slopes.append(slope)
+        return np.concatenate(blocks), np.vstack(slopes)
+
+    def _columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:
+        start, size = self.layout.starts[capture], self.layout.sizes[capture]
+        own = (free >= start) & (free < start + size)
+        return free[own | (free < len(SHARED))]
+
+    def _widths(self, parameters: Array) -> Array:
+        largest = SPACE * max(record.largest_a for record in self.records)
+        widths = np.empty(parameters.size)
+        widths[:6] = 1e-6 * np.array(
+            [
+                parameters[0],
+                1.0 / largest,
+                1.0 / largest**2,
+                parameters[3],
+                1.0 / largest,
+                1.0 / largest**2,
+            ]
+        )
+        for record, at, size in zip(
+            self.records, self.layout.starts, self.layout.sizes, strict=True
+        ):
+            widths[at] = 1e-6 * parameters[at]
+            widths[at + 1 : at + size] = 1e-5 * max(record.largest_a, 1e-9)
+            shift = 2 if record.wave.levels_v.size > 1 else 1
+            widths[at + shift : at + shift + len(record.wave.free)] = 1e-4
+            if record.commanded:
+                widths[at + size - 1] = 1e-5 * record.largest_a * parameters[at]
+        return widths
+
+
+def _at_samples(
+    record: StepRecord,
+    grid: tuple[NDArray[np.intp], Array, Array],
+    own: Own,
+    trace: tuple[Array, Array, Array],
+) -> Array:
+    """Current [n, m] at the record's times, by the exact step from the node before each."""
+    segment, begin, _ = grid
+    nodes, l_mid, target = trace
+    currents = np.empty((record.t_s.size, own.r_ohm.size))
+    lengths = np.diff(own.edges_s, axis=1)
+    for column in range(own.r_ohm.size):
+        starts = own.edges_s[column, segment] + begin * lengths[column, segment]
+        index = np.clip(np.searchsorted(starts, record.t_s, side="right") - 1, 0, segment.size - 1)
+        goal = target[index, column]
+        decay = np.exp(-(record.t_s - starts[index]) * own.r_ohm[column] / l_mid[index, column])
+        currents[:, column] = goal + (nodes[index, column] - goal) * decay + own.offset_a[column]
+    return currents
