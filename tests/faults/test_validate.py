@@ -524,10 +524,11 @@ def test_currents_that_do_not_sum_to_zero(rng: np.random.Generator) -> None:
     assert validate(_three_currents(healthy, 1.0), {})[1] == ()
     _, finding = warned(_three_currents(healthy, 1.05))
     assert finding.code == "current_sum"
-    share = 0.05 / np.sqrt(3.0)
-    assert float(finding.message.split(" is ")[1].split(" %")[0]) == pytest.approx(
-        100.0 * share, rel=0.02
-    )
+    table = _three_currents(healthy, 1.05).tables[0]
+    power = sum(np.mean(table[n].to_numpy() ** 2) for n in ("ia_a", "ib_a", "ic_a"))
+    stray = np.sqrt(np.mean((table["ic_a"].to_numpy() * 0.05 / 1.05) ** 2) / power)
+    stated = float(finding.message.split(" is ")[1].split(" %")[0])
+    assert stated == pytest.approx(100.0 * stray, rel=0.01)
     assert refused(_three_currents(healthy, -1.0)).code == "current_sum"
 
 

@@ -1,0 +1,37 @@
+"""`schemas`: writes the JSON Schemas and the glossary page that the repository carries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pipeline
+from pipeline.contracts.glossary_page import glossary_page
+from pipeline.contracts.json_schema import build_schemas
+from pipeline.io.publish import canonical_json, write_whole
+from pipeline.records.errors import UsageError
+from pipeline.records.outcome import Outcome
+from pipeline.settings import Settings
+
+SCHEMA_FOLDER = "pipeline/contracts/json"
+GLOSSARY_PAGE = "docs/glossary.md"
+
+
+def build() -> dict[str, bytes]:
+    """Every file that is built from the glossary: its path in the repository, its content."""
+    files = {
+        f"{SCHEMA_FOLDER}/{stem}.schema.json": canonical_json(schema)
+        for stem, schema in build_schemas().items()
+    }
+    return files | {GLOSSARY_PAGE: glossary_page().encode()}
+
+
+def main(settings: Settings) -> Outcome:
+    """Writes every built file into the checkout; raises UsageError where there is none."""
+    del settings
+    root = Path(pipeline.__file__).parent.parent
+    if not (root / "pyproject.toml").is_file():
+        raise UsageError("schemas are written into a checkout", "run it from a clone")
+    files = build()
+    for name, content in files.items():
+        write_whole(root / name, content)
+    return Outcome(text="\n".join(files))
