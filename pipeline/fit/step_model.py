@@ -4,7 +4,7 @@
     L(I)  = 2 [cos²g Ld(i_d) + sin²g Lq(i_q)],  i_d + j i_q = (2/√3) I e^{jg}
 
 g is the angle from the d axis to the pair's current. Ld and Lq are incremental and saturate as
-L0/(1 + a i + b i²), on q with |i|, for there both senses are alike. Every step of the integration
+L0/(1 + a i + b i² + c i⁴), on q with |i|, for there both senses are alike. Every integration step
 is an exact exponential with L frozen at its midpoint: exact for a constant L, else second order.
 
 References: IEEE Std 1812-2014, 8 (step response at standstill); Hairer, Norsett and Wanner,
@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from pipeline.fit.step_record import StepRecord
 
 Array = NDArray[np.float64]
-SHARED = ("ld_h", "d_odd", "d_even", "lq_h", "q_odd", "q_even")
+SHARED = ("ld_h", "d_1", "d_2", "d_4", "lq_h", "q_1", "q_2", "q_4")
+LD, LQ = 0, 4
 SPACE = 2.0 / math.sqrt(3.0)
 
 
@@ -94,21 +95,28 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
         mixing.T @ mixing + ridge, mixing.T @ l_total + ridge.sum(0) * l_total.mean() / 2
     )
     start = np.zeros(layout.size)
-    start[[0, 3]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
+    start[[LD, LQ]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
     for record, at in zip(records, layout.starts, strict=True):
         start[at] = record.r_start_ohm
     return start
 
 
 def inductance(shared: Array, cos_g: Array, current_a: Array) -> Array:
-    """Incremental inductance [m] between the terminals; shared [m, 6], cos_g and current [m]."""
+    """Incremental inductance [m] between the terminals; shared [m, 8], cos_g and current [m]."""
     sin2 = 1.0 - cos_g**2
     i_d = SPACE * cos_g * current_a
     i_q = SPACE * np.sqrt(sin2) * np.abs(current_a)
-    d_part = shared[:, 0] / np.maximum(1.0 + i_d * (shared[:, 1] + shared[:, 2] * i_d), 0.05)
-    q_part = shared[:, 3] / np.maximum(1.0 + i_q * (shared[:, 4] + shared[:, 5] * i_q), 0.05)
+    d_part = shared[:, LD] / _bend(shared[:, LD + 1 : LD + 4], i_d)
+    q_part = shared[:, LQ] / _bend(shared[:, LQ + 1 : LQ + 4], i_q)
     total: Array = 2.0 * (cos_g**2 * d_part + sin2 * q_part)
     return total
+
+
+def _bend(terms: Array, current_a: Array) -> Array:
+    """L0/L [m] at an axis current [m], kept above 1/20."""
+    square = current_a * current_a
+    bend: Array = 1.0 + current_a * terms[:, 0] + square * (terms[:, 1] + square * terms[:, 2])
+    return np.maximum(bend, 0.05)
 
 
 def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
@@ -238,16 +246,10 @@ class StepModel:
     def _widths(self, parameters: Array) -> Array:
         largest = SPACE * max(record.largest_a for record in self.records)
         widths = np.empty(parameters.size)
-        widths[:6] = 1e-6 * np.array(
-            [
-                parameters[0],
-                1.0 / largest,
-                1.0 / largest**2,
-                parameters[3],
-                1.0 / largest,
-                1.0 / largest**2,
-            ]
-        )
+        powers = largest ** -np.array([0.0, 1.0, 2.0, 4.0])
+        widths[LD : LD + 4] = 1e-6 * powers
+        widths[LQ : LQ + 4] = 1e-6 * powers
+        widths[[LD, LQ]] *= parameters[[LD, LQ]]
         for record, at, size in zip(
             self.records, self.layout.starts, self.layout.sizes, strict=True
         ):

@@ -54,6 +54,7 @@ class StepRecord:
     r_start_ohm: float
     commanded: bool
     starts_settled: bool
+    sigma_a: float
 
     @property
     def largest_a(self) -> float:
@@ -102,6 +103,7 @@ def read_step(capture: Capture) -> StepRecord | None:
         resistance,
         capture.meta.voltage_kind == "commanded",
         bool(wave.levels_v.size <= MOST_EDGES + 1 and first >= 5.0 * wave.period_s),
+        max(sigma_i, 1e-6 * float(np.ptp(i))),
     )
 
 

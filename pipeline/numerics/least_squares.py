@@ -138,12 +138,12 @@ def gauss_newton(
     low: Array | None = None,
     high: Array | None = None,
     iterations: int = 40,
-    tolerance: float = 1e-9,
+    tolerance: float = 1e-5,
 ) -> NonlinearFit:
     """Minimises sum r² from `start`, r already divided by its sigma; bounds are kept by clipping.
 
     Levenberg-Marquardt with the diagonal's scaling. The covariance is (J'J)^-1 at the solution.
-    Converged where the step is below `tolerance` of the parameters' own uncertainty.
+    Converged where no step moves the prediction by more than `tolerance` of the residuals' rms.
     Reference: Nocedal and Wright, Numerical Optimization, 2nd ed., 10.3.
     """
     low = np.full(start.size, -np.inf) if low is None else low
@@ -159,15 +159,16 @@ def gauss_newton(
         step = _step(normal, gradient, damping, free) / scale
         trial = np.clip(x + step, low, high)
         moved = float(np.max(np.abs(trial - x) * scale))
+        enough = tolerance * math.sqrt(cost / max(residuals.size - x.size, 1))
         new_residuals, new_jacobian = residuals_and_jacobian(trial)
         new_cost = float(new_residuals @ new_residuals)
         if np.isfinite(new_cost) and new_cost <= cost * (1.0 + 1e-12):
             x, residuals, jacobian, cost = trial, new_residuals, new_jacobian, new_cost
             damping = 0.0 if damping < 1e-6 else damping * 0.1
-            if moved < max(tolerance * math.sqrt(cost), 1e-6):
+            if moved <= enough:
                 converged = True
                 break
-        elif moved < 1e-9 * math.sqrt(cost):
+        elif moved <= enough:
             converged = True
             break
         else:

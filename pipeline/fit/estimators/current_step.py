@@ -18,7 +18,7 @@ from pipeline.fit.instruments import (
     voltage_source,
 )
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.fit.step_model import SHARED, SPACE, StepModel, inductance, start_of
+from pipeline.fit.step_model import LD, LQ, SHARED, SPACE, StepModel, inductance, start_of
 from pipeline.fit.step_record import StepRecord, read_step
 from pipeline.numerics.least_squares import (
     NonlinearFit,
@@ -39,7 +39,7 @@ EXPERIMENT = (
     "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
     "and 60), both senses of current, two or more amplitudes"
 )
-AXES = {"ld_h": (0, (1, 2)), "lq_h": (3, (4, 5))}
+AXES = {"ld_h": (LD, (LD + 1, LD + 2, LD + 3)), "lq_h": (LQ, (LQ + 1, LQ + 2, LQ + 3))}
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -69,8 +69,8 @@ class Solution:
 def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Least squares of the simulated current on the measured one, all captures together.
 
-    First without saturation, then with all of it, then with those terms that the Bayesian
-    information criterion keeps; what the rejected ones would still change is in the uncertainty.
+    First with all terms of saturation, then with those that the Bayesian information criterion
+    keeps; what the rejected ones would still change is in the uncertainty.
     Gains scale v and i, and L with v/i. References: Schwarz, Ann. Statist. 6(2), 1978 (BIC);
     Hoeting et al., Statist. Sci. 14(4), 1999, eq. 5 (variance between models).
     """
@@ -124,19 +124,14 @@ def _axes_told(records: Sequence[StepRecord], least_share: float) -> tuple[str, 
 
 def _solve(model: StepModel, axes: Sequence[str]) -> tuple[Solution, Solution]:
     """The chosen fit, and the one with all saturation terms that it was chosen from."""
-    free = np.ones(model.layout.size, dtype=bool)
-    free[: len(SHARED)] = False
+    full = np.ones(model.layout.size, dtype=bool)
+    full[: len(SHARED)] = False
     for name in axes:
-        free[AXES[name][0]] = True
+        full[[AXES[name][0], *AXES[name][1]]] = True
     start = start_of(model.records, model.layout)
     if len(axes) == 1:
-        start[[0, 3]] = start[AXES[axes[0]][0]]
-    plain = _fit(model, start, free, [1.0] * len(model.records))
-    full = free.copy()
-    for name in axes:
-        full[list(AXES[name][1])] = True
-    rich = _fit(model, plain.parameters, full, plain.sigmas)
-    rich = _fit(model, rich.parameters, full, rich.sigmas)
+        start[[LD, LQ]] = start[AXES[axes[0]][0]]
+    rich = _fit(model, start, full, [record.sigma_a for record in model.records])
     chosen = full.copy()
     start = rich.parameters.copy()
     for name in axes:
@@ -158,9 +153,9 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -
         return model.residuals(trial, sigmas, free)
 
     low = np.full(where.size, -np.inf)
-    low[where == 0] = 1e-3 * start[0]
-    low[where == 3] = 1e-3 * start[3]
-    fit = gauss_newton(residuals_and_jacobian, start[where], low, iterations=25)
+    for place in (LD, LQ):
+        low[where == place] = 1e-3 * start[place]
+    fit = gauss_newton(residuals_and_jacobian, start[where], low, tolerance=1e-3)
     parameters = start.copy()
     parameters[where] = fit.parameters
     found, factors, first = [], [], 0
@@ -241,8 +236,8 @@ def _share(record: StepRecord, name: str) -> float:
 def _incremental(name: str, solution: Solution, current_a: float) -> float:
     """Incremental inductance of one axis at an axis current [A]."""
     first = AXES[name][0]
-    low, a, b = solution.parameters[first : first + 3]
-    return float(low / (1.0 + current_a * (a + b * current_a)))
+    low, a, b, c = solution.parameters[first : first + 4]
+    return float(low / (1.0 + current_a * (a + current_a * (b + c * current_a**2))))
 
 
 def _gains(name: str, solution: Solution) -> list[Contribution]:
