@@ -19,6 +19,7 @@ def needed_columns(
     sigma: Array,
     level: float = 0.01,
     most: int | None = None,
+    dependence: float = 1.0,
 ) -> list[str]:
     """Names of the candidate columns [n each] that y [n] demands beside `base` [n, k].
 
@@ -43,8 +44,8 @@ def needed_columns(
         if costs[best] <= 0.0:
             statistic = np.inf if rest > 0.0 else 0.0
         else:
-            statistic = (rest - costs[best]) / (costs[best] / free)
-        if fdtrc(1.0, float(free), max(statistic, 0.0)) * len(left) > level:
+            statistic = (rest - costs[best]) / (costs[best] / free) / dependence
+        if fdtrc(1.0, max(free / dependence, 1.0), max(statistic, 0.0)) * len(left) > level:
             break
         chosen.append(left[best])
         design = np.column_stack([design, candidates[left[best]]])

@@ -1,0 +1,199 @@
+"""Inertia and drag from weak-form rows: Coulomb and viscous where that holds, a free curve else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.numerics.clusters import cluster_covariance
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.numerics.selection import needed_columns
+
+Array = NDArray[np.float64]
+
+KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
+BUMPS = (0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.16)
+MOST_NUISANCES = 14
+
+
+def _hat(index: int) -> Callable[[Array], Array]:
+    """Odd function of speed that is 1 at one knot and falls linearly to 0 at its neighbours."""
+    heights = [1.0 if k == index else 0.0 for k in range(len(KNOTS))]
+    return lambda x: np.sign(x) * np.interp(np.abs(x), KNOTS, heights)
+
+
+def _bump(width: float) -> Callable[[Array], Array]:
+    return lambda x: np.sign(x) * np.exp(-((x / width) ** 2))
+
+
+DRAG_FORMS: dict[str, Callable[[Array], Array]] = {
+    "windage": lambda x: x * np.abs(x),
+    **{f"stribeck {width:g}": _bump(width) for width in BUMPS},
+    **{f"knot {k}": _hat(k) for k in range(len(KNOTS))},
+}
+FORMS = ("windage", *(f"stribeck {width:g}" for width in BUMPS))
+CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
+
+
+@dataclass(frozen=True, slots=True)
+class DragFit:
+    """Coefficients of A = g T - sum a_m f_m(w) - nuisances, how sure, and what they mean.
+
+    `free` tells that the drag curve was left free (columns `CURVE`) as Coulomb and viscous drag
+    with the known additions did not hold. `u_form` [3] is the allowance for the form of drag on
+    J, T_c, B; `reasons` [3] says why one of them is not identifiable, else is empty.
+    """
+
+    names: tuple[str, ...]
+    coefficients: Array
+    covariance: Array
+    residuals: Array
+    dof: int
+    free: bool
+    u_form: Array
+    reasons: tuple[str, str, str]
+    design: Array
+    sigma: Array
+    target: Array
+    fastest_rad_s: float
+
+    def refit(self, driving_nm: Array) -> Array:
+        """The coefficients with another driving torque [w] in the same columns."""
+        design = self.design.copy()
+        design[:, 0] = driving_nm
+        return linear_fit(design, self.target, self.sigma).coefficients
+
+    def constants(self, coefficients: Array) -> Array:
+        """J, T_c and B from coefficients in this fit's columns."""
+        inertia = 1.0 / coefficients[0]
+        if not self.free:
+            return np.array([inertia, coefficients[1] * inertia, coefficients[2] * inertia])
+        level, slope = _low_end(coefficients[1 : 1 + len(KNOTS)], self.fastest_rad_s)
+        return np.array([inertia, level * inertia, slope * inertia])
+
+    def scatter(self) -> Array:
+        """Lower triangle [3, 3]: rows J, T_c, B; columns the scatter sources that they share."""
+        step = 1e-6 * np.maximum(np.abs(self.coefficients), np.sqrt(np.diag(self.covariance)))
+        columns = []
+        for k in range(self.coefficients.size):
+            moved = self.coefficients.copy()
+            moved[k] += step[k]
+            columns.append((self.constants(moved) - self.constants(self.coefficients)) / step[k])
+        slope = np.column_stack(columns)
+        joint = slope @ self.covariance @ slope.T
+        scale = np.sqrt(np.maximum(np.diag(joint), 1e-300))
+        correlation = joint / np.outer(scale, scale) + 1e-12 * np.eye(3)
+        lower: Array = np.linalg.cholesky(correlation) * scale[:, None]
+        return lower
+
+    def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
+        """Speed, drag torque and the published line, one point a window (at most 2000)."""
+        inertia = 1.0 / self.coefficients[0]
+        drag_columns = [k for k, name in enumerate(self.names) if name in _DRAG_NAMES]
+        modelled = self.design[:, drag_columns] @ self.coefficients[drag_columns]
+        keep = slice(None, None, -(-rows.count // 2000))
+        order = np.argsort(rows.speed_rad_s[keep], kind="stable")
+        _, level, slope = self.constants(self.coefficients)
+        speed = rows.speed_rad_s[keep][order]
+        drag = (-(modelled + self.residuals) * inertia)[keep][order]
+        return speed, drag, level * np.sign(speed) + slope * speed
+
+
+_DRAG_NAMES = ("coulomb", "viscous", *FORMS, *CURVE)
+
+
+def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level: float) -> DragFit:
+    """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve."""
+    y = rows.acceleration_rad_s2
+    usable = [n for n in nuisances if float(np.ptp(rows.columns[n])) > 0.0]
+    candidates = {name: -rows.columns[name] for name in [*usable, *FORMS]}
+    base = np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
+    chosen: list[str] = []
+    sigma = _balanced(rows, base, y)
+    for _ in range(2):
+        design = np.column_stack([base, *(candidates[n] for n in chosen)])
+        sigma = _balanced(rows, design, y)
+        tau = autocorrelation_time(linear_fit(design, y, sigma).residuals / sigma, 200)
+        chosen = needed_columns(base, candidates, y, sigma, level, MOST_NUISANCES, tau)
+    design = np.column_stack([base, *(candidates[n] for n in chosen)])
+    names = ("torque", "coulomb", "viscous", *chosen)
+    sigma = _balanced(rows, design, y)
+    plain = [n for n in chosen if n not in FORMS]
+    curve = np.column_stack(
+        [driving_nm, *(-rows.columns[n] for n in CURVE), *(candidates[n] for n in plain)]
+    )
+    free = _form_fails(rows, design, curve, y, level)
+    if free:
+        design, names = curve, ("torque", *CURVE, *plain)
+        sigma = _balanced(rows, design, y)
+    found = linear_fit(design, y, sigma)
+    covariance, dof = cluster_covariance(design, found.residuals, sigma, rows.cluster)
+    u_form, reasons = _form(found.coefficients, free, rows)
+    return DragFit(
+        names, found.coefficients, covariance, found.residuals, dof, free, u_form, reasons,
+        design, sigma, y, rows.fastest_rad_s,
+    )  # fmt: skip
+
+
+def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
+    """Standard deviation [w] of each row: one for drives, one for coast-downs, from the fit."""
+    sigma = np.ones(y.size)
+    for _ in range(4):
+        residuals = linear_fit(design, y, sigma).residuals
+        for kind in (DRIVE, COAST):
+            mine = rows.kind == kind
+            if np.any(mine):
+                spread = float(np.sqrt(np.mean(residuals[mine] ** 2)))
+                sigma[mine] = max(spread, 1e-6 * float(np.std(y)), 1e-300)
+    return sigma
+
+
+def _form_fails(rows: ShaftRows, design: Array, curve: Array, y: Array, level: float) -> bool:
+    """Whether a free drag curve explains the rows better than chance (F, correlation counted)."""
+    sigma = _balanced(rows, curve, y)
+    loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
+    costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
+    tau = autocorrelation_time(loose.residuals / sigma, 200)
+    free = max((y.size - curve.shape[1]) / tau, 1.0)
+    extra = max(len(CURVE) - 2, 1)
+    statistic = (costs[1] - costs[0]) / extra / tau / (costs[0] / (y.size - curve.shape[1]))
+    return bool(fdtrc(extra, free, max(statistic, 0.0)) < level)
+
+
+def _low_end(curve: Array, fastest: float) -> tuple[float, float]:
+    """Drag extrapolated to standstill from the slowest knots, and the mean slope of the curve."""
+    speeds = np.array(KNOTS) * fastest
+    level = float(np.polyfit(speeds[:3], curve[:3], 1)[1])
+    slope = float(np.polyfit(speeds, curve, 1)[0])
+    return level, slope
+
+
+def _form(coefficients: Array, free: bool, rows: ShaftRows) -> tuple[Array, tuple[str, str, str]]:
+    """Allowance for the form of drag, and why a constant of it has no meaning."""
+    if not free:
+        return np.zeros(3), ("", "", "")
+    inertia = 1.0 / coefficients[0]
+    curve = coefficients[1 : 1 + len(KNOTS)] * inertia
+    slope = np.diff(curve) / (np.diff(KNOTS) * rows.fastest_rad_s)
+    level = _low_end(curve, rows.fastest_rad_s)[0]
+    beyond = float(curve[1] - (curve[2] - curve[1]) * KNOTS[1] / (KNOTS[2] - KNOTS[1]))
+    spread = max(abs(float(curve[0]) - level), abs(beyond - level))
+    why = (
+        "drag is not Coulomb and viscous: its slope runs from "
+        f"{slope.min():.2g} to {slope.max():.2g} N·m·s/rad over the speeds; see the drag curve, "
+        "and record spin_downs with and without the suspected drag"
+    )
+    return np.array([0.0, spread, 0.0]), ("", "", why)
+
+
+def drag_words(found: DragFit) -> str:
+    """What the fit had to add to Coulomb and viscous drag, in words."""
+    added = [n for n in found.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
+    words = "drag curve left free, its form is not Coulomb and viscous" if found.free else ""
+    also = f"the data also demand columns {', '.join(added)}" if added else ""
+    return "; ".join(w for w in (words, also) if w) or "Coulomb and viscous drag hold"

@@ -1,0 +1,224 @@
+"""Rotor inertia, Coulomb and viscous friction from everyday drives and coast-downs together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.fit.drag import DRAG_FORMS, DragFit, drag_of, drag_words
+from pipeline.fit.instruments import (
+    budget_of,
+    contributions,
+    current_source,
+    instrument_uncertainties,
+    temperature_source,
+    torque_source,
+    unstated_note,
+)
+from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
+from pipeline.numerics.plateaus import decimated
+from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Budget, Contribution, propagate
+
+Array = NDArray[np.float64]
+
+NAME = "inertia"
+GIVES = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
+EXPERIMENT = (
+    "record a drive with iq_a and theta_mech_rad that accelerates and brakes hard in both senses "
+    "(torque_shaft_nm if a load is coupled), and a spin_down from full speed"
+)
+MAGNET_COEFFICIENT_1_K = -0.0011
+NUISANCES = (
+    "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
+    "d current sin", "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Torque:
+    """What turns currents into torque, and whose uncertainty the inertia inherits."""
+
+    kt_nm_a: float
+    kt_budget: Budget
+    reluctance_nm_a2: float
+    reluctance_budget: Budget
+    magnet_1_k: float
+    words: str
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """J, T_c and B of J dw/dt = K i_q + K_rel i_d i_q - T_load - T_c sign(w) - B w.
+
+    Rows of drives and coast-downs (fit.shaft_rows) are regressed together on g = 1/J, T_c/J, B/J:
+    coast-downs fix the ratios, drives the scale. Where drag has another form, J comes from the
+    drag curve left free, T = J (a_driven - a_coasting) at each speed. References: IEEE Std 115-2019
+    4.4 (retardation); Messenger and Bortz 2021 (weak form).
+    """
+    torque = _torque(known)
+    captures = campaign.of("drive", "spin_down")
+    orders = _cogging_orders(known)
+    rows = shaft_rows(captures, DRAG_FORMS, orders) if torque is not None else None
+    if torque is None or rows is None or not np.any(rows.kind == DRIVE):
+        missing = "a torque constant is not known" if torque is None else "no usable drive log"
+        note = f"{missing}; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
+    y, driving = rows.acceleration_rad_s2, _driving_nm(rows, torque, {})
+    if float(np.ptp(driving)) == 0.0:
+        note = f"the drive log holds no torque; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    found = drag_of(rows, driving, nuisances, options["level"])
+    estimates = _estimates(rows, torque, found)
+    return Fit(estimates, _evidence(rows, y, found))
+
+
+def _torque(known: Constants) -> Torque | None:
+    kt = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
+    if kt is None:
+        return None
+    alpha = known.best("temp_coeff_magnet_1_k")
+    magnet = MAGNET_COEFFICIENT_1_K if alpha is None else alpha.number
+    words = f"torque constant from {kt.method}"
+    reluctance = known.best("kt_reluctance_nm_a2")
+    if reluctance is not None:
+        return Torque(
+            kt.number, kt.budget, reluctance.number, reluctance.budget, magnet, words
+        )  # fmt: skip
+    ld, lq, pairs = known.best("ld_h"), known.best("lq_h"), known.best("pole_pairs")
+    if ld is not None and lq is not None and pairs is not None:
+        scale = 1.5 * pairs.number
+        budget = propagate([(scale, ld.budget), (-scale, lq.budget)])
+        value = scale * (ld.number - lq.number)
+        return Torque(kt.number, kt.budget, value, budget, magnet, words)
+    return Torque(kt.number, kt.budget, 0.0, (), magnet, f"{words}, reluctance torque unknown")
+
+
+def _cogging_orders(known: Constants) -> tuple[int, ...]:
+    order = known.best("cogging_order")
+    return () if order is None else (round(order.number),)
+
+
+def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> Array:
+    """Electromagnetic less load torque [w], as it would be with instruments off by `shift`."""
+    metas = [capture.meta for capture in rows.captures]
+    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
+    load = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
+    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])[rows.capture]
+    kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
+    reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
+    warm = rows.warm_current_k_a + rows.q_current_a * warmer
+    driven: Array = (
+        kt * current * (rows.q_current_a + torque.magnet_1_k * warm)
+        + reluctance * current**2 * rows.product_a2
+        - load * rows.load_nm
+    )
+    return driven
+
+
+def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimate, ...]:
+    def values(shift: Mapping[str, float]) -> Array:
+        return found.constants(found.refit(_driving_nm(rows, torque, shift)))
+
+    gains = instrument_uncertainties(rows.captures, ("current", "torque", "temperature"))
+    type_b = contributions(values, gains)
+    per_kt = (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a)
+    step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
+    per_rel = (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step)
+    constants, scatter = found.constants(found.coefficients), found.scatter()
+    paths = tuple(sorted(c.path for c in rows.captures))
+    note = _note(rows, torque, found)
+    at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
+    estimates = []
+    for i, name in enumerate(GIVES):
+        reason = found.reasons[i]
+        if reason:
+            estimates.append(not_identifiable(name, _unit(name), NAME, reason))
+            continue
+        parts = [
+            Contribution(f"scatter:{NAME}:{k}", float(scatter[i, k]), "A", found.dof)
+            for k in range(scatter.shape[1])
+        ]
+        parts += [Contribution("assumed:drag_form", float(found.u_form[i]), "B")]
+        budget = propagate(
+            [
+                (1.0, (*parts, *type_b[i])),
+                (float(per_kt[i]), torque.kt_budget),
+                (float(per_rel[i]), torque.reluctance_budget),
+            ]
+        )
+        value = float(constants[i])
+        estimates.append(
+            Estimate(name, value, _unit(name), "measured", NAME, budget_of(budget), at, paths, note)
+        )
+    return tuple(estimates)
+
+
+def _note(rows: ShaftRows, torque: Torque, found: DragFit) -> str:
+    words = [torque.words, drag_words(found)]
+    words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
+    if not np.any(rows.kind == COAST):
+        words.append("no spin_down: friction from driven motion alone")
+    drives = [c for c in rows.captures if c.meta.test == "drive"]
+    if not any(c.has("torque_shaft_nm") for c in drives):
+        words.append("no load torque logged: what is coupled counts to the inertia")
+    unstated = unstated_note(rows.captures, ("current", "torque"))
+    return "; ".join([*words, *([unstated] if unstated else [])])
+
+
+def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidence, ...]:
+    fitted = measured - found.residuals
+    plots = []
+    for index, capture in enumerate(rows.captures):
+        mine = np.flatnonzero(rows.capture == index)
+        mine = mine[decimated(mine.size)]
+        word = "coast" if capture.meta.test == "spin_down" else "drive"
+        series = Series(capture.path, rows.time_s[mine], measured[mine], fitted[mine])
+        plots.append(
+            Evidence(
+                NAME, f"Acceleration in the {word}", "t_s", "acceleration_rad_s2", "line", (series,),
+                caption="window means, no derivative taken",
+            )
+        )  # fmt: skip
+    speed, drag, line = found.curve(rows)
+    curve = Series("drag", speed, drag, line)
+    plots.append(
+        Evidence(
+            NAME, "Drag against speed", "omega_mech_rad_s", "torque_coulomb_nm", "scatter",
+            (curve,), caption="driving torque less J times acceleration; line: Coulomb and viscous",
+        )
+    )  # fmt: skip
+    return tuple(plots)
+
+
+def _unit(name: str) -> str:
+    return CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("drive", "spin_down"),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=(
+        "kt_peak_nm_a",
+        "kt_from_ke_nm_a",
+        "kt_reluctance_nm_a2",
+        "temp_coeff_magnet_1_k",
+        "ld_h",
+        "lq_h",
+        "pole_pairs",
+        "cogging_order",
+    ),
+    rank=0,
+    options={"level": 0.001},
+)
