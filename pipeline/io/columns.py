@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -85,16 +86,24 @@ def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
                 f"{part.field!r} could be {' or '.join(matches)}",
                 "write the full name into the source map",
             )
-        found += [
-            FieldMap(name, part.column, part.unit, part.sign, part.scale, part.offset)
-            for name in matches
-        ]
+        found += [replace(part, field=name) for name in matches]
+    columns = [part.column for part in found]
+    twice = next((part for part in found if columns.count(part.column) > 1), None)
+    if twice is not None:
+        raise CaptureError(
+            "duplicate_column",
+            f"two fields of the file become {twice.column}",
+            "keep one of them in the source map",
+        )
     return found
 
 
-def to_frame(table: RawTable, source: SourceMap | None) -> pl.DataFrame | None:
+def to_frame(
+    table: RawTable, source: SourceMap | None, pole_pairs: int | None = None
+) -> pl.DataFrame | None:
     """The contract's columns of one table, t_s first, float64; None if it holds none.
 
+    `pole_pairs` are the nameplate's, for fields that a drive logs in electrical terms.
     Raises CaptureError for units, times and duplicate columns that cannot be settled.
     """
     names = list(table.fields)
@@ -103,7 +112,9 @@ def to_frame(table: RawTable, source: SourceMap | None) -> pl.DataFrame | None:
     else:
         chosen = mapped_fields(names, source)
     columns = {
-        part.column: _converted(table.fields[part.field], part, dict(table.units))
+        part.column: _converted(
+            table.fields[part.field], _mechanical(part, pole_pairs), dict(table.units)
+        )
         for part in chosen
         if part.column != "t_s"
     }
@@ -114,6 +125,19 @@ def to_frame(table: RawTable, source: SourceMap | None) -> pl.DataFrame | None:
     if time is not None:
         columns = {"t_s": time} | columns
     return pl.DataFrame(columns)
+
+
+def _mechanical(part: FieldMap, pole_pairs: int | None) -> FieldMap:
+    """The field map with the pole pairs worked into its scale."""
+    if not part.per_pole_pair:
+        return part
+    if pole_pairs is None:
+        raise CaptureError(
+            "missing_metadata",
+            f"{part.field} counts electrical turns, and nothing states pole_pairs",
+            "state pole_pairs in the metadata, beside the file or in the source map",
+        )
+    return replace(part, scale=part.scale / pole_pairs)
 
 
 def _converted(
@@ -138,11 +162,12 @@ def _time(
     origin = "field" if source is None else source.time.origin
     if origin == "increment" and source is not None:
         return _counted(table.rows, source.time.start_s, source.time.increment_s)
-    if origin == "field" and clock is not None:
-        return _from_field(table, clock, source)
+    if origin in ("field", "even") and clock is not None:
+        time = _from_field(table, clock, source)
+        return _even(time) if origin == "even" else time
     if table.log_time_ns is None:
         return None
-    time: NDArray[np.float64] = table.log_time_ns / _NANOSECONDS_A_SECOND
+    time = table.log_time_ns / _NANOSECONDS_A_SECOND
     if not table.blocks:
         return time
     increment = None if source is None else source.time.increment_s
@@ -153,6 +178,29 @@ def _time(
             "write t_s into every block, or state `increment_s` in a source map",
         )
     return time + increment * _place_in_block(table.log_time_ns)
+
+
+def _even(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The straight line through rounded times [s]; a gap that rounding cannot explain is refused.
+
+    The printed times carry three digits or more, so each lies within 0.5 % of the line.
+    """
+    if time.size < 3 or not np.isfinite(time).all():
+        return time
+    row = np.arange(time.size, dtype=np.float64)
+    row -= row.mean()
+    step = float(row @ time / (row @ row))
+    line: NDArray[np.float64] = time.mean() + step * row
+    off = np.abs(time - line) > 0.006 * np.abs(time) + abs(step)
+    if step <= 0 or off.any():
+        first = int(np.argmax(off))
+        raise CaptureError(
+            "uneven_time",
+            "the times do not lie on one straight line",
+            "use `from: field` if the samples are not evenly spaced",
+            (first, first),
+        )
+    return line
 
 
 def _counted(rows: int, start_s: float, increment_s: float | None) -> NDArray[np.float64]:

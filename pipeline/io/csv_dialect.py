@@ -9,14 +9,16 @@ from dataclasses import dataclass
 class CsvDialect:
     """The layout of a text table. The defaults are the contract's own.
 
-    `comment_lines` says that leading lines with `#` hold metadata and are not the header.
-    `header_match` is a regular expression that the header line begins with; without it the header
-    is the first line after `skip_lines`. `names` replaces the header of a table without one; an
-    empty name leaves that column out. `skip_after_header` lines (a units row, a blank line) come
-    before the rows, the first of them a units row if `units_row`. `time_start` and
-    `time_increment` are regular expressions whose one group is a number in the text before the
-    rows. `whole_last_line` asks for a line break after the last row, without which a cut number
-    passes for a whole one.
+    `comment_lines`: leading lines with `#` hold metadata and are not the header.
+    `header_match`: regular expression that the header line begins with; without it the header is
+    the first line after `skip_lines`.
+    `names`: stand in for the header of a table without one, or (with `header_match`) of one whose
+    header names units only; an empty name leaves a column out.
+    `skip_after_header`: lines between header and rows, the first a units row if `units_row`.
+    `fewer_columns`: rows may end before the header does, all of them at the same column.
+    `time_start`, `time_increment`: regular expressions whose one group is a number [s] in the text
+    before the rows.
+    `whole_last_line`: the last row must end in a line break, or a cut number passes for a whole one.
     """
 
     separator: str = ","

@@ -159,7 +159,7 @@ def _text(data: bytes, dialect: CsvDialect) -> str:
 
 def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
     """Lines before the rows (the header and its followers last), and the rows."""
-    if dialect.names is not None:
+    if dialect.names is not None and dialect.header_match is None:
         lines = body.split(b"\n", dialect.skip_lines)
         return lines[:-1], lines[-1] if len(lines) > dialect.skip_lines else b""
     head: list[bytes] = []
@@ -188,19 +188,25 @@ def _header(
     head: Sequence[bytes], dialect: CsvDialect
 ) -> tuple[list[str], tuple[tuple[str, str], ...]]:
     """Column names and what a units row says of them."""
-    if dialect.names is not None:
+    if dialect.names is not None and dialect.header_match is None:
         return list(dialect.names), ()
     at = len(head) - 1 - dialect.skip_after_header
-    names = [part.strip().strip('"') for part in _text(head[at], dialect).split(dialect.separator)]
+    names = _cells(head[at], dialect)
+    names[0] = names[0].lstrip("#").strip()
+    if dialect.names is not None:
+        return list(dialect.names[: len(names)]), tuple(zip(dialect.names, names, strict=False))
     if len(names) > _MAX_COLUMNS:
         raise _refuse("limit", f"the header names {len(names)} columns", "record fewer columns")
     units: tuple[tuple[str, str], ...] = ()
     if dialect.units_row:
-        row = _text(head[at + 1], dialect).split(dialect.separator)
-        units = tuple(
-            (name, unit.strip().strip('"')) for name, unit in zip(names, row, strict=False) if name
-        )
+        row = _cells(head[at + 1], dialect)
+        units = tuple((name, unit) for name, unit in zip(names, row, strict=False) if name)
     return names, units
+
+
+def _cells(line: bytes, dialect: CsvDialect) -> list[str]:
+    cells = _text(line, dialect).split(dialect.separator)
+    return [cell.strip().strip('"').strip() for cell in cells]
 
 
 def _even_out(rows: bytes, dialect: CsvDialect) -> bytes:

@@ -24,7 +24,7 @@ from pipeline.io.metadata import MANIFEST, SIDECAR_SUFFIX, capture_meta, manifes
 from pipeline.io.raw_table import RawTable
 from pipeline.io.source_map import SourceMap, find_map
 from pipeline.physics.glossary import COLUMNS, METADATA
-from pipeline.records.capture import Capture, Integrity
+from pipeline.records.capture import Capture, CaptureMeta, Integrity
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
@@ -259,7 +259,7 @@ def read_capture(folder: Path, entry: Entry) -> Capture:
         raw, source, verified = _read_mcap(data, entry)
     else:
         raw, source, verified = _read_csv(data, entry)
-    frames = [frame for table in raw if (frame := to_frame(table, source)) is not None]
+    frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
     if not frames:
         raise CaptureError(
             "missing_column",
@@ -268,6 +268,10 @@ def read_capture(folder: Path, entry: Entry) -> Capture:
         )
     integrity: Integrity = "verified" if verified else "unverified"
     return Capture(entry.path, entry.sha256, integrity, meta, tuple(_sorted(frames)))
+
+
+def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.DataFrame | None:
+    return to_frame(table, source, meta.pole_pairs)
 
 
 def _sorted(frames: list[pl.DataFrame]) -> list[pl.DataFrame]:

@@ -16,7 +16,7 @@ from pipeline.io.plain_yaml import load_plain
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError, UsageError
 
-TimeFrom = Literal["field", "log", "increment"]
+TimeFrom = Literal["field", "even", "log", "increment"]
 MessageForm = Literal["auto", "row", "block"]
 _MAX_PATTERN = 500
 
@@ -26,6 +26,7 @@ class FieldMap:
     """One foreign field: column = sign * scale * (value in `unit`, converted) + offset.
 
     `unit` None is the column's own unit; `row` takes what the file's units row says.
+    `per_pole_pair` divides by the metadata's pole pairs, for a drive that logs electrical speed.
     """
 
     field: str
@@ -34,12 +35,15 @@ class FieldMap:
     sign: float = 1.0
     scale: float = 1.0
     offset: float = 0.0
+    per_pole_pair: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class TimeMap:
     """Where t_s comes from: a mapped field, the log clock, or start + increment * row.
 
+    `even` is a field whose digits do not part neighbouring samples: the rows are evenly spaced
+    along the straight line through it.
     `wraps_at` is the value, in the field's unit, at which a clock starts again from zero.
     `start_s` and `increment_s` [s] stand in where the layout does not find them in the file; an
     increment with the log clock parts the rows of one block.
@@ -143,10 +147,6 @@ def parse_source_map(data: bytes, name: str) -> SourceMap:
     top.text("about")
     recognise.close()
     top.close()
-    columns = [part.column for part in found.fields]
-    twice = sorted({column for column in columns if columns.count(column) > 1})
-    if twice:
-        raise top.fault("fields", f"two fields become {twice[0]}", "keep one of them")
     return found
 
 
@@ -285,7 +285,8 @@ def _fields(section: _Section) -> tuple[FieldMap, ...]:
         scale, offset = part.number("scale", 1.0), part.number("offset", 0.0)
         if not scale:
             raise part.fault("scale", "is zero", "write the factor")
-        found.append(FieldMap(name, column, part.text("unit"), sign, scale, offset or 0.0))
+        unit, per_pole_pair = part.text("unit"), part.flag("per_pole_pair", False)
+        found.append(FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair))
         part.close()
     return tuple(found)
 
