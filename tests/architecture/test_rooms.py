@@ -1,0 +1,161 @@
+"""The house stands as it was drawn: import direction, small files, nothing done at import."""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "pipeline"
+LINES = 450
+SLOW = ("pandera", "rerun", "altair", "numba", "scipy.stats", "scipy.optimize", "polars", "mcap")
+THE_DOOR = "__main__.py"
+EVERYTHING = {"Exception", "BaseException"}
+
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+
+def _trees() -> Iterator[tuple[str, ast.Module]]:
+    """Path in the package and syntax tree of every source."""
+    for path in SOURCES:
+        yield path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text())
+
+
+def _python(*words: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_imports_point_down() -> None:
+    """The contracts of `pyproject.toml`: layers, the blind simulator, criticism without disk."""
+    pytest.importorskip("importlinter", reason="import-linter is a development tool")
+    code = "from importlinter.cli import lint_imports_command; lint_imports_command()"
+    done = _python("-c", code)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert " 0 broken" in done.stdout
+
+
+def test_an_import_upwards_is_seen(tmp_path: Path) -> None:
+    """The tool itself: in a house of two rooms, the lower one that looks up is reported."""
+    pytest.importorskip("importlinter", reason="import-linter is a development tool")
+    house = tmp_path / "house"
+    for room in ("", "upper", "lower"):
+        (house / room).mkdir()
+        (house / room / "__init__.py").write_text("")
+    (house / "lower" / "__init__.py").write_text("import house.upper\n")
+    (tmp_path / ".importlinter").write_text(
+        "[importlinter]\nroot_package = house\n[importlinter:contract:1]\nname = down\n"
+        "type = layers\nlayers =\n    upper\n    lower\ncontainers = house\n"
+    )
+    code = (
+        f"import os, sys; os.chdir({str(tmp_path)!r}); sys.path.insert(0, '.')\n"
+        "from importlinter.cli import lint_imports_command; lint_imports_command()"
+    )
+    done = _python("-c", code)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "house.lower -> house.upper" in done.stdout
+
+
+def test_no_file_is_long() -> None:
+    lengths = {path.name: len(path.read_text().splitlines()) for path in SOURCES}
+    assert {name: length for name, length in lengths.items() if length >= LINES} == {}
+
+
+def test_no_drawer_for_everything() -> None:
+    """Neither a module nor a room is named for having no subject."""
+    drawers = {"utils", "util", "helpers", "helper", "misc", "common", "tools"}
+    names = {part.removesuffix(".py") for p in SOURCES for part in p.relative_to(PACKAGE).parts}
+    assert names & drawers == set()
+
+
+def test_print_is_the_doors_alone() -> None:
+    callers = [
+        f"{path}:{node.lineno}"
+        for path, tree in _trees()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "print"
+        and path != THE_DOOR
+    ]
+    assert callers == []
+
+
+def test_no_bare_except() -> None:
+    """No `except:`, and none of everything that goes on as if nothing were."""
+    offenders = []
+    for path, tree in _trees():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.ExceptHandler):
+                continue
+            silent = all(isinstance(step, (ast.Pass, ast.Continue)) for step in node.body)
+            broad = node.type is not None and ast.unparse(node.type) in EVERYTHING
+            if node.type is None or (broad and silent):
+                offenders.append(f"{path}:{node.lineno}")
+    assert offenders == []
+
+
+def test_nothing_acts_at_import() -> None:
+    """No loop, `with`, `try` or bare call stands at the top of a module.
+
+    Constants may be built there; what acts stands in a function, or under `if __name__`.
+    """
+    offenders = [
+        f"{path}:{node.lineno}" for path, tree in _trees() for node in tree.body if _acts(node)
+    ]
+    assert offenders == []
+
+
+def _acts(node: ast.stmt) -> bool:
+    if isinstance(node, ast.Expr):
+        return not isinstance(node.value, ast.Constant)
+    if isinstance(node, ast.If):
+        return ast.unparse(node.test) not in {"TYPE_CHECKING", "__name__ == '__main__'"}
+    return isinstance(node, (ast.For, ast.While, ast.With, ast.Try))
+
+
+def test_every_module_says_what_it_is() -> None:
+    assert [path for path, tree in _trees() if tree.body and not ast.get_docstring(tree)] == []
+
+
+def _modules_after(statement: str) -> set[str]:
+    code = f"{statement}\nimport sys\nsys.stdout.write(' '.join(sys.modules))"
+    done = _python("-c", code)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return set(done.stdout.split())
+
+
+def test_the_door_opens_light() -> None:
+    """Listing the commands costs no polars, pandera, rerun, altair or numba."""
+    loaded = _modules_after("import pipeline.__main__")
+    assert sorted(loaded & set(SLOW)) == []
+
+
+@pytest.mark.parametrize("room", ["validate", "registry", "motor", "json_schema", "schemas"])
+def test_contracts_load_without_pandera(room: str) -> None:
+    """Importing pandera costs most of a second; only a capture that is validated pays it."""
+    loaded = _modules_after(f"import pipeline.contracts.{room}")
+    assert sorted(loaded & {"pandera", "rerun", "altair", "numba"}) == []
+
+
+@pytest.mark.parametrize("room", ["pipeline.fit.registry", "pipeline.crosscheck.registry"])
+def test_plug_ins_load_light(room: str) -> None:
+    """Finding the plug-ins costs neither a plotting library nor a compiler."""
+    name = room.rsplit(".", 2)[1]
+    find = {"fit": "estimators", "crosscheck": "rules"}[name]
+    loaded = _modules_after(f"import {room}\n{room}.{find}()")
+    assert sorted(loaded & {"pandera", "rerun", "altair", "scipy.stats"}) == []
