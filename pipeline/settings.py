@@ -69,6 +69,21 @@ class PlanSettings(Settings):
     motor: str | None = key(None, "motor_id; every motor without it")
 
 
+@dataclass(kw_only=True)
+class SimulateSettings(Settings):
+    """`simulate`: captures of a simulated motor, and what is true of it."""
+
+    output: str = key("", "folder to write to", result=False)
+    motor: str = key("gimbal-5208", "design of conf/motor/")
+    effects: str = key("", "[name, name=size, name.parameter=value, ...]; a name alone is typical")
+    seed: int = key(1, "of every random draw")
+    motor_id: str | None = key(None, "serial number; the design and the seed without it")
+    lot: str = key("A", "lot")
+    exact: bool = key(False, "instruments without gain errors")
+    encoding: str = key("mixed", "mixed, csv, json, protobuf, cdr, or json_samples and the like")
+    fleet: str | None = key(None, "fleet of conf/fleet/: many motors at once, seed its own")
+
+
 def result_document(settings: Settings) -> dict[str, Any]:
     """The settings that can change a result, as plain data for a digest."""
     kept = {f.name for f in fields(settings) if f.metadata.get("result", True)}

@@ -59,6 +59,7 @@ class Motor:
     `cth_*` [J/K] are winding to ambient (wa), winding to magnet (wm) and magnet to ambient (ma).
     `effects` are those of `contract/effects.md` on top of copper, magnet and Coulomb friction,
     which are here because every motor has them. `nameplate` overrides what the metadata claims.
+    `thermometer_share` below 1 is a winding thermometer that partly reads the magnet.
     """
 
     motor_type: str
@@ -88,6 +89,7 @@ class Motor:
     nameplate: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     effects: Effects = field(default_factory=lambda: MappingProxyType({}))
     extras: tuple[Extra, ...] = ()
+    thermometer_share: float = 1.0
 
     def __post_init__(self) -> None:
         positive = (

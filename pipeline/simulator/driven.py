@@ -140,7 +140,7 @@ def log(session: Session, rows: Array, period_s: float) -> dict[str, Array]:
         "theta_mech_rad": rows[:, 4],
         "omega_mech_rad_s": to_grid(rows[:, 5], grid(m.speed_rated_rad_s, 17)),
         "torque_shaft_nm": session.torque(rows[:, 6], t_s),
-        "temp_winding_degc": session.temperature(rows[:, 7]),
+        "temp_winding_degc": session.winding(rows[:, 7], rows[:, 8]),
         "temp_magnet_degc": session.temperature(rows[:, 8]),
     }
 

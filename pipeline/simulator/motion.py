@@ -12,6 +12,7 @@ from pipeline.simulator.field import cogging
 from pipeline.simulator.plant import Plant
 
 TURN = 2.0 * math.pi
+Array = NDArray[np.float64]
 
 
 @njit(cache=True)
@@ -65,7 +66,7 @@ def coupling(twist: float, rate: float, p: Plant) -> float:
 
 
 @njit(cache=True)
-def lookup(x: float, xs: NDArray[np.float64], ys: NDArray[np.float64], n: int) -> float:
+def lookup(x: float, xs: Array, ys: Array, n: int) -> float:
     """Linear table, constant outside."""
     if x <= xs[0]:
         return float(ys[0])
@@ -161,7 +162,7 @@ def free_rates(
 @njit(cache=True)
 def coast(
     theta: float, omega: float, step_s: float, substeps: int, count: int, t_m: float, p: Plant
-) -> NDArray[np.float64]:
+) -> Array:
     """Angle and speed [count, 2] of a coasting rotor with open terminals, RK4."""
     out = np.empty((count, 2))
     h = step_s / substeps
@@ -189,12 +190,13 @@ def coast(
 
 
 @njit(cache=True)
-def turned(
-    theta: NDArray[np.float64], omega: NDArray[np.float64], t_m: float, p: Plant
-) -> NDArray[np.float64]:
-    """Shaft torque [n] of an open-circuit motor that a drive turns slowly and steadily."""
+def turned(theta: Array, omega: Array, t_m: float, p: Plant) -> Array:
+    """Shaft torque [n] of an open-circuit motor that a drive turns slowly and steadily.
+
+    It came from the other side: a bristle is still bent the other way at the start.
+    """
     out = np.empty(theta.size)
-    bristle = math.copysign(p.bristle, omega[0])
+    bristle = -math.copysign(p.bristle, omega[0])
     for k in range(theta.size):
         if k > 0:
             bristle = bristle_after(bristle, theta[k] - theta[k - 1], p)
@@ -218,9 +220,7 @@ def heat(
 
 
 @njit(cache=True)
-def warmed(
-    watt_25: NDArray[np.float64], start: tuple[float, float], ambient: float, h: float, p: Plant
-) -> NDArray[np.float64]:
+def warmed(watt_25: Array, start: tuple[float, float], ambient: float, h: float, p: Plant) -> Array:
     """Temperatures [n, 2] of winding and magnet under copper losses [n] stated at 25 degC."""
     out = np.empty((watt_25.size, 2))
     t_w, t_m = start
@@ -232,7 +232,7 @@ def warmed(
 
 
 @njit(cache=True)
-def lagged(x: NDArray[np.float64], blend: float) -> NDArray[np.float64]:
+def lagged(x: Array, blend: float) -> Array:
     """First-order lag [n] that starts settled: y += blend (x - y)."""
     out = np.empty(x.size)
     y = x[0] if x.size else 0.0
@@ -243,12 +243,24 @@ def lagged(x: NDArray[np.float64], blend: float) -> NDArray[np.float64]:
 
 
 @njit(cache=True)
-def passives(
-    theta: NDArray[np.float64], omega: NDArray[np.float64], torque: NDArray[np.float64], p: Plant
-) -> NDArray[np.float64]:
+def passives(theta: Array, omega: Array, torque: Array, i_q: Array, t_m: float, p: Plant) -> Array:
     """Torque [n] of everything but the windings in steady creep, bristle fully bent."""
     out = np.empty(theta.size)
     for k in range(theta.size):
         bristle = math.copysign(p.bristle, omega[k])
         out[k] = passive(theta[k], omega[k], bristle, torque[k], 1.0, p)
+        if p.extras > 0:
+            out[k] += extra(0, omega[k], theta[k], 0.0, i_q[k], t_m, t_m, p)
+    return out
+
+
+@njit(cache=True)
+def extra_volts(
+    theta: Array, omega: Array, i_d: Array, i_q: Array, t_w: Array, t_m: Array, p: Plant
+) -> Array:
+    """Extra voltages along d and q [n, 2] that the terminals see on top."""
+    out = np.empty((theta.size, 2))
+    for k in range(theta.size):
+        for axis in range(2):
+            out[k, axis] = extra(1 + axis, omega[k], theta[k], i_d[k], i_q[k], t_w[k], t_m[k], p)
     return out

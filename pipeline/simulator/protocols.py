@@ -14,7 +14,7 @@ class Resistance:
 
     pair: str = "ab"
     levels: tuple[float, ...] = (0.0, 0.12, 0.24, 0.06, -0.06, -0.24, -0.12)
-    dwell_s: float = 0.3
+    dwell_s: float = 0.2
     rate_hz: float = 1000.0
     rise_s: float = 2e-3
     temp_degc: float | None = None

@@ -145,6 +145,11 @@ class Session:
         seen = seen + self.noise(degc.size, self.bench.temperature_noise_degc)
         return to_grid(seen, TEMPERATURE_STEP_DEGC)
 
+    def winding(self, winding_degc: Array, magnet_degc: Array) -> Array:
+        """The winding's thermometer [n], which may sit between winding and iron."""
+        share = self.motor.thermometer_share
+        return self.temperature(share * winding_degc + (1.0 - share) * magnet_degc)
+
     def meta(self, test: str, **further: str) -> dict[str, str]:
         """Metadata of one capture, in the contract's words."""
         motor, bench = self.motor, self.bench

@@ -71,7 +71,7 @@ def resistance(session: Session, how: protocols.Resistance) -> Recording:
         "t_s": stamps,
         f"v{how.pair}_v": session.voltage(v, t_s),
         f"i{'abc'[first]}_a": session.line_current(i_a, first, t_s),
-        "temp_winding_degc": session.temperature(heat[:, 0]),
+        "temp_winding_degc": session.winding(heat[:, 0], heat[:, 1]),
     }
     meta = session.meta("resistance", pair=how.pair)
     return Recording(f"resistance_{how.pair}", meta, (table,))
@@ -194,9 +194,9 @@ def heat_run(session: Session, how: protocols.HeatRun) -> Recording:
     true -= true.mean()
     drop = plant.dead_v * true / np.sqrt(true**2 + plant.dead_knee_a**2)
     v_phase = warm[:, None] * (ohm * true)[None, :] + drop[None, :]
-    table = {"t_s": stamps, **_dq_log(session, phase, v_phase, eps, t_s)}
+    table = {"t_s": stamps, **_dq_log(session, phase, v_phase, eps, heat, t_s)}
     table["theta_mech_rad"] = session.angle(np.full(n, eps / motor.pole_pairs))
-    table["temp_winding_degc"] = session.temperature(heat[:, 0])
+    table["temp_winding_degc"] = session.winding(heat[:, 0], heat[:, 1])
     table["temp_magnet_degc"] = session.temperature(heat[:, 1])
     table["temp_ambient_degc"] = session.temperature(np.full(n, motor.ambient_degc))
     meta = session.meta("heat_run", voltage_kind="commanded", voltage_timing="centred")
@@ -204,13 +204,21 @@ def heat_run(session: Session, how: protocols.HeatRun) -> Recording:
 
 
 def _dq_log(
-    session: Session, i_phase: Array, v_phase: Array, eps: float, t_s: Array
+    session: Session, i_phase: Array, v_phase: Array, eps: float, heat: Array, t_s: Array
 ) -> dict[str, Array]:
     """Rotor-frame log of a locked motor from phase currents [3] and voltages [n, 3]."""
+    from pipeline.simulator.motion import extra_volts
+
     turn = np.exp(-1j * eps) * 2.0 / 3.0 * np.exp(2j * math.pi * np.arange(3) / 3.0)
     n = t_s.size
-    gain = session.instruments.voltage_commanded * (1.0 + session.fault("voltage_scale"))
-    i_dq, v_dq = complex(i_phase @ turn), gain * (v_phase @ turn)
+    i_dq, v_dq = complex(i_phase @ turn), v_phase @ turn
+    if session.plant.extras > 0:
+        theta, still = np.full(n, eps / session.motor.pole_pairs), np.zeros(n)
+        i_d, i_q = np.full(n, i_dq.real), np.full(n, i_dq.imag)
+        t_w, t_m = np.ascontiguousarray(heat[:, 0]), np.ascontiguousarray(heat[:, 1])
+        more = extra_volts(theta, still, i_d, i_q, t_w, t_m, session.plant)
+        v_dq = v_dq + more[:, 0] + 1j * more[:, 1]
+    v_dq = session.instruments.voltage_commanded * (1.0 + session.fault("voltage_scale")) * v_dq
     sigma = session.current_sigma_a * math.sqrt(2.0 / 3.0)
     step_a, step_v = session.current_step_a, session.voltage_step_v
     return {
@@ -265,7 +273,7 @@ def holding_current(session: Session, how: protocols.HoldingCurrent) -> Recordin
     eps, i_q = motor.pole_pairs * theta, np.zeros(theta.size)
     for _ in range(12):
         torque = torques(np.zeros(theta.size), i_q, eps, degc, plant)
-        rest = passives(theta, crawl, torque, plant) + plant.b_visc * crawl
+        rest = passives(theta, crawl, torque, i_q, degc, plant) + plant.b_visc * crawl
         i_q = i_q - (torque + rest) / kt
     each = how.samples
     n = theta.size * each

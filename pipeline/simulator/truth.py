@@ -126,6 +126,8 @@ def truth(motor: Motor) -> dict[str, object]:
         "rth_winding_k_w": rth_winding(p),
     }
     hidden = sorted(name for name in motor.effects if name not in ALWAYS)
+    if motor.thermometer_share != 1.0:
+        hidden.append("unknown: winding thermometer")
     unknown = [f"unknown: {extra.signal} against {extra.variable}" for extra in motor.extras]
     sizes = {name: values for name, values in active(motor).items() if name in motor.effects}
     return {

@@ -24,6 +24,7 @@ def _terminal_voltages(
     `centred` is the mean over half a period either side, a difference of flux.
     """
     from pipeline.simulator.field import open_emf, open_flux
+    from pipeline.simulator.motion import extra_volts
 
     p = session.motor.pole_pairs
     magnet = np.full(theta.size, degc)
@@ -34,6 +35,11 @@ def _terminal_voltages(
         mean: Array = (after - before) / (2.0 * half)
         return mean
     emf: Array = open_emf(p * theta, p * omega, magnet, session.plant)
+    if session.plant.extras > 0:
+        none = np.zeros(theta.size)
+        more = extra_volts(theta, omega, none, none, magnet, magnet, session.plant)
+        vector = (more[:, 0] + 1j * more[:, 1]) * np.exp(1j * p * theta)
+        emf += np.real(vector[:, None] * np.exp(-2j * math.pi * np.arange(3) / 3.0)[None, :])
     return emf
 
 

@@ -1,0 +1,123 @@
+"""`simulate`: captures of a simulated motor or fleet, and what is true of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pipeline.io.plain_yaml import load_plain
+from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.write_capture import Format, write_capture
+from pipeline.records.errors import UsageError
+from pipeline.records.naming import file_stem
+from pipeline.records.outcome import Outcome, Stopwatch
+from pipeline.settings import SimulateSettings, configuration_folder
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.catalogue import (
+    bench_from,
+    fleet_from,
+    motor_from,
+    seed_of,
+    with_effects,
+)
+from pipeline.simulator.design import EXACT, Bench, Motor, Recording
+from pipeline.simulator.truth import truth
+
+TRUTH = "truth.json"
+FORMATS: Mapping[str, Format] = {
+    "csv": Format("csv"),
+    "json": Format("json"),
+    "json_samples": Format("json", block_rows=None, compression="lz4"),
+    "protobuf": Format("protobuf"),
+    "protobuf_samples": Format("protobuf", block_rows=None),
+    "cdr": Format("cdr", compression="none"),
+    "cdr_samples": Format("cdr", block_rows=None),
+}
+MIXED_SMALL = ("csv", "json_samples", "protobuf_samples", "cdr_samples", "json", "cdr")
+LARGE_ROWS = 1900
+CDR_ZSTD = Format("cdr")
+
+
+def main(settings: SimulateSettings) -> Outcome:
+    """Writes the captures of one motor, or of every motor of a fleet, each with `truth.json`."""
+    if not settings.output:
+        raise UsageError("simulate needs output=DIR", "name the folder to write to")
+    if settings.encoding != "mixed" and settings.encoding not in FORMATS:
+        raise UsageError(
+            f"no encoding {settings.encoding!r}", f"known are mixed, {', '.join(FORMATS)}"
+        )
+    watch, output = Stopwatch(), Path(settings.output)
+    try:
+        jobs = list(_fleet(settings) if settings.fleet else _single(settings))
+    except (ValueError, KeyError) as error:
+        raise UsageError(f"simulate: {error}", "correct it") from error
+    lines = []
+    for folder, motor, bench, seed in jobs:
+        with watch.stage("simulate"):
+            recordings, true = campaign(motor, bench, seed), truth(motor)
+        with watch.stage("write"):
+            written = _write(output / folder, recordings, settings.encoding)
+            write_whole(output / folder / TRUTH, canonical_json(true))
+        lines.append(f"{motor.motor_id}: {written} captures in {output / folder}")
+    return Outcome(text="\n".join(lines) + "\n", timings=watch.table())
+
+
+Job = tuple[str, Motor, Bench, int]
+"""Subfolder, motor, bench, seed."""
+
+
+def _single(settings: SimulateSettings) -> Iterable[Job]:
+    document = _document("motor", settings.motor)
+    motor = motor_from(document)
+    name = settings.motor_id or f"{settings.motor}-{settings.seed}"
+    motor = with_effects(replace(motor, lot=settings.lot, motor_id=name), settings.effects)
+    bench = bench_from(document.get("bench") or {})
+    if settings.exact:
+        bench = replace(bench, instruments=EXACT)
+    yield "", motor, bench, settings.seed
+
+
+def _fleet(settings: SimulateSettings) -> Iterable[Job]:
+    """Every motor on one station, whose gains are drawn once from the fleet's seed."""
+    import numpy as np
+
+    words = _document("fleet", str(settings.fleet))
+    document = _document("motor", str(words.get("motor")))
+    fleet = fleet_from(words, document)
+    bench = replace(bench_from(document.get("bench") or {}), station=fleet.station)
+    drawn = EXACT if settings.exact else bench.drawn(np.random.default_rng(fleet.seed))
+    for motor in fleet.motors:
+        there = replace(bench, instruments=drawn, started_at=fleet.started_at[motor.motor_id])
+        yield file_stem(motor.motor_id), motor, there, seed_of(fleet.seed, motor.motor_id)
+
+
+def _document(kind: str, name: str) -> dict[str, Any]:
+    folder = configuration_folder() / kind
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    if name not in known:
+        raise UsageError(f"no {kind} {name!r} in conf/{kind}", f"known are {', '.join(known)}")
+    document = load_plain((folder / f"{name}.yaml").read_bytes(), f"{kind}/{name}.yaml")
+    if not isinstance(document, dict):
+        raise UsageError(f"conf/{kind}/{name}.yaml holds no keys", "write `key: value` lines")
+    return document
+
+
+def _write(folder: Path, recordings: Iterable[Recording], encoding: str) -> int:
+    """`mixed` goes through the encodings in turn; long captures stay in compact ones."""
+    count = 0
+    for recording in recordings:
+        table = recording.tables[0]
+        rows = next(iter(table.values())).size
+        if "t_s" not in table:
+            form = FORMATS["csv"]
+        elif encoding != "mixed":
+            form = FORMATS[encoding]
+        elif rows > LARGE_ROWS:
+            form = (FORMATS["protobuf"], CDR_ZSTD)[count % 2]
+        else:
+            form = FORMATS[MIXED_SMALL[count % len(MIXED_SMALL)]]
+        write_capture(folder, recording.stem, recording.meta, recording.tables, form)
+        count += 1
+    return count
