@@ -17,8 +17,10 @@ class Rule:
     """One check of `contract/outputs.md`: `check(constants, campaign, options)` is pure.
 
     With too little to judge it returns a Check of status not_evaluated that says what is missing.
+    `tests`: the captures that the check rests on, the one to repeat first when it fails first.
     """
 
     name: str
     check: RuleFunction
     options: Mapping[str, float] = field(default_factory=dict)
+    tests: tuple[str, ...] = ()

@@ -40,4 +40,4 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     return Check(NAME, "fail", words, ratio, 0.0, "1", "another motor's slots, or a gear")
 
 
-RULE = Rule(NAME, check)
+RULE = Rule(NAME, check, tests=("cogging", "open_circuit"))

@@ -35,4 +35,4 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     )
 
 
-RULE = Rule(NAME, check, {"allowance": 0.01})
+RULE = Rule(NAME, check, {"allowance": 0.01}, tests=("torque_map", "open_circuit"))

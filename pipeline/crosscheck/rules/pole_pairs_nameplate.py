@@ -36,4 +36,4 @@ def _suspect(ratio: float) -> str:
     return "a gear between the shaft and the angle sensor, or another motor's nameplate"
 
 
-RULE = Rule(NAME, check)
+RULE = Rule(NAME, check, tests=("open_circuit", "hand_turn"))

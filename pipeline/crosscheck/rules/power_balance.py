@@ -86,4 +86,4 @@ def _slope(blocks: NDArray[np.float64]) -> tuple[float, float]:
     return float(beta[0] / scale[0]), float(np.sqrt(max(spread[0, 0], 0.0)) / scale[0])
 
 
-RULE = Rule(NAME, check, {"allowance": 0.02})
+RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("torque_map",))

@@ -33,4 +33,4 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     )
 
 
-RULE = Rule(NAME, check, {"allowance": 0.05})
+RULE = Rule(NAME, check, {"allowance": 0.05}, tests=("heat_run", "resistance"))

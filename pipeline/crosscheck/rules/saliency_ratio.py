@@ -47,4 +47,4 @@ def _status(
     return "fail", "d and q exchanged: theta_elec_deg is a quarter period off"
 
 
-RULE = Rule(NAME, check, {"largest": 10.0})
+RULE = Rule(NAME, check, {"largest": 10.0}, tests=("current_step", "lcr"))

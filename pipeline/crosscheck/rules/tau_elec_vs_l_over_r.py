@@ -112,4 +112,4 @@ def _expected_s(capture: Capture, ld_h: float, lq_h: float, r_phase_ohm: float) 
     return l_h / (2.0 * float(copper_resistance_ohm(r_phase_ohm, temp_degc, 25.0)))
 
 
-RULE = Rule(NAME, check, {"allowance": 0.04})
+RULE = Rule(NAME, check, {"allowance": 0.04}, tests=("current_step", "resistance"))

@@ -74,4 +74,4 @@ def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> tuple[floa
     return ratio, standard_uncertainty(propagate(terms))
 
 
-RULE = Rule(NAME, check, {"allowance": 0.02})
+RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("torque_map", "open_circuit", "current_step"))

@@ -1,0 +1,267 @@
+"""What to record next: the tests that resolve most of what a datasheet leaves open."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pipeline.physics.glossary import CONSTANTS, TESTS
+from pipeline.records.datasheet import Check
+from pipeline.records.estimate import Estimate
+
+DoubtKind = Literal["failed", "missing", "assumed", "at_bound", "uncertain", "not_evaluated"]
+
+# How much one doubt weighs: what keeps a datasheet from its release before what would adorn it.
+WEIGHTS: dict[DoubtKind, float] = {
+    "failed": 4.0,
+    "missing": 1.0,
+    "assumed": 1.0,
+    "at_bound": 1.0,
+    "uncertain": 0.5,
+    "not_evaluated": 0.5,
+}
+REQUIRED = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """How constants can be had: what an estimator declares, without the estimator."""
+
+    gives: tuple[str, ...]
+    tests: tuple[str, ...]
+    experiment: str
+    uses: tuple[str, ...] = ()
+
+    @property
+    def computes(self) -> bool:
+        """Whether it reads no test of its own but other constants: any test will do for it."""
+        return bool(self.uses) and not set(TESTS) - set(self.tests)
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is there of one motor: a constant a name, its checks, the tests recorded of it."""
+
+    motor_id: str
+    constants: Mapping[str, Estimate]
+    checks: tuple[Check, ...]
+    tests: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """One thing that is open: a constant or a check, why, and the tests that could settle it."""
+
+    kind: DoubtKind
+    name: str
+    words: str
+    tests: frozenset[str]
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One test to record, with the doubts that no earlier step settles."""
+
+    test: str
+    again: bool
+    doubts: tuple[Doubt, ...]
+    experiments: tuple[str, ...]
+
+    @property
+    def weight(self) -> float:
+        """How much it resolves."""
+        return sum(doubt.weight for doubt in self.doubts)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Steps, the most telling first, and what no capture will settle."""
+
+    motor_id: str
+    steps: tuple[Step, ...]
+    beyond: tuple[Doubt, ...] = ()
+
+    def text(self) -> str:
+        """The plan in words, one test a paragraph."""
+        if not self.steps and not self.beyond:
+            return f"{self.motor_id}: nothing is missing and nothing is in doubt"
+        lines = [f"{self.motor_id}: what to record next, the most telling first"]
+        for number, step in enumerate(self.steps, 1):
+            again = ", again" if step.again else ""
+            lines += ["", f"{number}. {step.test}{again}: {TESTS.get(step.test, '')}"]
+            lines += [f"   how: {experiment}" for experiment in step.experiments]
+            lines += [f"   for {doubt.name}: {doubt.words}" for doubt in step.doubts]
+        if self.beyond:
+            lines += ["", "what no further capture settles"]
+            lines += [f"   {doubt.name}: {doubt.words}" for doubt in self.beyond]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Aims:
+    """What a datasheet is to reach: constants it must hold, relative u [1] it must not exceed."""
+
+    required: frozenset[str] = frozenset()
+    u_rel: float = 0.02
+    u_rel_of: Mapping[str, float] = field(default_factory=dict)
+
+
+def make_plan(
+    known: Known,
+    ways: Iterable[Way],
+    check_tests: Mapping[str, tuple[str, ...]],
+    aims: Aims,
+) -> Plan:
+    """Tests in the order in which they resolve most, each counted for what is left by then.
+
+    A greedy cover: the test with the largest weight of doubts comes first, its doubts are
+    taken off, and so on. Ties go to a test not yet recorded, then by name. `check_tests` are
+    the captures that each check rests on.
+    """
+    options = tuple(ways)
+    doubts = [
+        *_constants_in_doubt(known, options, aims),
+        *_checks_in_doubt(known, options, check_tests),
+    ]
+    open_doubts = [doubt for doubt in doubts if doubt.tests]
+    steps: list[Step] = []
+    while open_doubts:
+        weights: dict[str, float] = {}
+        for doubt in open_doubts:
+            for test in doubt.tests:
+                weights[test] = weights.get(test, 0.0) + doubt.weight
+        best = min(weights, key=lambda test: (-weights[test], test in known.tests, test))
+        settled = [doubt for doubt in open_doubts if best in doubt.tests]
+        steps.append(_step(best, settled, known, options))
+        open_doubts = [doubt for doubt in open_doubts if best not in doubt.tests]
+    return Plan(known.motor_id, tuple(steps), tuple(d for d in doubts if not d.tests))
+
+
+def _step(test: str, doubts: list[Doubt], known: Known, ways: tuple[Way, ...]) -> Step:
+    names = {doubt.name for doubt in doubts}
+    measuring = [way for way in ways if test in way.tests and not way.computes]
+    telling = [way for way in measuring if names & set(way.gives)] or measuring[:1]
+    experiments = tuple(dict.fromkeys(way.experiment for way in telling))
+    ordered = sorted(doubts, key=lambda doubt: (-doubt.weight, doubt.name))
+    return Step(test, test in known.tests, tuple(ordered), experiments)
+
+
+def settling_tests(constant: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:
+    """The tests that could give a constant, or give it better.
+
+    A way that has not been tried counts with all its tests. One that was tried and wants
+    constants that are missing counts with the tests for those; one that had all it wants
+    counts with its tests again, those not yet recorded where there are any. A way that only
+    computes counts with the tests of what it computes from.
+    """
+    return _settling(constant, known, ways, frozenset())
+
+
+def _settling(
+    constant: str, known: Known, ways: tuple[Way, ...], above: frozenset[str]
+) -> frozenset[str]:
+    fresh: set[str] = set()
+    repeats: set[str] = set()
+    for way in ways:
+        if constant not in way.gives:
+            continue
+        deeper = above | {constant}
+        wanting = [n for n in way.uses if n not in deeper and _is_missing(known, n)]
+        if way.computes and not wanting:
+            wanting = [n for n in way.uses if n not in deeper]
+        tried = bool(known.tests & set(way.tests))
+        if way.computes or (tried and wanting):
+            for name in wanting:
+                fresh |= _settling(name, known, ways, deeper)
+        elif tried:
+            fresh |= set(way.tests) - known.tests
+            repeats |= set(way.tests) & known.tests
+        else:
+            fresh |= set(way.tests)
+    return frozenset(fresh or repeats)
+
+
+def _is_missing(known: Known, name: str) -> bool:
+    estimate = known.constants.get(name)
+    return estimate is None or not estimate.known
+
+
+def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list[Doubt]:
+    names = sorted({name for way in ways for name in way.gives} & set(CONSTANTS) | aims.required)
+    doubts = []
+    for name in names:
+        found = _doubt_of(name, known.constants.get(name), aims)
+        if found is None:
+            continue
+        kind, words = found
+        by_instrument = kind == "uncertain" and _mostly_instrument(known.constants[name])
+        tests = frozenset[str]() if by_instrument else settling_tests(name, known, ways)
+        weight = WEIGHTS[kind] * (REQUIRED if name in aims.required else 1.0)
+        doubts.append(Doubt(kind, name, words, tests, weight))
+    return doubts
+
+
+def _doubt_of(name: str, estimate: Estimate | None, aims: Aims) -> tuple[DoubtKind, str] | None:
+    if estimate is None:
+        return "missing", "nothing recorded gives it"
+    if not estimate.known:
+        return "missing", estimate.note or "not identifiable from what is there"
+    if estimate.status == "assumed":
+        return "assumed", f"assumed, not measured ({estimate.note or estimate.method})"
+    if estimate.at_bound:
+        return "at_bound", f"its fit ended at a bound of its search, {estimate.number:.4g}"
+    return _too_uncertain(name, estimate, aims.u_rel_of.get(name, aims.u_rel))
+
+
+def _too_uncertain(name: str, estimate: Estimate, target: float) -> tuple[DoubtKind, str] | None:
+    """Counts and zeros have no relative uncertainty; the rest is held against its target."""
+    term = CONSTANTS.get(name)
+    if (term is not None and term.integer) or estimate.number == 0.0:
+        return None
+    relative = estimate.u / abs(estimate.number)
+    if relative <= target:
+        return None
+    words = f"known to {100.0 * relative:.2g} % (k=1), wanted to {100.0 * target:.2g} %"
+    if _mostly_instrument(estimate):
+        source = max((c for c in estimate.budget if c.kind == "B"), key=lambda c: abs(c.u)).source
+        words += f"; most of it is {source}, which repeating does not reduce: calibrate that"
+    return "uncertain", words
+
+
+def _mostly_instrument(estimate: Estimate) -> bool:
+    """Whether the part that repeating cannot reduce is the larger one."""
+    return estimate.u_b > estimate.u_a
+
+
+def _checks_in_doubt(
+    known: Known, ways: tuple[Way, ...], check_tests: Mapping[str, tuple[str, ...]]
+) -> list[Doubt]:
+    doubts = []
+    for check in known.checks:
+        if check.status not in ("fail", "not_evaluated"):
+            continue
+        rests_on = check_tests.get(check.name, ())
+        if check.status == "fail":
+            suspect = f"; suspect: {check.suspect}" if check.suspect else ""
+            tests = frozenset(rests_on)
+            kind: DoubtKind = "failed"
+            words = f"the check failed: {check.meaning}{suspect}"
+        else:
+            kind, words = "not_evaluated", f"the check could not be made: {check.meaning}"
+            tests = _tests_named(check.meaning, known, ways)
+            tests = tests or frozenset(set(rests_on) - known.tests) or frozenset(rests_on)
+        doubts.append(Doubt(kind, check.name, words, tests, WEIGHTS[kind]))
+    return doubts
+
+
+def _tests_named(meaning: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:
+    """Tests not yet recorded that a reason speaks of, by name or through a missing constant."""
+    words = set(re.findall(r"\w+", meaning))
+    named = (words & set(TESTS)) - known.tests
+    for constant in sorted(words & set(CONSTANTS)):
+        if _is_missing(known, constant):
+            named |= settling_tests(constant, known, ways)
+    return frozenset(named)
