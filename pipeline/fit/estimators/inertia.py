@@ -182,12 +182,11 @@ def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidenc
         mine = mine[decimated(mine.size)]
         word = "coast" if capture.meta.test == "spin_down" else "drive"
         series = Series(capture.path, rows.time_s[mine], measured[mine], fitted[mine])
+        title = f"Acceleration in the {word}"
+        caption = "window means, no derivative taken"
         plots.append(
-            Evidence(
-                NAME, f"Acceleration in the {word}", "t_s", "acceleration_rad_s2", "line", (series,),
-                caption="window means, no derivative taken",
-            )
-        )  # fmt: skip
+            Evidence(NAME, title, "t_s", "acceleration_rad_s2", "line", (series,), caption=caption)
+        )
     speed, drag, line = found.curve(rows)
     curve = Series("drag", speed, drag, line)
     plots.append(

@@ -1,0 +1,59 @@
+"""Motion of a shaft that coasts under a drag that depends on speed alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Deceleration = Callable[[Array], Array]
+
+GRID = 3000
+
+
+def coast_down(
+    t_s: Array, speed_rad_s: float, deceleration_rad_s2: Deceleration
+) -> tuple[Array, Array]:
+    """Angle travelled [n, rad] and speed [n, rad/s] at times t_s [n] after speed_rad_s > 0.
+
+    dw/dt = -D(w): time and angle follow from quadrature over speed, t(w) = int dw/D and
+    theta(w) = int w dw/D, Simpson's rule on a grid of w; at and after standstill the shaft rests.
+    Between grid points cubic Hermite interpolation (both derivatives are known).
+    """
+    grid = np.linspace(speed_rad_s, 0.0, GRID + 1)
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    width = speed_rad_s / GRID
+    at, mid = _inverse(deceleration_rad_s2(grid)), _inverse(deceleration_rad_s2(middle))
+    time = _simpson(at, mid, width)
+    angle = _simpson(grid * at, middle * mid, width)
+    inside = np.clip(t_s, 0.0, time[-1])
+    cell = np.clip(np.searchsorted(time, inside, side="right") - 1, 0, GRID - 1)
+    step = time[cell + 1] - time[cell]
+    x = (inside - time[cell]) / step
+    speed = _hermite(x, step, grid[cell], grid[cell + 1], -1.0 / at[cell], -1.0 / at[cell + 1])
+    theta = _hermite(x, step, angle[cell], angle[cell + 1], grid[cell], grid[cell + 1])
+    return theta, speed
+
+
+def _inverse(deceleration: Array) -> Array:
+    floor = 1e-9 * max(float(np.max(deceleration)), 1e-300)
+    inverse: Array = 1.0 / np.maximum(deceleration, floor)
+    return inverse
+
+
+def _simpson(at: Array, mid: Array, width: float) -> Array:
+    pieces = width / 6.0 * (at[:-1] + 4.0 * mid + at[1:])
+    total: Array = np.concatenate([[0.0], np.cumsum(pieces)])
+    return total
+
+
+def _hermite(x: Array, step: Array, y0: Array, y1: Array, d0: Array, d1: Array) -> Array:
+    value: Array = (
+        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * y0
+        + x * (1.0 - x) ** 2 * step * d0
+        + x**2 * (3.0 - 2.0 * x) * y1
+        + x**2 * (x - 1.0) * step * d1
+    )
+    return value
