@@ -31,6 +31,15 @@ def _index(*commands: Command) -> dict[str, Command]:
 COMMANDS = _index(
     Command("run", "run", s.RunSettings, "captures in; datasheets, checks, report, recordings out"),
     Command(
+        "inspect",
+        "inspect_file",
+        s.InspectSettings,
+        "what a file holds, which columns it knows, a source map to start from",
+        positional=("file",),
+    ),
+    Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
+    Command("schemas", "schemas", s.Settings, "JSON Schemas and glossary, built into the checkout"),
+    Command(
         "calc",
         "calc",
         s.CalcSettings,
