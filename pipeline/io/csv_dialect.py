@@ -18,7 +18,7 @@ class CsvDialect:
     `fewer_columns`: rows may end before the header does, all of them at the same column.
     `time_start`, `time_increment`: regular expressions whose one group is a number [s] in the text
     before the rows.
-    `whole_last_line`: the last row must end in a line break, or a cut number passes for a whole one.
+    `whole_last_line`: the last row must end in a line break; a cut number looks whole.
     """
 
     separator: str = ","

@@ -25,7 +25,7 @@ from pipeline.io.raw_table import RawTable
 from pipeline.io.source_map import SourceMap, find_map
 from pipeline.physics.glossary import COLUMNS, METADATA
 from pipeline.records.capture import Capture, CaptureMeta, Integrity
-from pipeline.records.errors import CaptureError
+from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding
 
 Form = Literal["mcap", "csv"]
@@ -234,7 +234,10 @@ def _source(
     """
     named = beside.get("source") or listed.get("source") or own.get("source")
     if named:
-        return find_map(sources, named), True
+        try:
+            return find_map(sources, named), True
+        except UsageError as fault:
+            raise CaptureError("unknown_source", fault.message, fault.remedy) from None
     if "contract" in own:
         return None, True
     matches = [s for s in sources.values() if s.recognises(path, head, topics)]

@@ -314,9 +314,7 @@ def _per_file(section: _Section) -> tuple[tuple[str, tuple[tuple[str, str], ...]
 
 
 def find_map(maps: Mapping[str, SourceMap], name: str) -> SourceMap:
-    """The map of a name; raises CaptureError naming the known ones."""
+    """The map of a name; raises UsageError naming the known ones."""
     if name not in maps:
-        raise CaptureError(
-            "unknown_source", f"there is no source map {name!r}", f"use one of {', '.join(maps)}"
-        )
+        raise UsageError(f"there is no source map {name!r}", f"use one of {', '.join(maps)}")
     return maps[name]

@@ -1,0 +1,108 @@
+"""Guesses: which column a bench probably means by a field. For `inspect` only, never for `run`."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from pipeline.io.columns import JOINT_COLUMNS, last_part
+from pipeline.io.units import FOREIGN_UNITS, normal_unit
+from pipeline.physics.glossary import COLUMNS
+
+_NAMES: dict[str, str] = {
+    "t_s": "t time times timestamp timesec seconds second sec xaxis mstoday source sequence",
+    "theta_mech_rad": (
+        "theta thetam thetamech position pos angle shaftangle rotorangle mechanicalangle "
+        "mechangle encoder encoderposition shaftposition motorposition"
+    ),
+    "theta_elec_rad": "thetae thetael thetaelec electricalangle elecangle eangle phaseangle",
+    "omega_mech_rad_s": (
+        "omega omegam omegamech w wm speed velocity vel rpm motorspeed shaftspeed rotorspeed "
+        "angularvelocity angularspeed mechanicalspeed n motorvelocity"
+    ),
+    "torque_shaft_nm": "torque tq trq shafttorque loadtorque torqueshaft mshaft dynotorque effort",
+    "vdc_v": "vdc udc vbus ubus busvoltage dcvoltage inputvoltage supplyvoltage voltage vin",
+    "idc_a": "idc ibus busin dccurrent currentin inputcurrent buscurrent supplycurrent",
+    "temp_winding_degc": (
+        "tempwinding windingtemp windingtemperature tempmotor motortemp motortemperature "
+        "tempcoil coiltemp twinding tw"
+    ),
+    "temp_magnet_degc": "tempmagnet magnettemp magnettemperature temprotor rotortemp tm tmagnet",
+    "temp_case_degc": "tempcase casetemp casetemperature temphousing housingtemp tcase",
+    "temp_ambient_degc": "tempambient ambienttemp ambienttemperature ambient tamb tambient",
+    "theta_elec_deg": "thetaelecdeg lockedangle rotoranglee",
+    "rab_ohm": "rab rs esr resistance",
+    "freq_hz": "freq frequency testfrequency f",
+    "lab_h": "lab ls l inductance",
+    "lbc_h": "lbc",
+    "lca_h": "lca lac",
+}
+_PATTERNS: tuple[tuple[str, str, str], ...] = (
+    ("i{axis}_a", "axis", "i{} {}current {}axiscurrent current{} i{}meas i{}measured"),
+    ("v{axis}_v", "axis", "v{} u{} {}voltage {}axisvoltage voltage{} voltagedq{}"),
+    ("psi_{axis}_wb", "axis", "psi{} flux{} lambda{} {}flux"),
+    ("i{phase}_a", "phase", "i{} iphase{} phasecurrent{} current{} phase{}current"),
+    ("v{phase}_v", "phase", "vphase{} phasevoltage{} voltage{} {}n v{}n u{}n"),
+    ("v{pair}_v", "pair", "v{} u{} voltage{} line{}"),
+)
+"""Column, what varies in it, and the names it goes by."""
+_VARIANTS: dict[str, dict[str, str]] = {
+    "axis": {"d": "d", "q": "q"},
+    "phase": {"a": "a u 1 l1", "b": "b v 2 l2", "c": "c w 3 l3"},
+    "pair": {"ab": "ab uv 12", "bc": "bc vw 23", "ca": "ca wu 31"},
+}
+_BRACKET = re.compile(r"^(.*?)\s*[(\[{]\s*([^)\]}]*)\s*[)\]}]\s*$")
+_IMPLIED = {"rpm": "rpm", "mstoday": "ms", "erpm": "rpm"}
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """A column that a field probably is, and the unit its name or units row gives, if any."""
+
+    column: str
+    unit: str | None = None
+
+
+def _table() -> dict[str, str]:
+    table = {name: column for column, names in _NAMES.items() for name in names.split()}
+    for column, kind, stems in _PATTERNS:
+        for value, letters in _VARIANTS[kind].items():
+            names = (stem.format(letter) for stem in stems.split() for letter in letters.split())
+            table |= dict.fromkeys(names, column.format(**{kind: value}))
+    return table | {"va": "va_v", "vb": "vb_v", "vc": "vc_v"}
+
+
+def guess(name: str, unit_row: str | None = None) -> Guess | None:
+    """The column a field name probably means, or None.
+
+    The unit comes from the units row, brackets (`Speed [rpm]`) or the name's end (`time_ms`).
+    """
+    bare = last_part(name)
+    if bare in COLUMNS:
+        return Guess(bare)
+    table = _table() | JOINT_COLUMNS
+    bracket = _BRACKET.match(bare)
+    stem, unit = (bracket[1], bracket[2]) if bracket else (bare, unit_row)
+    column = table.get(_key(stem))
+    if column is None:
+        head, _, tail = stem.replace(" ", "_").rpartition("_")
+        column = table.get(_key(head))
+        unit = tail if column is not None and unit is None else unit
+    if column is None:
+        return None
+    return Guess(column, _unit(column, unit) or _IMPLIED.get(_key(stem)))
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _unit(column: str, text: str | None) -> str | None:
+    """The unit as the table knows it, whatever its capitals, or None."""
+    if not text:
+        return None
+    known = FOREIGN_UNITS.get(COLUMNS[column].unit, {})
+    unit = normal_unit(text)
+    if unit in known:
+        return unit
+    return next((name for name in known if name.lower() == unit.lower()), None)

@@ -1,0 +1,168 @@
+"""What any one file holds, whether or not it is a capture, and a source map to start from."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from pipeline.io.aliases import guess
+from pipeline.io.csv_dialect import CONTRACT_DIALECT
+from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
+from pipeline.io.files import read_whole
+from pipeline.io.mcap.container import MAGIC, Layout, scan
+from pipeline.io.mcap.tables import read_tables
+from pipeline.io.raw_table import RawTable
+from pipeline.io.sniff import numeric_columns, sniff
+from pipeline.io.source_map import SourceMap
+from pipeline.io.starter_map import FieldSeen, StreamSeen, starter_map
+from pipeline.records.errors import CaptureError
+
+
+@dataclass(frozen=True, slots=True)
+class InspectReport:
+    """What `describe` found. `faults` says what stands in the way of reading the file."""
+
+    path: str
+    form: Literal["mcap", "text", "unknown"]
+    size: int
+    sha256: str
+    checksums: str
+    metadata: tuple[tuple[str, str], ...]
+    source: str | None
+    streams: tuple[StreamSeen, ...]
+    faults: tuple[str, ...]
+    starter: str
+
+    @property
+    def columns(self) -> frozenset[str]:
+        """Columns that the file holds under their own name, or by a guess."""
+        found = (seen.guess for stream in self.streams for seen in stream.fields)
+        return frozenset(one.column for one in found if one is not None)
+
+
+def describe(path: Path, sources: Mapping[str, SourceMap]) -> InspectReport:
+    """Look into any file; raises CaptureError only where it cannot be opened at all."""
+    data = read_whole(path)
+    name = path.name
+    if data.startswith(MAGIC):
+        return _mcap(name, data, sources)
+    return _text(name, data, sources)
+
+
+def _mcap(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectReport:
+    faults: list[str] = []
+    metadata: dict[str, str] = {}
+    topics: list[str] = []
+    tables: list[RawTable] = []
+    checksums = "none that covers the whole file"
+    try:
+        layout = scan(data)
+        metadata = layout.metadata_named("capture")
+        if layout.data_crc_holds:
+            checksums = "cover every byte, and hold"
+        tables = _tables(layout, metadata.get("joint"), faults)
+        topics = [channel.topic for channel in layout.definitions.channels.values()]
+    except CaptureError as fault:
+        faults.append(str(fault))
+    matched = _matched(name, None, topics, sources)
+    streams = tuple(_stream(table, "messages") for table in tables)
+    starter = "" if "contract" in metadata else starter_map(streams, CONTRACT_DIALECT, None, topics)
+    return _report(name, "mcap", data, checksums, metadata, matched, streams, faults, starter)
+
+
+def _tables(layout: Layout, joint: str | None, faults: list[str]) -> list[RawTable]:
+    try:
+        return read_tables(layout, lambda _topic, _name: True, joint)
+    except CaptureError as fault:
+        faults.append(str(fault))
+        return []
+
+
+def _text(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectReport:
+    faults: list[str] = []
+    metadata: dict[str, str] = {}
+    table = None
+    dialect, header = CONTRACT_DIALECT, None
+    checksums = "none"
+    head = ""
+    try:
+        check_text(data)
+        metadata, begin = split_comments(data)
+        head = data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
+        found = sniff(data[begin : begin + MAX_HEAD_BYTES].decode("utf-8", "replace"))
+        if found is None:
+            faults.append("no table of numbers is found in it")
+        else:
+            dialect, header = found
+            parsed = read_csv(data, dialect, numeric_columns(data[begin:], dialect))
+            table = parsed.table
+            checksums = "sha256_rows covers the rows, and holds" if parsed.verified else "none"
+    except CaptureError as fault:
+        faults.append(str(fault))
+    matched = _matched(name, head, [], sources)
+    streams = () if table is None else (_stream(table, "text"),)
+    starter = ""
+    if table is not None and "contract" not in metadata:
+        starter = starter_map(streams, dialect, header, [])
+    form: Literal["text", "unknown"] = "text" if head else "unknown"
+    return _report(name, form, data, checksums, metadata, matched, streams, faults, starter)
+
+
+def _report(
+    name: str,
+    form: Literal["mcap", "text", "unknown"],
+    data: bytes,
+    checksums: str,
+    metadata: Mapping[str, str],
+    source: str | None,
+    streams: tuple[StreamSeen, ...],
+    faults: list[str],
+    starter: str,
+) -> InspectReport:
+    digest = hashlib.sha256(data).hexdigest()
+    said = tuple(metadata.items())
+    return InspectReport(
+        name, form, len(data), digest, checksums, said, source, streams, tuple(faults), starter
+    )
+
+
+def _matched(
+    name: str, head: str | None, topics: list[str], sources: Mapping[str, SourceMap]
+) -> str | None:
+    found = [source.name for source in sources.values() if source.recognises(name, head, topics)]
+    return ", ".join(found) or None
+
+
+def _stream(table: RawTable, encoding: str) -> StreamSeen:
+    units = dict(table.units)
+    fields = tuple(
+        FieldSeen(
+            name,
+            float(values[0]) if values.size else None,
+            guess(name, units.get(name)),
+            guess(name) == guess(name, units.get(name)) and _is_column(name),
+        )
+        for name, values in table.fields.items()
+    )
+    return StreamSeen(table.name, encoding, table.rows, _rate_hz(table), fields)
+
+
+def _is_column(name: str) -> bool:
+    found = guess(name)
+    return found is not None and name.rsplit(".", 1)[-1] == found.column
+
+
+def _rate_hz(table: RawTable) -> float | None:
+    """Median rate [Hz] by t_s or the log clock."""
+    time = table.fields.get("t_s")
+    if time is None and table.log_time_ns is not None and not table.blocks:
+        time = table.log_time_ns / 1e9
+    if time is None or time.size < 2:
+        return None
+    step = float(np.nanmedian(np.diff(time.astype(np.float64))))
+    return 1.0 / step if step > 0 else None

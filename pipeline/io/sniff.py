@@ -1,0 +1,86 @@
+"""How a strange text table is probably laid out: separator, header, units row, decimal sign."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable
+from dataclasses import replace
+
+from pipeline.io.csv_dialect import CsvDialect
+from pipeline.io.csv_table import MAX_HEAD_BYTES
+
+_SEPARATORS = (",", ";", "\t", "|")
+_NUMBER = re.compile(r"^[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?$|^[-+]?(nan|NaN|NAN)$")
+_LOOK_AT_LINES = 200
+
+
+def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
+    """The dialect of a text table and its header line, or None where no rows of numbers are found.
+
+    The separator is the one that parts the most rows into equally many numbers; the header is the
+    last line of as many texts before the first such row, a second one taken for the units row.
+    """
+    lines = text.split("\n")[:_LOOK_AT_LINES]
+    best: tuple[int, str, int, int] | None = None
+    for separator in _SEPARATORS:
+        counts = [_numbers(line, separator) for line in lines]
+        widths = [count for count in counts if count > 1]
+        if widths:
+            width = max(set(widths), key=lambda w: (widths.count(w), w))
+            found = (widths.count(width) * width, separator, counts.index(width), width)
+            best = max(best, found) if best else found
+    if best is None:
+        return None
+    _, separator, first, width = best
+    heads = [n for n in range(first) if _is_header(lines[n], separator, width)]
+    decimal = "," if separator != "," and re.search(r"\d,\d", lines[first]) else "."
+    dialect = CsvDialect(separator=separator, decimal=decimal, fewer_columns=True)
+    if not heads:
+        names = tuple(f"column_{n + 1}" for n in range(width))
+        return replace(dialect, names=names, skip_lines=first), None
+    header = heads[-2] if len(heads) > 1 and heads[-1] - heads[-2] == 1 else heads[-1]
+    return (
+        replace(
+            dialect,
+            skip_lines=header,
+            units_row=header != heads[-1],
+            skip_after_header=first - header - 1,
+        ),
+        lines[header],
+    )
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    row = next(csv.reader(io.StringIO(line), delimiter=separator), [])
+    cells = [cell.strip() for cell in row]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _numbers(line: str, separator: str) -> int:
+    """Fields of a row that consists of numbers (some may be empty or text), or 0."""
+    cells = _cells(line, separator)
+    numeric = sum(bool(_NUMBER.match(cell)) for cell in cells)
+    return len(cells) if numeric and numeric * 2 >= len(cells) else 0
+
+
+def _is_header(line: str, separator: str, width: int) -> bool:
+    cells = _cells(line, separator)
+    return len(cells) >= min(width, 2) and not any(_NUMBER.match(cell) for cell in cells[:1])
+
+
+def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
+    """A filter for the columns whose first rows hold numbers."""
+    lines = body[:MAX_HEAD_BYTES].decode("utf-8", "replace").replace("\r\n", "\n").split("\n")
+    header = dialect.skip_lines
+    first = header + (0 if dialect.names else 1 + dialect.skip_after_header)
+    names = list(dialect.names or _cells(lines[header], dialect.separator))
+    texts: set[str] = set()
+    for line in lines[first : first + _LOOK_AT_LINES]:
+        for name, cell in zip(names, _cells(line, dialect.separator), strict=False):
+            if cell and not _NUMBER.match(cell):
+                texts.add(name)
+    return (frozenset(names) - texts).__contains__
