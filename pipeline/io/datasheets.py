@@ -1,0 +1,113 @@
+"""Reading back the datasheets that a run wrote."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.errors import UsageError
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import Budget, Contribution, effective_dof
+
+SCHEMA = "motor-datasheet/1"
+MAX_BYTES = 1 << 26
+
+
+def read_datasheets(output: Path) -> tuple[Datasheet, ...]:
+    """Every datasheet of an output folder, by motor.
+
+    Raises UsageError where the folder has none, or where a file is no datasheet of version 1.
+    """
+    paths = sorted((output / "datasheets").glob("*.json"))
+    if not paths:
+        raise UsageError(f"no datasheets in {output}", "name the output folder of a run")
+    sheets = [_read(path) for path in paths]
+    return tuple(sorted(sheets, key=lambda sheet: sheet.motor_id))
+
+
+def _read(path: Path) -> Datasheet:
+    if path.stat().st_size > MAX_BYTES:
+        raise UsageError(f"{path.name} is too large for a datasheet", "run again")
+    try:
+        document = json.loads(path.read_bytes())
+        if document["schema"] != SCHEMA:
+            raise UsageError(f"{path.name} is {document['schema']}, not {SCHEMA}", "run again")
+        return datasheet_of(document)
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise UsageError(f"{path.name} is no datasheet: {error}", "run again") from error
+
+
+def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
+    """The record that `Datasheet.document` wrote; the inverse of it.
+
+    A contribution's own degrees of freedom are not published: those of type A share what gives
+    the published total (GUM eq. G.2b). Raises LookupError, TypeError or ValueError otherwise.
+    """
+    provenance = document["provenance"]
+    return Datasheet(
+        motor_id=document["motor_id"],
+        motor_type=document["motor_type"],
+        lot=document["lot"],
+        version=document["version"],
+        status=document["status"],
+        why=tuple(document.get("why", ())),
+        captures=tuple(
+            CaptureReference(c["path"], c["sha256"], c["test"], c["integrity"])
+            for c in provenance["captures"]
+        ),
+        config_sha256=provenance["config_sha256"],
+        code_version=provenance["code_version"],
+        constants={n: _estimate(n, e) for n, e in document["constants"].items()},
+        alternatives=tuple(_estimate(e["name"], e) for e in document.get("alternatives", ())),
+        checks=tuple(_check(check) for check in document["checks"]),
+    )
+
+
+def _check(said: Mapping[str, Any]) -> Check:
+    return Check(
+        name=said["name"],
+        status=said["status"],
+        meaning=said["meaning"],
+        value=said["value"],
+        limit=said["limit"],
+        unit=said["unit"],
+        suspect=said["suspect"],
+    )
+
+
+def _estimate(name: str, said: Mapping[str, Any]) -> Estimate:
+    bounds = said.get("bounds")
+    return Estimate(
+        name=name,
+        value=said["value"],
+        unit=said["unit"],
+        status=said["status"],
+        method=said["method"],
+        budget=_budget(said),
+        at=said["at"],
+        captures=tuple(said["captures"]),
+        note=said["note"],
+        bounds=None if bounds is None else (bounds[0], bounds[1]),
+        at_bound=said.get("at_bound", False),
+    )
+
+
+def _budget(said: Mapping[str, Any]) -> Budget:
+    parts = said.get("budget", ())
+    dof = said["dof"]
+    if dof is None or not parts:
+        return tuple(Contribution(p["source"], p["u"], p["kind"]) for p in parts)
+    # With one dof for every type A part, dof_total = dof * u^4 / sum(u_i^4).
+    unit = tuple(
+        Contribution(p["source"], p["u"], p["kind"], 1.0 if p["kind"] == "A" else math.inf)
+        for p in parts
+    )
+    share = effective_dof(unit)
+    return tuple(
+        Contribution(p.source, p.u, p.kind, dof / share if p.kind == "A" else math.inf)
+        for p in unit
+    )

@@ -1,0 +1,56 @@
+"""`plan`: which test to record next, for which constant or doubt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.crosscheck.plan import Aims, Known, Plan, Way, make_plan
+from pipeline.crosscheck.registry import rules
+from pipeline.fit.registry import estimators
+from pipeline.io.datasheets import read_datasheets
+from pipeline.io.limits import limits_file, required_constants
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.errors import UsageError
+from pipeline.records.outcome import Outcome
+from pipeline.settings import PlanSettings, configuration_folder
+
+# Relative standard uncertainties that a bench of calibrated instruments reaches.
+U_REL = 0.02
+U_REL_OF = {
+    "r_phase_ohm": 0.005,
+    "ld_h": 0.01,
+    "lq_h": 0.01,
+    "psi_pm_wb": 0.005,
+    "kt_peak_nm_a": 0.005,
+    "j_rotor_kgm2": 0.02,
+    "torque_coulomb_nm": 0.05,
+    "b_visc_nm_s_rad": 0.1,
+    "resistance_imbalance": 1.0,
+    "cogging_peak_nm": 0.1,
+    "cogging_amplitude_nm": 0.1,
+    "rth_winding_k_w": 0.1,
+    "temp_coeff_copper_1_k": 0.05,
+    "temp_coeff_magnet_1_k": 0.2,
+}
+
+
+def main(settings: PlanSettings) -> Outcome:
+    """The plan of one motor of an output folder, or of each; raises UsageError for neither."""
+    sheets = read_datasheets(Path(settings.output))
+    chosen = [s for s in sheets if settings.motor is None or s.motor_id == settings.motor]
+    if not chosen:
+        known = ", ".join(sheet.motor_id for sheet in sheets)
+        raise UsageError(f"no motor {settings.motor!r} in {settings.output}", f"known are {known}")
+    required = required_constants(limits_file(configuration_folder() / "limits", "default"))
+    plans = (plan_of(sheet, frozenset(required)) for sheet in chosen)
+    return Outcome(text="\n\n".join(plan.text() for plan in plans))
+
+
+def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:
+    """What to record next of the motor of a datasheet, to have `required` and settle its doubts."""
+    tests = frozenset(capture.test for capture in sheet.captures)
+    known = Known(sheet.motor_id, sheet.constants, sheet.checks, tests)
+    by_rank = sorted(estimators(), key=lambda estimator: (estimator.rank, estimator.name))
+    ways = [Way(e.gives, e.tests, e.experiment, e.uses) for e in by_rank]
+    check_tests = {rule.name: rule.tests for rule in rules()}
+    return make_plan(known, ways, check_tests, Aims(required, U_REL, U_REL_OF))

@@ -1,0 +1,119 @@
+"""`plan` on an output folder, and datasheets read back as they were written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline.fit.registry import estimators, fit_all
+from pipeline.io.datasheets import datasheet_of, read_datasheets
+from pipeline.io.publish import canonical_json
+from pipeline.physics.glossary import CONSTANTS, TESTS
+from pipeline.records.capture import Campaign
+from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.errors import UsageError
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.uncertainty import type_a, type_b
+from pipeline.settings import PlanSettings
+from pipeline.stages.plan import main
+
+
+def sheet(motor_id: str, constants: dict[str, Estimate], *tests: str) -> Datasheet:
+    captures = tuple(CaptureReference(f"{t}.csv", "0" * 64, t, "verified") for t in tests)
+    check = Check("kt_vs_ke", "not_evaluated", "needs a torque_map for Kt")
+    alternatives = tuple(constants.values())[:1]
+    return Datasheet(
+        motor_id=motor_id,
+        motor_type="made-up",
+        lot=None,
+        version="a" * 64,
+        status="provisional",
+        why=("missing",),
+        captures=captures,
+        config_sha256="b" * 64,
+        code_version="0.1.0+1",
+        constants=constants,
+        alternatives=alternatives,
+        checks=(check,),
+    )
+
+
+@pytest.fixture
+def resistance_alone() -> Datasheet:
+    budget = type_a("scatter:resistance:fit", 1e-4, 40.0) + type_a("scatter:soak:fit", 2e-4, 40.0)
+    r = Estimate(
+        "r_phase_ohm",
+        0.31,
+        "ohm",
+        "measured",
+        "resistance",
+        (*budget, *type_b("voltage@rig-1", 3e-4)),
+        {"temp_degc": 25.0},
+        ("a.csv",),
+        "",
+        (0.0, 1e3),
+    )
+    j = not_identifiable("j_rotor_kgm2", "kg·m²", "spin_down", "record a spin_down")
+    return sheet("r-only", {"r_phase_ohm": r, "j_rotor_kgm2": j}, "resistance")
+
+
+def write(folder: Path, *sheets: Datasheet) -> None:
+    (folder / "datasheets").mkdir(parents=True)
+    for one in sheets:
+        path = folder / "datasheets" / f"{one.motor_id}.json"
+        path.write_bytes(canonical_json(one.document()))
+
+
+def test_a_datasheet_comes_back_as_it_was_written(resistance_alone: Datasheet) -> None:
+    document = json.loads(canonical_json(resistance_alone.document()))
+    again = datasheet_of(document)
+    back = json.loads(canonical_json(again.document()))
+    dof = [d["constants"]["r_phase_ohm"].pop("dof") for d in (document, back)]
+    other = [d["alternatives"][0].pop("dof") for d in (document, back)]
+    assert dof[1] == pytest.approx(dof[0])
+    assert other[1] == pytest.approx(other[0])
+    assert back == document
+
+
+def test_plan_of_a_motor_with_one_test(tmp_path: Path, resistance_alone: Datasheet) -> None:
+    """Resistance is there and good: never again; open circuit, torque map and steps are named."""
+    write(tmp_path, resistance_alone)
+    outcome = main(PlanSettings(output=str(tmp_path), motor="r-only"))
+    assert outcome.exit_code == 0
+    heads = [line for line in outcome.text.splitlines() if line[:1].isdigit()]
+    tests = [line.split(". ")[1].split(":")[0].split(",")[0] for line in heads]
+    assert set(tests) <= set(TESTS)
+    assert {"open_circuit", "torque_map"} <= set(tests[:3])
+    assert "for psi_pm_wb: nothing recorded gives it" in outcome.text
+    assert "for r_phase_ohm" not in outcome.text
+
+
+def test_every_constant_can_be_planned(tmp_path: Path) -> None:
+    """From no usable capture at all, each constant that can be had is some step's business."""
+    nothing = sheet("nothing", fit_all(Campaign("nothing", ()), {})[0].chosen())
+    write(tmp_path, nothing)
+    text = main(PlanSettings(output=str(tmp_path))).text
+    given = {name for estimator in estimators() for name in estimator.gives} & set(CONSTANTS)
+    missing = [name for name in sorted(given) if f"for {name}:" not in text]
+    assert missing == []
+    assert "what no further capture settles" not in text
+
+
+def test_unknown_motor_and_empty_folder(tmp_path: Path, resistance_alone: Datasheet) -> None:
+    write(tmp_path / "some", resistance_alone)
+    with pytest.raises(UsageError, match="known are r-only"):
+        main(PlanSettings(output=str(tmp_path / "some"), motor="other"))
+    with pytest.raises(UsageError, match="no datasheets in"):
+        main(PlanSettings(output=str(tmp_path / "none")))
+
+
+@pytest.mark.parametrize(
+    "content", [b"{}", b"[1]", b"no", b'{"schema": "findings/1"}', b"[" * 9999]
+)
+def test_a_file_that_is_no_datasheet(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "datasheets").mkdir()
+    (tmp_path / "datasheets" / "x.json").write_bytes(content)
+    with pytest.raises(UsageError, match=r"x\.json"):
+        read_datasheets(tmp_path)
