@@ -27,9 +27,9 @@ LEAST_ROWS = 20
 class Point:
     """Means over one settled step; NaN where a column is missing.
 
-    `omega_mech_rad_s` is the slope of the angle where it is there. `u_torque_nm` is the standard
-    error of the mean torque, correlation included. `cos_turn`, `sin_turn` are means over the
-    shaft angle (0 where it is missing). `group` numbers the constant-speed stretches.
+    `omega_mech_rad_s` is the slope of the angle where it is there; `u_torque_nm`, `u_vd_v` and
+    `u_vq_v` are standard errors of means, correlation included. `cos_turn`, `sin_turn` are means
+    over the shaft angle (0 where it is missing). `group` numbers the constant-speed stretches.
     """
 
     group: int
@@ -41,6 +41,8 @@ class Point:
     vq_v: float
     torque_nm: float
     u_torque_nm: float
+    u_vd_v: float
+    u_vq_v: float
     temp_magnet_degc: float
     cos_turn: float
     sin_turn: float
@@ -196,14 +198,29 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
     else:
         omega = float(np.mean(data["omega_mech_rad_s"][rows]))
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
-    torque = data["torque_shaft_nm"][rows]
-    u = float("nan")
-    if np.all(np.isfinite(torque)):
-        u = float(np.std(torque) * np.sqrt(autocorrelation_time(torque) / torque.size))
+    u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}
     if not np.isfinite(means["temp_magnet_degc"]):
         means["temp_magnet_degc"] = magnet_temperature(capture)[0]
     return Point(
-        0, t.size, omega, means["id_a"], means["iq_a"], means["vd_v"], means["vq_v"],
-        means["torque_shaft_nm"], u, means["temp_magnet_degc"],
-        cos_turn, sin_turn, capture,
-    )  # fmt: skip
+        group=0,
+        rows=t.size,
+        omega_mech_rad_s=omega,
+        id_a=means["id_a"],
+        iq_a=means["iq_a"],
+        vd_v=means["vd_v"],
+        vq_v=means["vq_v"],
+        torque_nm=means["torque_shaft_nm"],
+        u_torque_nm=u["torque_shaft_nm"],
+        u_vd_v=u["vd_v"],
+        u_vq_v=u["vq_v"],
+        temp_magnet_degc=means["temp_magnet_degc"],
+        cos_turn=cos_turn,
+        sin_turn=sin_turn,
+        capture=capture,
+    )
+
+
+def _error_of_mean(part: Array) -> float:
+    if not np.all(np.isfinite(part)):
+        return float("nan")
+    return float(np.std(part) * np.sqrt(autocorrelation_time(part) / part.size))
