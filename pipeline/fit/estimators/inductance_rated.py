@@ -113,7 +113,8 @@ def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
 
     A point with no q current is a pair with itself. Voltages are first brought to the sampling
     instant (`voltage_timing`) and turned back by the angle delta + tau w_e that the pairs without
-    d current show: there v+ + v- = 2 j w_e psi_d, whatever R and L.
+    d current show: there v+ + v- = 2 j w_e psi_d, whatever R and L. What of that angle differs
+    from pair to pair (an eccentric encoder) goes into the uncertainty.
     """
     largest = max(max(abs(p.iq_a), abs(p.id_a)) for p in points)
     matched = [
@@ -124,7 +125,7 @@ def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
         and abs(one.iq_a + other.iq_a) < SAME * largest
         and (one is not other or abs(one.iq_a) < SAME * largest)
     ]
-    offset, late_s = _lateness(matched, pole_pairs, largest)
+    offset, late_s, wobble = _lateness(matched, pole_pairs, largest)
     fluxes = []
     for one, other in matched:
         plus, minus = (one, other) if one.iq_a >= other.iq_a else (other, one)
@@ -141,12 +142,26 @@ def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
                 float((first - second).imag) / 2.0,
                 half.imag / omega,
                 gap.real / omega,
-                share * float(np.hypot(plus.u_vq_v, minus.u_vq_v)) / abs(omega),
-                share * float(np.hypot(plus.u_vd_v, minus.u_vd_v)) / abs(omega),
+                _root_sum(
+                    share * plus.u_vq_v,
+                    share * minus.u_vq_v,
+                    wobble * (abs(half.real) + abs(gap.real)) / np.sqrt(2.0),
+                )
+                / abs(omega),
+                _root_sum(
+                    share * plus.u_vd_v,
+                    share * minus.u_vd_v,
+                    wobble * (abs(half.imag) + abs(gap.imag)) / np.sqrt(2.0),
+                )
+                / abs(omega),
                 0.5 * (plus.temp_magnet_degc + minus.temp_magnet_degc),
             )
         )
     return fluxes
+
+
+def _root_sum(*parts: float) -> float:
+    return float(np.sqrt(sum(part**2 for part in parts)))
 
 
 def _instant(point: Point, pole_pairs: int) -> complex:
@@ -170,8 +185,8 @@ def _period_s(capture: Capture) -> float:
 
 def _lateness(
     matched: Sequence[tuple[Point, Point]], pole_pairs: int, largest: float
-) -> tuple[float, float]:
-    """Angle offset [rad] and delay [s] of the voltages; the offset needs two speeds."""
+) -> tuple[float, float, float]:
+    """Angle offset [rad] and delay [s] of the voltages; what is left, rms [rad]. The offset needs two speeds."""
     omegas, angles = [], []
     for one, other in matched:
         if max(abs(one.id_a), abs(other.id_a)) > SAME * largest:
@@ -181,11 +196,15 @@ def _lateness(
         omegas.append(omega)
         angles.append(float(np.angle(total)))
     if not omegas:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     spread = np.ptp(omegas) > 0.1 * np.max(np.abs(omegas))
     columns = [np.ones(len(omegas)), np.array(omegas)] if spread else [np.array(omegas)]
-    found = np.linalg.lstsq(np.column_stack(columns), np.array(angles), rcond=None)[0]
-    return (float(found[0]), float(found[1])) if spread else (0.0, float(found[0]))
+    design = np.column_stack(columns)
+    found = np.linalg.lstsq(design, np.array(angles), rcond=None)[0]
+    free = len(angles) - design.shape[1]
+    left = np.array(angles) - design @ found
+    wobble = float(np.sqrt(left @ left / free)) if free > 0 else 0.0
+    return (float(found[0]) if spread else 0.0), float(found[-1]), wobble
 
 
 def _corrected(
