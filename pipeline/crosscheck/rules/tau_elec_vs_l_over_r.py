@@ -21,11 +21,10 @@ Array = NDArray[np.float64]
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
-    """The smallest step on each rotor position, its area over its height, over L/R.
+    """The smallest current step on each rotor position, its time constant over L/R.
 
-    (i_end - i) integrated from any instant of an exponential is tau (i_end - i there): no
-    voltage, no gain and no edge enters, so this sees what L and R cannot say of themselves (an
-    open delta, a lossy core, a drooping supply).
+    Only the shape of the current enters, no voltage and no gain, so this sees what L and R cannot
+    say of themselves: an open delta, a lossy core, resistance in the leads.
     """
     ld, lq = constants.best("ld_h"), constants.best("lq_h")
     r_phase = constants.best("r_phase_ohm")
@@ -57,28 +56,27 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 
 def step_time_constants_s(t_s: Array, v_v: Array, i_a: Array) -> list[float]:
-    """Time constants [s] of each step of a trace [n] that settles before the next step.
+    """Time constants [s] of each step of a trace [n], by the integral form of an exponential.
 
-    An edge is where the voltage moves by more than half of its largest move between samples. A
-    segment counts if its last fifth is level within 2 % of the step, and if the time constant
-    fits into it five times.
+    i(t) = c + i_end t/tau - (1/tau) integral of i dt is linear in c, i_end/tau and 1/tau; nothing
+    is differentiated, and the current need not settle. An edge is where the voltage moves by more
+    than half of its largest move between samples. A segment counts if it spans three time
+    constants and its current moves by 20 times what the line leaves over.
     """
     moves = np.abs(np.diff(v_v))
     edges = np.flatnonzero(moves > 0.5 * moves.max()) + 1
     found = []
     for start, stop in zip(edges, [*edges[1:], v_v.size], strict=True):
-        t, i = t_s[start : stop - 1], i_a[start : stop - 1]
+        t, i = t_s[start : stop - 1] - t_s[start], i_a[start : stop - 1]
         if t.size < 50:
             continue
-        tail = i[-t.size // 5 :]
-        end = float(tail.mean())
-        height = end - float(i[0])
-        halves = abs(float(tail[: tail.size // 2].mean() - tail[tail.size // 2 :].mean()))
-        if abs(height) < 20.0 * float(tail.std()) or halves > 0.02 * abs(height):
-            continue
-        tau = float(np.trapezoid(end - i, t)) / height
-        if 0.0 < tau < (t[-1] - t[0]) / 5.0:
-            found.append(tau)
+        area = np.concatenate([[0.0], np.cumsum(0.5 * (i[1:] + i[:-1]) * np.diff(t))])
+        columns = np.column_stack([np.ones(t.size), t, area])
+        beta = np.linalg.lstsq(columns, i, rcond=None)[0]
+        left = float(np.std(i - columns @ beta))
+        moved = float(np.ptp(columns @ beta))
+        if beta[2] < 0.0 and -1.0 / beta[2] < t[-1] / 3.0 and moved > 20.0 * left:
+            found.append(-1.0 / float(beta[2]))
     return found
 
 
