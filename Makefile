@@ -4,18 +4,24 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: demo test test-slow lint recovery lock clean help
+.PHONY: help demo demo-data test test-slow lint lock clean
 
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
 	@echo "make test      the default tests"
 	@echo "make test-slow the long sweeps as well"
 	@echo "make lint      style, types, import direction"
+	@echo "make demo-data simulate data/demo anew"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
 
+# One motor of the demo has a poor joint: its check fails, and `run` says so by exit code 1.
 demo: $(READY)
-	$(PY) -m pipeline run input=data/demo output=reports/demo
+	@$(PY) -m pipeline run input=data/demo output=reports/demo || [ $$? -eq 1 ]
+
+demo-data: $(READY)
+	rm -rf data/demo
+	$(PY) -m pipeline simulate output=data/demo fleet=demo
 
 test: $(READY)
 	$(PY) -m pytest -n logical --dist loadfile
