@@ -14,7 +14,6 @@ differ in the ids that Rerun draws, so compare their content, never their bytes.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,11 +23,10 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.io.publish import sync_folder
+from pipeline.io.publish import write_whole
 from pipeline.io.recording_sheet import sheet_markdown
 from pipeline.records.capture import Capture
 from pipeline.records.datasheet import Datasheet
-from pipeline.records.errors import MachineError
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 
@@ -38,7 +36,7 @@ if TYPE_CHECKING:
 APPLICATION = "motor-datasheets"
 ROWS_A_CHUNK = 4096
 TIME, ROW = "t", "row"
-FOOTER, TAIL_BYTES = b"RRF2FOOT", 32
+FLUSH_S = 300.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,37 +76,34 @@ def write_recording(
     `evidence` may be of the whole campaign; what was fitted to other captures is left out.
     Raises MachineError where the disk refuses.
     """
+    write_whole(path, recording_bytes(capture, evidence, datasheet, findings))
+
+
+def recording_bytes(
+    capture: Capture,
+    evidence: Sequence[Evidence],
+    datasheet: Datasheet | None = None,
+    findings: Sequence[Finding] = (),
+) -> bytes:
+    """One capture's .rrd, footer included.
+
+    Made in memory, since a stream onto a full disk may wait for its dead writer for ever.
+    """
     import rerun as rr
 
     from pipeline.io.recording_layout import capture_layout
 
-    traces, fits = list(capture_traces(capture)), list(fit_traces(capture, evidence))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     rr.set_strict_mode(True)
+    traces, fits = list(capture_traces(capture)), list(fit_traces(capture, evidence))
     name = recording_id(capture, datasheet)
     stream = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=False)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        stream.save(temporary, default_blueprint=capture_layout(traces, fits))
-        _send(stream, capture, [*traces, *(fit.trace for fit in fits)])
-        _send_texts(stream, capture, datasheet, findings)
-        stream.flush()
-        stream.disconnect()
-        _check_whole(temporary)
-        temporary.replace(path)
-        sync_folder(path.parent)
-    except (OSError, RuntimeError) as error:
-        temporary.unlink(missing_ok=True)
-        raise MachineError(f"cannot write {path.name}: {error}", "free the disk") from error
-
-
-def _check_whole(path: Path) -> None:
-    """Syncs a finished recording; OSError where its footer did not reach the disk."""
-    with path.open("rb+") as stream:
-        os.fsync(stream.fileno())
-        stream.seek(max(path.stat().st_size - TAIL_BYTES, 0))
-        if FOOTER not in stream.read():
-            raise OSError("the recording ends early")
+    memory = stream.memory_recording()
+    stream.send_blueprint(capture_layout(traces, fits), make_active=False, make_default=True)
+    _send(stream, capture, [*traces, *(fit.trace for fit in fits)])
+    _send_texts(stream, capture, datasheet, findings)
+    stream.flush(timeout_sec=FLUSH_S)
+    content: bytes = memory.drain_as_bytes()
+    return content
 
 
 def recording_id(capture: Capture, datasheet: Datasheet | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipeline.physics.glossary import suffix_of
@@ -27,27 +28,46 @@ PALETTE: tuple[Colour, ...] = (
 )
 MOST_FITS, MOST_GROUPS = 3, 5
 AIR = 1.1
-Line = tuple[str, str, Colour]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One curve: `component` of `entity`, and how it is drawn."""
+
+    entity: str
+    component: str
+    name: str
+    colour: Colour
+
+
+@dataclass(frozen=True, slots=True)
+class ViewPlan:
+    """One time series view; `reach` locks its y axis to -reach..reach, `share` is its height."""
+
+    name: str
+    lines: tuple[Line, ...]
+    share: float
+    reach: float | None = None
+
+
+def planned_views(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
+    """Fitted quantities with their residuals first, all other columns by unit after them."""
+    views = []
+    quantities = list(dict.fromkeys((fit.title, fit.y_name) for fit in fits))[:MOST_FITS]
+    for title, y_name in quantities:
+        own = [fit for fit in fits if (fit.title, fit.y_name) == (title, y_name)]
+        views += [_fit_view(title, y_name, own, traces), _residual_view(y_name, own)]
+    groups = _by_unit(traces, {y_name for _, y_name in quantities})
+    views += [_group_view(unit, columns) for unit, columns in list(groups.items())[:MOST_GROUPS]]
+    return tuple(views)
 
 
 def capture_layout(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> Blueprint:
-    """Fitted quantities with their residuals on top, all other columns by unit below.
-
-    Findings and datasheet stand at the right; the x axes are linked, panels hidden.
-    """
+    """The planned views at the left, datasheet and findings at the right, x axes linked."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
-    plots, shares = [], []
-    quantities = list(dict.fromkeys((fit.title, fit.y_name) for fit in fits))
-    for title, y_name in quantities[:MOST_FITS]:
-        own = [fit for fit in fits if (fit.title, fit.y_name) == (title, y_name)]
-        plots += [_fit_view(title, y_name, own, traces), _residual_view(y_name, own)]
-        shares += [3.0, 1.6]
-    fitted = {y_name for _, y_name in quantities[:MOST_FITS]}
-    for unit, columns in list(_by_unit(traces, fitted).items())[:MOST_GROUPS]:
-        plots.append(_group_view(unit, columns))
-        shares.append(2.0)
+    plans = planned_views(traces, fits)
     side = rrb.Vertical(
         rrb.TextDocumentView(origin="/datasheet", name="Datasheet"),
         rrb.TextLogView(
@@ -59,9 +79,9 @@ def capture_layout(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> Bluepri
         ),
         row_shares=[3.0, 1.0],
     )
-    left = rrb.Vertical(*plots, row_shares=shares) if plots else rrb.Vertical()
+    plots = rrb.Vertical(*map(_view, plans), row_shares=[plan.share for plan in plans] or None)
     return rrb.Blueprint(
-        rrb.Horizontal(left, side, column_shares=[2.4, 1.0]),
+        rrb.Horizontal(plots, side, column_shares=[2.4, 1.0]),
         rrb.TimePanel(state="collapsed", timeline=traces[0].index if traces else None),
         auto_views=False,
         auto_layout=False,
@@ -71,38 +91,40 @@ def capture_layout(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> Bluepri
 
 def _fit_view(
     title: str, y_name: str, fits: Sequence[FitTrace], traces: Sequence[Trace]
-) -> TimeSeriesView:
+) -> ViewPlan:
     """Measured under model; the measured trace is the whole column where the capture has it."""
-    lines: dict[str, list[Line]] = {}
     home = next((trace for trace in traces if y_name in trace.columns), None)
-    if home is not None:
-        lines[home.entity] = [(y_name, "measured", MEASURED)]
-    for fit in fits:
-        after = f" {fit.label}" if fit.label and len(fits) > 1 else ""
-        own: list[Line] = [("fitted", f"model{after}", MODEL)]
-        if home is None:
-            own.insert(0, ("measured", f"measured{after}", MEASURED))
-        lines[fit.trace.entity] = own
-    return _view(f"{title}: {_named(y_name)}", lines)
+    if home is None:
+        measured = [
+            Line(f.trace.entity, "measured", f"measured{_after(f, fits)}", MEASURED) for f in fits
+        ]
+    else:
+        measured = [Line(home.entity, y_name, "measured", MEASURED)]
+    models = [Line(f.trace.entity, "fitted", f"model{_after(f, fits)}", MODEL) for f in fits]
+    return ViewPlan(f"{title}: {_named(y_name)}", (*measured, *models), 3.0)
 
 
-def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> TimeSeriesView:
+def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
     """What is left over, on an axis that is symmetric and stays so."""
     reach = AIR * max(fit.reach for fit in fits) or 1.0
-    lines: dict[str, list[Line]] = {}
-    for fit in fits:
-        after = f" {fit.label}" if fit.label and len(fits) > 1 else ""
-        lines[fit.trace.entity] = [("residual", f"measured − model{after}", RESIDUAL)]
-    return _view(f"{_named(y_name)}, measured − model", lines, (-reach, reach))
+    lines = [
+        Line(f.trace.entity, "residual", f"measured − model{_after(f, fits)}", RESIDUAL)
+        for f in fits
+    ]
+    return ViewPlan(f"{_named(y_name)}, measured − model", tuple(lines), 1.6, reach)
 
 
-def _group_view(unit: str, columns: Sequence[tuple[str, str]]) -> TimeSeriesView:
-    lines: dict[str, list[Line]] = {}
-    for place, (entity, column) in enumerate(columns):
-        colour = PALETTE[place % len(PALETTE)]
-        lines.setdefault(entity, []).append((column, _stem(column), colour))
-    names = ", ".join(_stem(column) for _, column in columns)
-    return _view(f"{names} [{unit}]", lines)
+def _after(fit: FitTrace, fits: Sequence[FitTrace]) -> str:
+    return f" {fit.label}" if fit.label and len(fits) > 1 else ""
+
+
+def _group_view(unit: str, columns: Sequence[tuple[str, str]]) -> ViewPlan:
+    lines = [
+        Line(entity, column, _stem(column), PALETTE[place % len(PALETTE)])
+        for place, (entity, column) in enumerate(columns)
+    ]
+    names = ", ".join(line.name for line in lines)
+    return ViewPlan(f"{names} [{unit}]", tuple(lines), 2.0)
 
 
 def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[str, str]]]:
@@ -115,27 +137,28 @@ def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[
     return groups
 
 
-def _view(
-    name: str, lines: dict[str, list[Line]], value_range: tuple[float, float] | None = None
-) -> TimeSeriesView:
+def _view(plan: ViewPlan) -> TimeSeriesView:
     import rerun.blueprint as rrb
     from rerun.blueprint.components import LinkAxis
 
     axis_y = None
-    if value_range is not None:
-        axis_y = rrb.archetypes.ScalarAxis(range=value_range, zoom_lock=True)
+    if plan.reach is not None:
+        axis_y = rrb.archetypes.ScalarAxis(range=(-plan.reach, plan.reach), zoom_lock=True)
+    overrides: dict[Any, list[Any]] = {}
+    for line in plan.lines:
+        overrides.setdefault(line.entity, []).append(_curve(line))
     return rrb.TimeSeriesView(
-        name=name,
+        name=plan.name,
         origin="/",
-        contents=list(lines),
+        contents=list(overrides),
         axis_x=rrb.archetypes.TimeAxis(link=LinkAxis.LinkToGlobal),
         axis_y=axis_y,
         plot_legend=rrb.Corner2D.RightTop,
-        overrides={entity: [_line(*one) for one in own] for entity, own in lines.items()},
+        overrides=overrides,
     )
 
 
-def _line(component: str, name: str, colour: Colour) -> Any:
+def _curve(line: Line) -> Any:
     """A curve of one column; MinMax, since averaging would hide a spike."""
     import rerun as rr
     from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
@@ -143,12 +166,12 @@ def _line(component: str, name: str, colour: Colour) -> Any:
     mapping = VisualizerComponentMapping(
         target="Scalars:scalars",
         source_kind=ComponentSourceKind.SourceComponent,
-        source_component=component,
+        source_component=line.component,
     )
     style = rr.SeriesLines(
-        names=name,
-        colors=colour,
-        widths=2.6 if colour == MEASURED else 1.4,
+        names=line.name,
+        colors=line.colour,
+        widths=2.6 if line.colour == MEASURED else 1.4,
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
     return style.visualizer(mappings=[mapping])

@@ -1,0 +1,275 @@
+"""A recording read back holds what the capture and the fit held, and its layout points at it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.io.recording import capture_traces, fit_traces, recording_id, write_recording
+from pipeline.io.recording_layout import planned_views
+from pipeline.io.recording_sheet import sheet_markdown
+from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.datasheet import Check, Datasheet
+from pipeline.records.errors import MachineError
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.finding import Finding
+from pipeline.records.uncertainty import type_a
+
+PATH = "joint-P0/current_step_0.mcap"
+ROWS = 10_000
+
+
+def make_capture(motor_id: str = "joint-P0") -> Capture:
+    t_s = 0.25 + np.arange(ROWS) * 5e-5
+    current = 10 * (1 - np.exp(-(t_s - 0.25) / 9.2e-4))
+    noise = np.random.default_rng(5).normal(0, 0.02, ROWS)
+    fast = pl.DataFrame({"t_s": t_s, "ia_a": current + noise, "vab_v": np.full(ROWS, 6.2)})
+    slow = pl.DataFrame({"t_s": t_s[::1000], "temp_winding_degc": np.linspace(25, 26, 10)})
+    slow[3, "temp_winding_degc"] = np.nan
+    return Capture(PATH, "ab" * 32, "verified", CaptureMeta(motor_id, "current_step"), (fast, slow))
+
+
+def make_evidence(capture: Capture) -> tuple[Evidence, ...]:
+    t_s = capture.tables[0]["t_s"].to_numpy()
+    fitted = 10 * (1 - np.exp(-(t_s - 0.25) / 9.2e-4))
+    own = Series("", t_s, capture.tables[0]["ia_a"].to_numpy(), fitted)
+    return (
+        Evidence("step", "Step", "t_s", "ia_a", "line", (own,), capture.path),
+        Evidence("step", "Other file", "t_s", "ia_a", "line", (own,), "joint-P0/other.mcap"),
+        Evidence("step", "No time", "iq_a", "ia_a", "scatter", (own,), capture.path),
+    )
+
+
+def make_sheet() -> Datasheet:
+    resistance = Estimate(
+        "r_phase_ohm", 0.31, "ohm", "measured", "step", type_a("scatter:step:r", 4e-4), {}, (PATH,)
+    )
+    return Datasheet(
+        motor_id="a|b *x*",
+        motor_type=None,
+        lot=None,
+        version="5f" * 32,
+        status="provisional",
+        why=("not approved",),
+        captures=(),
+        config_sha256="",
+        code_version="",
+        constants={"r_phase_ohm": resistance},
+        alternatives=(),
+        checks=(Check("kt_vs_ke", "fail", "x | y", 1.15, 0.01, "1", "2/sqrt(3)"),),
+    )
+
+
+FINDINGS = (
+    Finding(PATH, "warning", "gap", "12 samples are missing", "look at the cable", (400, 412)),
+    Finding(PATH, "refused", "odd", "odd", "ask"),
+)
+
+
+def read_back(path: Path, entity: str) -> pl.DataFrame:
+    from rerun.chunk import RrdReader
+
+    chunks = RrdReader(str(path)).stream().filter(content=entity, is_static=False)
+    frames = [pl.from_arrow(chunk.to_record_batch()) for chunk in chunks]
+    index = next(name for name in ("t", "row") if name in frames[0].columns)
+    whole = pl.concat(frames).drop("rerun.controls.RowId").sort(index)
+    return whole.explode(pl.exclude(index))
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    capture = make_capture()
+    path = tmp_path_factory.mktemp("recordings") / "joint-P0" / "step.rrd"
+    write_recording(capture, make_evidence(capture), path, make_sheet(), FINDINGS)
+    return path
+
+
+def test_columns_come_back_as_float32_on_their_own_clock_to_the_nanosecond(recording: Path) -> None:
+    capture = make_capture()
+    for entity, table in zip(("/measured", "/measured_1"), capture.tables, strict=True):
+        back = read_back(recording, entity)
+        assert set(back.columns) == {"t", *table.columns} - {"t_s"}
+        nanoseconds = np.rint(table["t_s"].to_numpy() * 1e9).astype(np.int64)
+        np.testing.assert_array_equal(back["t"].to_physical().to_numpy(), nanoseconds)
+        for name in table.columns[1:]:
+            np.testing.assert_array_equal(
+                back[name].to_numpy(), table[name].to_numpy().astype(np.float32)
+            )
+
+
+def test_residual_is_measured_less_fitted_and_only_this_captures_fits_are_there(
+    recording: Path,
+) -> None:
+    series = make_evidence(make_capture())[0].series[0]
+    back = read_back(recording, "/model/step/0_0")
+    np.testing.assert_array_equal(
+        back["residual"].to_numpy(), (series.measured - series.fitted).astype(np.float32)
+    )
+    np.testing.assert_array_equal(back["fitted"].to_numpy(), series.fitted.astype(np.float32))
+    entities = {
+        trace.trace.entity for trace in fit_traces(make_capture(), make_evidence(make_capture()))
+    }
+    assert entities == {"/model/step/0_0"}
+
+
+def test_findings_stand_at_their_first_row_and_no_wall_clock_is_written(recording: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    back = read_back(recording, "/findings")
+    assert back["t"].to_physical().to_list() == [250_000_000, 270_000_000]
+    assert back["TextLog:level"].to_list() == ["ERROR", "WARN"]
+    assert back["TextLog:text"][1].startswith("rows 400-412: 12 samples are missing")
+    names = {
+        name
+        for chunk in RrdReader(str(recording)).stream()
+        for name in chunk.to_record_batch().schema.names
+    }
+    assert "log_time" not in names
+    assert not any("start_time" in name for name in names)
+
+
+def test_equal_work_has_an_equal_id_and_equal_content(recording: Path, tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    capture = make_capture()
+    again = tmp_path / "again.rrd"
+    write_recording(capture, make_evidence(capture), again, make_sheet(), FINDINGS)
+    ids = [RrdReader(str(p)).recordings()[0].recording_id for p in (recording, again)]
+    assert ids == [recording_id(capture, make_sheet())] * 2
+    for entity in ("/measured", "/model/step/0_0", "/findings"):
+        assert read_back(recording, entity).equals(read_back(again, entity), null_equal=True)
+
+
+def test_every_planned_curve_exists_in_the_data_and_every_column_is_planned() -> None:
+    capture = make_capture()
+    traces, fits = list(capture_traces(capture)), list(fit_traces(capture, make_evidence(capture)))
+    held = {(t.entity, name) for t in [*traces, *(f.trace for f in fits)] for name in t.columns}
+    views = planned_views(traces, fits)
+    drawn = {(line.entity, line.component) for view in views for line in view.lines}
+    assert drawn <= held
+    assert held - drawn == {("/model/step/0_0", "measured")}
+    assert [line.name for line in views[0].lines] == ["measured", "model"]
+    residual = fits[0].trace.frame["residual"].to_numpy()
+    assert views[1].reach is not None
+    assert views[1].reach > np.abs(residual).max()
+
+
+def test_a_table_without_time_goes_by_row(tmp_path: Path) -> None:
+    table = pl.DataFrame({"theta_elec_deg": [0.0, 15.0, 30.0], "lab_h": [1e-4, 2e-4, 3e-4]})
+    capture = Capture("lcr.csv", "cd" * 32, "verified", CaptureMeta("m", "lcr"), (table,))
+    found = Finding("lcr.csv", "warning", "odd", "odd", "ask", (2, 2))
+    write_recording(capture, (), tmp_path / "lcr.rrd", None, (found,))
+    back = read_back(tmp_path / "lcr.rrd", "/measured")
+    assert back["row"].to_list() == [0, 1, 2]
+    assert back["theta_elec_deg"].to_list() == [0.0, 15.0, 30.0]
+    assert read_back(tmp_path / "lcr.rrd", "/findings")["row"].to_list() == [2]
+
+
+def test_an_empty_capture_still_makes_a_recording(tmp_path: Path) -> None:
+    capture = Capture("e.csv", "ef" * 32, "verified", CaptureMeta("m", "drive"), ())
+    write_recording(capture, (), tmp_path / "e.rrd", make_sheet(), FINDINGS)
+    assert read_back(tmp_path / "e.rrd", "/findings").height == 2
+
+
+def test_a_refusing_disk_is_a_machine_error_and_leaves_nothing(tmp_path: Path) -> None:
+    """Fault: the folder's place is taken by a file. Reaction: one MachineError, nothing written."""
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(MachineError, match="cannot write"):
+        write_recording(make_capture(), (), tmp_path / "taken" / "x.rrd")
+    assert [p.name for p in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_disk_that_fills_up_is_a_machine_error_and_leaves_nothing(tmp_path: Path) -> None:
+    """Fault: no file may grow past 100 kB. Reaction: one MachineError, no part of a recording."""
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    try:
+        with pytest.raises(MachineError, match=r"cannot write x\.rrd"):
+            write_recording(make_capture(), (), tmp_path / "x.rrd")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_temporary_file_is_left(recording: Path) -> None:
+    assert [p.name for p in recording.parent.iterdir()] == ["step.rrd"]
+
+
+def test_the_sheet_escapes_what_markdown_would_read() -> None:
+    text = sheet_markdown(make_sheet(), PATH)
+    assert text.startswith("# a\\|b \\*x\\*: provisional\n")
+    assert "| kt\\_vs\\_ke | fail | x \\| y; suspect: 2/sqrt\\(3\\) |" in text
+    assert "| r\\_phase\\_ohm | 0.31 | 0.0008 | ohm | step |" in text
+    assert text.index("Constants from this capture") < text.index("## Checks")
+
+
+VULKAN = Path("/usr/share/vulkan/icd.d")
+
+
+@pytest.fixture
+def viewer(recording: Path, tmp_path: Path) -> Iterator[str]:
+    """A headless viewer on the recording; its address."""
+    command = shutil.which("rerun", path=f"{Path(sys.executable).parent}{os.pathsep}{os.defpath}")
+    if command is None or not VULKAN.is_dir() or not any(VULKAN.glob("lvp*")):
+        pytest.skip("the viewer needs a software Vulkan driver (mesa-vulkan-drivers)")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    home = {**os.environ, "HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path)}
+    subprocess.run([command, "analytics", "disable"], env=home, check=False, capture_output=True)
+    place = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000"]
+    process = subprocess.Popen(
+        [command, *place, str(recording)],
+        env=home,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        yield f"rerun+http://127.0.0.1:{port}/proxy"
+    finally:
+        os.killpg(process.pid, 15)
+        process.wait(timeout=10)
+
+
+@pytest.mark.slow
+def test_the_viewer_draws_the_recording_without_a_complaint(viewer: str) -> None:
+    from rerun.experimental import ViewerClient
+
+    deadline = time.monotonic() + 40
+    client, frames = None, [b"", b"x"]
+    while time.monotonic() < deadline and frames[-1] != frames[-2]:
+        try:
+            client = client or ViewerClient.connect(viewer)
+            if client.get_state().views:
+                frames.append(client.take_screenshot())
+        except (RuntimeError, ConnectionError):
+            client = None
+        time.sleep(0.5)
+    assert client is not None
+    state = client.get_state()
+    assert [report for view in state.views for report in view.reports] == []
+    assert {view.name for view in state.views} >= {"Step: ia [A]", "ia [A], measured − model"}
+    assert _has_colour(frames[-1], (255, 143, 0))
+    assert _has_colour(frames[-1], (229, 57, 53))
+
+
+def _has_colour(png: bytes, colour: tuple[int, int, int]) -> bool:
+    import io
+
+    pillow = pytest.importorskip("PIL.Image")
+    pixels = np.asarray(pillow.open(io.BytesIO(png)).convert("RGB")).astype(int)
+    near = np.abs(pixels - np.array(colour)).max(axis=2) < 12
+    return int(near.sum()) > 200
