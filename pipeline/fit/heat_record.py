@@ -1,0 +1,150 @@
+"""A heat run as block means: resistance seen by voltage over current, temperatures, current."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.fit.terminals import first_temperature, pair_of, pair_signals
+from pipeline.numerics.plateaus import block_means, find_plateaus
+from pipeline.physics.conventions import phase_from_line
+from pipeline.records.capture import Capture
+from pipeline.records.constants import Constants
+
+Array = NDArray[np.float64]
+BLOCKS = 300
+DQ = ("vd_v", "vq_v", "id_a", "iq_a")
+TURNING = ("psi_pm_wb", "pole_pairs", "ld_h", "lq_h")
+
+
+@dataclass(frozen=True, slots=True)
+class HeatRecord:
+    """Block means [n] of one heat run while the current flows.
+
+    `r_phase_ohm` is voltage along the current over current, per wye-equivalent phase; `square_a2`
+    is the mean of i_d² + i_q², so that copper loss is 1.5 R times it. Temperatures other than the
+    winding's are None where not measured. `turning` says that back-EMF was taken off.
+    """
+
+    capture: Capture
+    t_s: Array
+    r_phase_ohm: Array
+    current_a: Array
+    square_a2: Array
+    temp_winding_degc: Array
+    temp_second_degc: Array | None
+    temp_ambient_degc: Array | None
+    turning: bool
+
+
+def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
+    """The record of a capture, or None where no current flows long enough.
+
+    Raises KeyError where voltage, current or winding temperature is missing, or where the rotor
+    turns and the flux, pole pairs or inductances needed to take its back-EMF off are unknown.
+    """
+    if first_temperature(capture, "winding") is None:
+        raise KeyError(f"{capture.path}: no temp_winding_degc")
+    second = first_temperature(capture, "case", "magnet")
+    ambient = first_temperature(capture, "ambient")
+    others = ["temp_winding_degc", *(n for n in (second, ambient) if n is not None)]
+    turning = False
+    if capture.has(*DQ, "t_s"):
+        data, turning = _rotor_frame(capture, others, known)
+    else:
+        data = _terminal_frame(capture, others)
+    return _blocks(capture, data, second, ambient, turning)
+
+
+def _rotor_frame(
+    capture: Capture, others: list[str], known: Constants
+) -> tuple[dict[str, Array], bool]:
+    speed = [n for n in ("omega_mech_rad_s",) if capture.has(n)]
+    magnet = [n for n in ("temp_magnet_degc",) if capture.has(n) and n not in others]
+    data = capture.arrays("t_s", *DQ, *others, *speed, *magnet)
+    along = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
+    turning = False
+    if speed and np.nanmax(np.abs(data[speed[0]])) > 0.0:
+        power, turning = _motional(capture, data, known)
+        along = along - power
+    data["square_a2"] = data["id_a"] ** 2 + data["iq_a"] ** 2
+    data["along_va"] = along
+    return data, turning
+
+
+def _motional(capture: Capture, data: dict[str, Array], known: Constants) -> tuple[Array, bool]:
+    """omega_e (psi_d i_q - psi_q i_d) [n], and whether it is large enough to matter."""
+    omega = np.nan_to_num(data["omega_mech_rad_s"])
+    found = {name: known.best(name) for name in TURNING}
+    numbers = {name: estimate.number for name, estimate in found.items() if estimate is not None}
+    if len(numbers) < len(TURNING):
+        if abs(float(np.mean(omega))) < 0.02:
+            return np.zeros(omega.size), False
+        raise KeyError(
+            f"{capture.path}: the rotor turns, and its back-EMF needs an open_circuit spin and "
+            "current steps; or lock the rotor"
+        )
+    psi = np.full(omega.size, numbers["psi_pm_wb"])
+    coefficient = known.best("temp_coeff_magnet_1_k")
+    if coefficient is not None and "temp_magnet_degc" in data:
+        psi = psi * (1.0 + coefficient.number * (data["temp_magnet_degc"] - 25.0))
+    psi_d = psi + numbers["ld_h"] * data["id_a"]
+    psi_q = numbers["lq_h"] * data["iq_a"]
+    power = numbers["pole_pairs"] * omega * (psi_d * data["iq_a"] - psi_q * data["id_a"])
+    copper = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
+    matters = abs(float(np.nanmean(power))) > 1e-4 * abs(float(np.nanmean(copper)))
+    return (power if matters else np.zeros(omega.size)), matters
+
+
+def _terminal_frame(capture: Capture, others: list[str]) -> dict[str, Array]:
+    """Current through one pair: i_d² + i_q² is 4/3 I² and the loss 2 R I²."""
+    pair = pair_of(capture)
+    if pair is None:
+        raise KeyError(f"{capture.path}: neither dq nor one pair's voltage and current")
+    data = pair_signals(capture, pair, *others)
+    data["square_a2"] = data["i_a"] ** 2 * (4.0 / 3.0)
+    data["along_va"] = phase_from_line(1.0) * data["v_v"] * data["i_a"] * (4.0 / 3.0)
+    return data
+
+
+def _blocks(
+    capture: Capture,
+    data: dict[str, Array],
+    second: str | None,
+    ambient: str | None,
+    turning: bool,
+) -> HeatRecord | None:
+    """Means over equal blocks of the longest settled stretch of current."""
+    needed = ("t_s", "along_va", "square_a2", "temp_winding_degc")
+    good = np.all([np.isfinite(data[n]) for n in needed], axis=0)
+    data = {name: values[good] for name, values in data.items()}
+    current = np.sqrt(data["square_a2"])
+    plateaus = find_plateaus(current, least=50, tolerance=0.02)
+    flowing = [p for p in plateaus if current[p.rows].mean() > 0.2 * float(current.max(initial=0))]
+    if not flowing:
+        return None
+    longest = max(flowing, key=lambda p: p.size)
+    size = max(1, longest.size // BLOCKS)
+    mean = {n: block_means(v[longest.rows], size) for n, v in data.items()}
+    return HeatRecord(
+        capture,
+        mean["t_s"],
+        mean["along_va"] / mean["square_a2"],
+        np.sqrt(mean["square_a2"]),
+        mean["square_a2"],
+        mean["temp_winding_degc"],
+        None if second is None else mean[second],
+        None if ambient is None else mean[ambient],
+        turning,
+    )
+
+
+def ambient_degc(record: HeatRecord) -> float | None:
+    """Ambient temperature: measured, else as stated; None where neither is there."""
+    if record.temp_ambient_degc is not None:
+        return float(np.nanmean(record.temp_ambient_degc))
+    stated = record.capture.meta.ambient_degc
+    return None if stated is None or not math.isfinite(stated) else stated
