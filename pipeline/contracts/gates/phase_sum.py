@@ -15,6 +15,7 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
 
+SIGMAS = 6.0
 CODES = {LINE_CURRENTS: "current_sum", LINE_VOLTAGES: "voltage_sum"}
 REMEDIES = {
     LINE_CURRENTS: "check the gain, sign and wiring of each current sensor (no neutral is led out)",
@@ -35,7 +36,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         for table in capture.tables:
             if not set(names) <= set(table.columns):
                 continue
-            share = sum_share(table, names)
+            share = sum_share(table, names, options["additive"])
             words = (
                 f"{' + '.join(names)} is {100.0 * share:.3g} % of them (rms), where "
                 f"{100.0 * allowed:.3g} % could be the instruments' gains"
@@ -47,19 +48,25 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     return Passed(findings=tuple(findings))
 
 
-def sum_share(table: pl.DataFrame, names: tuple[str, ...]) -> float:
-    """Root mean square of the sum over that of the three together, noise taken off.
+def sum_share(table: pl.DataFrame, names: tuple[str, ...], additive: float) -> float:
+    """Root mean square of the sum over that of the three together, white noise left out.
 
-    share² = (mean(s²) - sigma²) / mean(a² + b² + c²), sigma the white noise of the sum s.
+    share² = mean(s[k] s[k+1]) / mean(a² + b² + c²): the product of neighbours holds none of the
+    white noise. 0 where it is not clear of its own scatter, mean(s²)/sqrt(n), or where it is
+    below `additive` times the noise: offset, hum and drift of that size are any channel's.
     """
     three = [table[name].to_numpy() for name in names]
     total = three[0] + three[1] + three[2]
     good = np.isfinite(total)
     power = float(sum(np.mean(column[good] ** 2) for column in three)) if good.any() else 0.0
-    if power == 0.0:
+    total = total[good]
+    if power == 0.0 or total.size < 2:
         return 0.0
-    excess = float(np.mean(total[good] ** 2)) - noise_of(total) ** 2
-    return float(np.sqrt(max(0.0, excess) / power))
+    shared = float(np.mean(total[1:] * total[:-1]))
+    scatter = float(np.mean(total**2)) / np.sqrt(total.size)
+    if shared < max(SIGMAS * scatter, (additive * noise_of(total)) ** 2):
+        return 0.0
+    return float(np.sqrt(shared / power))
 
 
 GATE = Gate(
@@ -69,6 +76,8 @@ GATE = Gate(
     {
         # A percent is an offset of half a percent of range with the usual margin of two.
         "warn_share": 0.01,
+        # Offset, hum and drift of a good channel stay within a few times its noise.
+        "additive": 3.0,
         # Three independent gains of relative uncertainty u leave a sum of about u; k = 5.
         "coverage": 5.0,
         # No sensor is a tenth off: a channel is swapped, dead, reversed or another motor's.

@@ -12,7 +12,7 @@ from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "speed_against_angle"
-BLOCKS = 50
+BLOCKS = 20
 SUSPECTS = {
     9.5493: "the speed is in rpm",
     0.10472: "the angle is in rpm·s, or the speed was converted twice",
@@ -78,7 +78,7 @@ GATE = Gate(
         # Below a turn, eccentricity of the angle sensor is a large part of the angle.
         "turns": 1.0,
         # Lag and smoothing of a speed average out over blocks; a scale error does not.
-        "warn": 0.03,
+        "warn": 0.05,
         # Nearer to 1 than this lies no unit, gear or pole count.
         "refuse": 0.2,
     },
