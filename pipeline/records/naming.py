@@ -11,7 +11,7 @@ _RESERVED = frozenset(
     ["con", "prn", "aux", "nul", "index"]
     + [f"{port}{n}" for port in ("com", "lpt") for n in range(10)]
 )
-_WORD = re.compile("[A-Za-z]+")
+_CAPITALS = re.compile("(?<![A-Za-z])[A-Za-z]{1,2}(?=-?[0-9])")
 
 
 def file_stem(motor_id: str) -> str:
@@ -19,11 +19,12 @@ def file_stem(motor_id: str) -> str:
 
     ASCII letters, digits and `-_.` stay; every other byte of the UTF-8 form becomes `~` and two
     hex digits, as do a first `-` or `.`, a last `.`, and the first letter of a name that Windows
-    keeps for devices or that a folder of pages keeps for its first page. Two ids that differ in case alone must differ on every file system: words
-    of one or two letters are expected in capitals, longer ones in small letters (`joint-P0`,
-    `SN-12`), and an id written otherwise ends in `~u` and a hex mask of the letters that deviate
-    (bit 0 is the first). What is then longer than `MAX_CHARS` keeps a readable beginning and ends
-    in `~h` and a sha256. The empty id is `~n`. No two ids share a name, whatever the case.
+    keeps for devices or that a folder of pages keeps for its first page. Two ids that differ in
+    case alone must differ on every file system: one or two letters before a number are expected
+    in capitals, all others in small letters (`joint-P0`, `SN-12`), and an id written otherwise
+    ends in `~u` and a hex mask of the letters that deviate (bit 0 is the first). What is then
+    longer than `MAX_CHARS` keeps a readable beginning and ends in `~h` and a sha256. The empty id
+    is `~n`. No two ids share a name, whatever the case.
     """
     if not motor_id:
         return "~n"
@@ -53,7 +54,9 @@ def _escaped(text: str) -> str:
 
 
 def _case_mark(text: str) -> str:
-    expected = _WORD.sub(lambda m: m[0].upper() if len(m[0]) <= 2 else m[0].lower(), text)
-    letters = [(a, b) for a, b in zip(text, expected, strict=True) if a.isascii() and a.isalpha()]
-    mask = sum(1 << bit for bit, (was, normal) in enumerate(letters) if was != normal)
+    capitals = {i for m in _CAPITALS.finditer(text) for i in range(*m.span())}
+    letters = [(i, char) for i, char in enumerate(text) if char.isascii() and char.isalpha()]
+    mask = sum(
+        1 << bit for bit, (i, char) in enumerate(letters) if char.isupper() != (i in capitals)
+    )
     return f"~u{mask:x}" if mask else ""

@@ -43,8 +43,8 @@ def decode(stem: str) -> str:
     body, _, mask = stem.lower().partition("~u")
     raw = re.sub(rb"~([0-9a-f]{2})", lambda m: bytes([int(m[1], 16)]), body.encode())
     expected = re.sub(
-        "[a-z]+",
-        lambda m: m[0].upper() if len(m[0]) <= 2 else m[0],
+        r"(?<![a-z])[a-z][a-z]?(?=-?[0-9])",
+        lambda m: m[0].upper(),
         raw.decode("utf-8", "surrogatepass"),
     )
     bits, out = int(mask or "0", 16), []
@@ -62,6 +62,8 @@ def decode(stem: str) -> str:
         ("SN-0012", "SN-0012"),
         ("MN4004-KV300", "MN4004-KV300"),
         ("left_knee.2", "left_knee.2"),
+        ("cogging_cw.csv", "cogging_cw.csv"),
+        ("resistance_ab_0", "resistance_ab_0"),
         ("p0", "p0~u1"),
         ("Motor", "Motor~u1"),
         ("MOTOR", "MOTOR~u1f"),
@@ -69,13 +71,13 @@ def decode(stem: str) -> str:
         (".", "~2e"),
         ("..", "~2e~2e"),
         ("../../etc", "~2e.~2f..~2fetc"),
-        ("-rf", "~2drf~u3"),
+        ("-rf", "~2drf"),
         ("nul", "~6eul"),
         ("index", "~69ndex"),
         ("con.v2", "~63on.v2~u8"),
         ("motor 1", "motor~201"),
         ("é", "~c3~a9"),
-        ("A~B", "A~7eB"),
+        ("A~B", "A~7eB~u3"),
     ],
 )
 def test_known_ids(motor_id: str, stem: str) -> None:
