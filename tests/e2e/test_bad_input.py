@@ -1,0 +1,142 @@
+"""Bad input: one clear line each, the right exit code, and the rest done."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.__main__ import main
+
+HEAD = "# contract: 1\n# motor_id: stray\n# test: {test}\n"
+
+
+class Batch:
+    """A folder with one good motor's resistance and spin, to which a test adds what is bad."""
+
+    def __init__(self, bench: Path, folder: Path) -> None:
+        self.input, self.output = folder / "in", folder / "out"
+        self.input.mkdir()
+        for name in ("resistance_ab.csv", "open_circuit_forward.mcap"):
+            shutil.copyfile(bench / "one" / name, self.input / name)
+        self.bench = bench
+
+    def add(self, name: str, content: str | bytes) -> None:
+        data = content.encode() if isinstance(content, str) else content
+        (self.input / name).write_bytes(data)
+
+    def run(self, *more: str) -> tuple[int, list[dict[str, Any]]]:
+        """Exit code and findings; the good motor's datasheet must be there."""
+        words = [f"input={self.input}", f"output={self.output}", "workers=1"]
+        code = main(["run", *words, "report=false", "recordings=false", *more])
+        sheet = json.loads((self.output / "datasheets" / "gimbal~2fone.json").read_bytes())
+        assert sheet["constants"]["r_phase_ohm"]["status"] == "measured"
+        return code, json.loads((self.output / "findings.json").read_bytes())["findings"]
+
+
+@pytest.fixture
+def batch(bench: Path, tmp_path: Path) -> Batch:
+    return Batch(bench, tmp_path)
+
+
+def refused(findings: list[dict[str, Any]]) -> dict[str, Any]:
+    """The only refusal."""
+    (only,) = [finding for finding in findings if finding["severity"] == "refused"]
+    assert only["message"]
+    assert only["remedy"]
+    return only
+
+
+STEP = HEAD.format(test="current_step") + "# pair: ab\n# theta_elec_deg: 330\n"
+ROWS = "".join(f"{k * 1e-5},{1.0},{0.01 * k}\n" for k in range(400))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code"),
+    [
+        ("words.mcap", "these are words, not a recording\n", "not_mcap"),
+        ("column.csv", STEP + "t_s,vab_v\n" + "0.0,1.0\n0.1,1.0\n", "missing_column"),
+        ("nan.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "nan,1.0,0.0\n", "time_not_finite"),
+        ("test.csv", HEAD.format(test="dance") + "t_s,vab_v,ia_a\n" + ROWS, "unknown_test"),
+        ("back.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "0.0,1.0,0.0\n", "time_not_increasing"),
+    ],
+)
+def test_a_bad_file_is_refused_by_name_and_the_rest_is_done(
+    batch: Batch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    content: str,
+    code: str,
+) -> None:
+    batch.add(name, content)
+    exit_code, findings = batch.run()
+    assert exit_code == 3
+    only = refused(findings)
+    assert (only["file"], only["code"]) == (name, code)
+    lines = [line for line in capsys.readouterr().err.splitlines() if name in line]
+    assert len(lines) == 1
+
+
+def test_rows_of_the_fault_are_named(batch: Batch) -> None:
+    """Time is NaN in row 400 of 401, counted from 0."""
+    batch.add("nan.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "nan,1.0,0.0\n")
+    assert refused(batch.run()[1])["rows"] == [400, 400]
+
+
+def test_a_truncated_recording(batch: Batch) -> None:
+    whole = (batch.bench / "one" / "spin_down_forward.mcap").read_bytes()
+    batch.add("cut.mcap", whole[: len(whole) // 2])
+    code, findings = batch.run()
+    assert code == 3
+    assert refused(findings)["file"] == "cut.mcap"
+
+
+def test_an_unknown_unit(batch: Batch, tmp_path: Path) -> None:
+    """A column named after no unit of the contract is left alone; a needed one is missed."""
+    batch.add("unit.csv", STEP + "t_s,vab_furlong,ia_a\n" + ROWS)
+    code, findings = batch.run()
+    assert code == 3
+    only = refused(findings)
+    assert only["file"] == "unit.csv"
+    assert "vab" in only["message"]
+
+
+def test_captures_that_disagree_on_pole_pairs_fail_the_nameplate(batch: Batch) -> None:
+    """7 is measured; one capture's nameplate says 14: both files are named, the check fails."""
+    text = (batch.input / "resistance_ab.csv").read_text()
+    assert "# pole_pairs: 7\n" in text
+    batch.add("resistance_ab.csv", text.replace("# pole_pairs: 7\n", "# pole_pairs: 14\n"))
+    code, findings = batch.run()
+    assert code == 1
+    (only,) = [f for f in findings if "pole_pairs" in f["message"]]
+    assert "resistance_ab.csv" in only["file"] + only["message"]
+    assert "open_circuit_forward.mcap" in only["file"] + only["message"]
+    sheet = json.loads((batch.output / "datasheets" / "gimbal~2fone.json").read_bytes())
+    assert sheet["status"] == "refused"
+    (check,) = [c for c in sheet["checks"] if c["name"] == "pole_pairs_nameplate"]
+    assert check["status"] == "fail"
+    assert "poles" in check["suspect"]
+
+
+def test_a_motor_with_one_test_is_undecided(batch: Batch) -> None:
+    """Nothing can be checked against anything: exit 4, and the constant is there all the same."""
+    (batch.input / "open_circuit_forward.mcap").unlink()
+    code, findings = batch.run()
+    assert code == 4
+    assert not [f for f in findings if f["severity"] == "refused"]
+
+
+def test_an_empty_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "in").mkdir()
+    assert main(["run", f"input={tmp_path / 'in'}", f"output={tmp_path / 'out'}"]) == 4
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_typo_in_an_option_is_usage(bench: Path, tmp_path: Path) -> None:
+    words = [f"input={bench / 'one'}", f"output={tmp_path}"]
+    assert main(["run", *words, "crosscheck.kt_vs_ke.alowance=0.1"]) == 2
+    assert main(["run", *words, "fit.nothing.x=1"]) == 2
+    assert not list(tmp_path.iterdir())
