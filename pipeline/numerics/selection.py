@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-
-from pipeline.numerics.least_squares import linear_fit
+from scipy.special import fdtrc
 
 Array = NDArray[np.float64]
+
+COLLINEAR = 1e-8
 
 
 def needed_columns(
@@ -24,35 +25,54 @@ def needed_columns(
     """Names of the candidate columns [n each] that y [n] demands beside `base` [n, k].
 
     Forward selection: the column with the largest fall of the weighted sum of squares joins while
-    its F(1, n-k-1) is significant at `level` over the candidates left. At least half as many
-    degrees of freedom as rows stay free. Reference: Draper and Smith, Applied Regression
-    Analysis, 3rd ed., 15.3.
+    its F(1, n-k-1) is significant at `level` over the candidates left, at most `most` of
+    them (half of the rows by default). `dependence` rows count as one where rows are correlated.
+    Columns are kept orthogonal to those already in, so one step costs one product. References:
+    Draper and Smith, Applied Regression Analysis, 3rd ed., 15.3; Chen, Billings and Luo, Int. J.
+    Control 50(5), 1989 (orthogonal forward selection).
     """
-    from scipy.special import fdtrc
-
-    chosen: list[str] = []
+    names = list(candidates)
     most = max(0, y.size // 2 - base.shape[1]) if most is None else most
-    design = base
-    rest = _cost(design, y, sigma)
-    while len(chosen) < most:
-        left = [name for name in candidates if name not in chosen]
-        costs = [_cost(np.column_stack([design, candidates[n]]), y, sigma) for n in left]
-        free = y.size - design.shape[1] - 1
-        if not left or free < 1:
+    if not names or most < 1:
+        return []
+    basis = _basis(base / sigma[:, None])
+    pool = np.column_stack([candidates[name] for name in names]) / sigma[:, None]
+    length = np.sum(pool**2, axis=0)
+    pool = _without(pool, basis)
+    rest = _without(y / sigma, basis)
+    chosen: list[int] = []
+    while len(chosen) < min(most, len(names)):
+        free = y.size - basis.shape[1] - len(chosen) - 1
+        power = np.sum(pool**2, axis=0)
+        usable = (power > COLLINEAR * length) & ~np.isin(np.arange(len(names)), chosen)
+        if free < 1 or not usable.any():
             break
-        best = int(np.argmin(costs))
-        if costs[best] <= 0.0:
-            statistic = np.inf if rest > 0.0 else 0.0
+        falls = np.where(usable, (pool.T @ rest) ** 2 / np.where(usable, power, 1.0), 0.0)
+        best = int(np.argmax(falls))
+        left = float(rest @ rest) - float(falls[best])
+        if left > 0.0:
+            statistic = float(falls[best]) / (left / free) / dependence
         else:
-            statistic = (rest - costs[best]) / (costs[best] / free) / dependence
-        if fdtrc(1.0, max(free / dependence, 1.0), max(statistic, 0.0)) * len(left) > level:
+            statistic = np.inf if falls[best] > 0.0 else 0.0
+        tests = len(names) - len(chosen)
+        if fdtrc(1.0, max(free / dependence, 1.0), max(statistic, 0.0)) * tests > level:
             break
-        chosen.append(left[best])
-        design = np.column_stack([design, candidates[left[best]]])
-        rest = costs[best]
-    return chosen
+        chosen.append(best)
+        unit = (pool[:, best] / np.linalg.norm(pool[:, best]))[:, None]
+        pool, rest = _without(pool, unit), _without(rest, unit)
+    return [names[k] for k in chosen]
 
 
-def _cost(design: Array, y: Array, sigma: Array) -> float:
-    residual = linear_fit(design, y, sigma).residuals / sigma
-    return float(residual @ residual)
+def _basis(design: Array) -> Array:
+    """Orthonormal columns that span the design's."""
+    norm = np.linalg.norm(design, axis=0)
+    left, singular, _ = np.linalg.svd(design / np.where(norm > 0, norm, 1.0), full_matrices=False)
+    basis: Array = left[:, singular > 1e-10 * singular.max(initial=0.0)]
+    return basis
+
+
+def _without(values: Array, basis: Array) -> Array:
+    """Values [n] or [n, m] less their part along the basis, twice for accuracy."""
+    for _ in range(2):
+        values = values - basis @ (basis.T @ values)
+    return values

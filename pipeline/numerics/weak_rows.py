@@ -24,14 +24,16 @@ EVEN_SPACING = 1e-3
 class WeakRows:
     """Windows over one clock: rows `starts` [w] to `starts + sizes`, and their weights.
 
-    `kernels[order]` is a list of one weight vector a window, or of one for all where the clock is
-    even. `centres_s` [w] are the windows' mid times.
+    On an even clock `weights` [3, m] is shared by all windows and `members` is empty; else
+    `members` [sum m] lists the rows of every window in turn and `weights` is [3, sum m].
+    `centres_s` [w] are the windows' mid times.
     """
 
     starts: NDArray[np.int64]
     sizes: NDArray[np.int64]
     centres_s: Array
-    kernels: tuple[tuple[Array, ...], tuple[Array, ...], tuple[Array, ...]]
+    weights: Array
+    members: NDArray[np.int64]
 
     @property
     def count(self) -> int:
@@ -44,22 +46,24 @@ class WeakRows:
         integral(phi d^order x/dt^order) / integral(phi), the derivatives thrown onto phi. Exact
         for constants (order 0), straight lines (1) and parabolas (2) on any clock.
         """
-        kernels = self.kernels[order]
-        if len(kernels) == 1:
-            size = kernels[0].size
-            views = np.lib.stride_tricks.sliding_window_view(signal, size)[self.starts]
+        kernel = self.weights[order]
+        if self.members.size == 0:
+            views = np.lib.stride_tricks.sliding_window_view(signal, kernel.size)[self.starts]
             centred = views - views.mean(axis=1, keepdims=True) if order else views
-            uniform: Array = centred @ kernels[0]
-            return uniform
-        out = np.empty(self.count)
-        for i, (start, kernel) in enumerate(zip(self.starts, kernels, strict=True)):
-            part = signal[start : start + kernel.size]
-            out[i] = kernel @ (part - part.mean() if order else part)
-        return out
+            even: Array = centred @ kernel
+            return even
+        part = signal[self.members]
+        if order:
+            means = _sums(part, self.sizes) / self.sizes
+            part = part - np.repeat(means, self.sizes)
+        return _sums(part * kernel, self.sizes)
 
     def noise_gain(self, order: int) -> float:
         """Standard deviation of `integral(white noise of unit deviation, order)`, typical."""
-        return float(np.median([np.linalg.norm(kernel) for kernel in self.kernels[order]]))
+        power = self.weights[order] ** 2
+        if self.members.size == 0:
+            return float(np.sqrt(power.sum()))
+        return float(np.sqrt(np.median(_sums(power, self.sizes))))
 
 
 def weak_rows(t_s: Array, width_s: float, overlap: float = 0.5) -> WeakRows:
@@ -81,46 +85,73 @@ def weak_rows(t_s: Array, width_s: float, overlap: float = 0.5) -> WeakRows:
     wide = np.flatnonzero(gap > 0.25 * width_s)
     blocked = np.searchsorted(wide, starts) != np.searchsorted(wide, np.maximum(stops - 1, starts))
     fine = (stops - starts >= LEAST_SAMPLES) & ~blocked
-    starts, stops = starts[fine], stops[fine]
+    starts, sizes = starts[fine].astype(np.int64), (stops - starts)[fine].astype(np.int64)
     if starts.size == 0:
         raise ValueError("the record holds no window of nine samples without a gap")
-    centres = np.array([0.5 * (t_s[a] + t_s[b - 1]) for a, b in zip(starts, stops, strict=True)])
-    cells = [(starts[0], stops[0])] if even else list(zip(starts, stops, strict=True))
-    triples = [_kernels(t_s[a:b]) for a, b in cells]
-    kernels = (
-        tuple(k[0] for k in triples),
-        tuple(k[1] for k in triples),
-        tuple(k[2] for k in triples),
-    )
-    return WeakRows(starts.astype(np.int64), (stops - starts).astype(np.int64), centres, kernels)
+    centres: Array = 0.5 * (t_s[starts] + t_s[starts + sizes - 1])
+    if even:
+        weights = _kernels(t_s[starts[0] : starts[0] + sizes[0]], sizes[:1])
+        return WeakRows(starts, sizes, centres, weights, np.zeros(0, dtype=np.int64))
+    within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    members = np.repeat(starts, sizes) + within
+    return WeakRows(starts, sizes, centres, _kernels(t_s[members], sizes), members)
 
 
-def _kernels(t_s: Array) -> tuple[Array, Array, Array]:
-    """Weights of order 0, 1, 2 over one window, normalised to be exact on polynomials."""
-    half = 0.5 * float(t_s[-1] - t_s[0])
-    u = (t_s - 0.5 * (t_s[0] + t_s[-1])) / half
+def _sums(values: Array, sizes: NDArray[np.int64]) -> Array:
+    """Sums over consecutive stretches of `sizes` values."""
+    totals: Array = np.add.reduceat(values, np.cumsum(sizes) - sizes)
+    return totals
+
+
+def _kernels(t_s: Array, sizes: NDArray[np.int64]) -> Array:
+    """Weights [3, sum m] of order 0, 1, 2 over windows in turn, exact on polynomials."""
+    heads = np.cumsum(sizes) - sizes
+    tails = heads + sizes - 1
+    half = 0.5 * (t_s[tails] - t_s[heads])
+    u = (t_s - np.repeat(0.5 * (t_s[tails] + t_s[heads]), sizes)) / np.repeat(half, sizes)
     cell = np.gradient(u)
+    cell[heads], cell[tails] = 0.0, 0.0
     inside = 1.0 - u**2
     zero = cell * inside**4
     first = cell * 8.0 * u * inside**3
     second = cell * (48.0 * u**2 * inside**2 - 8.0 * inside**3)
-    zero = zero / zero.sum()
-    first = _free_of(first, np.ones((1, u.size)))
-    first = first / (first @ u) / half
-    second = _free_of(second, np.vstack([np.ones(u.size), u]))
-    second = second / (second @ (0.5 * u**2)) / half**2
-    return zero, first, second
 
+    def spread(per_window: Array) -> Array:
+        wide: Array = np.repeat(per_window, sizes)
+        return wide
 
-def _free_of(kernel: Array, rows: Array) -> Array:
-    """The kernel less its part along the rows [r, n]."""
-    coefficients = np.linalg.lstsq(rows.T, kernel, rcond=None)[0]
-    free: Array = kernel - coefficients @ rows
-    return free
+    zero = zero / spread(_sums(zero, sizes))
+    first = first - spread(_sums(first, sizes) / sizes)
+    first = first / spread(_sums(first * u, sizes) * half)
+    centred = u - spread(_sums(u, sizes) / sizes)
+    second = second - spread(_sums(second, sizes) / sizes)
+    slope = _sums(second * centred, sizes) / _sums(centred**2, sizes)
+    second = second - spread(slope) * centred
+    second = second / spread(_sums(0.5 * second * u**2, sizes) * half**2)
+    return np.vstack([zero, first, second])
 
 
 def smooth_speed(t_s: Array, angle: Array, width_s: float) -> Array:
-    """Rate [n] of an angle [n] averaged over windows of `width_s`, interpolated to the clock."""
-    rows = weak_rows(t_s, width_s, overlap=0.75)
-    speed: Array = np.interp(t_s, rows.centres_s, rows.integral(angle, 1))
-    return speed
+    """Rate [n] of an angle [n]: slope of the straight line through the samples of `width_s`.
+
+    Raises ValueError where the record is shorter than two windows.
+    """
+    reach = max(2, round(0.5 * width_s / float(np.median(np.diff(t_s)))))
+    if t_s.size < 2 * reach + 1:
+        raise ValueError("the record is shorter than the window of its speed")
+    low = np.clip(np.arange(t_s.size) - reach, 0, t_s.size - 2 * reach - 1)
+    high = low + 2 * reach + 1
+    slope, offset = np.polyfit(t_s - t_s[0], angle, 1)
+    t = t_s - t_s.mean()
+    x = angle - slope * (t_s - t_s[0]) - offset
+    count = float(2 * reach + 1)
+
+    def total(values: Array) -> Array:
+        running = np.concatenate([[0.0], np.cumsum(values)])
+        summed: Array = running[high] - running[low]
+        return summed
+
+    mean_t, mean_x = total(t) / count, total(x) / count
+    spread = total(t * t) / count - mean_t**2
+    rate: Array = (total(t * x) / count - mean_t * mean_x) / spread + float(slope)
+    return rate

@@ -186,7 +186,10 @@ def _period_s(capture: Capture) -> float:
 def _lateness(
     matched: Sequence[tuple[Point, Point]], pole_pairs: int, largest: float
 ) -> tuple[float, float, float]:
-    """Angle offset [rad] and delay [s] of the voltages; what is left, rms [rad]. The offset needs two speeds."""
+    """Angle offset [rad] and delay [s] of the voltages, and the rms angle left [rad].
+
+    With one speed alone the two are one, and all of it is taken as delay.
+    """
     omegas, angles = [], []
     for one, other in matched:
         if max(abs(one.id_a), abs(other.id_a)) > SAME * largest:
