@@ -165,10 +165,10 @@ def torque_map(motor: Motor, rng: np.random.Generator) -> Capture:
     speed = 0.4 * motor.top_rad_s
     iq = np.repeat(motor.rated_a * np.array([-1.0, -0.5, 0.5, 1.0]), 4000)
     id_ = np.tile(np.repeat([0.0, -0.3 * motor.rated_a], 2000), 4)
-    return capture_of("torque_map", _dq_columns(motor, rng, t, speed, id_, iq), motor)
+    return capture_of("torque_map", dq_columns(motor, rng, t, speed, id_, iq), motor)
 
 
-def _dq_columns(
+def dq_columns(
     motor: Motor,
     rng: np.random.Generator,
     t: np.ndarray,
@@ -176,6 +176,7 @@ def _dq_columns(
     id_: np.ndarray,
     iq: np.ndarray,
 ) -> dict[str, np.ndarray]:
+    """Columns of a capture under dq currents at a speed: steady-state voltages and torque."""
     omega = np.broadcast_to(np.asarray(speed, float), t.shape)
     theta = np.concatenate(([0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))))
     electrical = motor.pole_pairs * omega
@@ -248,7 +249,7 @@ def drive(motor: Motor, rng: np.random.Generator) -> Capture:
     t = np.arange(40000) * 1e-4
     omega = 0.8 * motor.top_rad_s * np.sin(2.0 * np.pi * t / 2.0)
     iq = 0.2 * motor.rated_a * np.cos(2.0 * np.pi * t / 2.0) + 0.1 * motor.rated_a * np.sign(omega)
-    columns = _dq_columns(motor, rng, t, omega, np.zeros(t.size), iq)
+    columns = dq_columns(motor, rng, t, omega, np.zeros(t.size), iq)
     return capture_of("drive", columns, motor, voltage_kind="commanded", vdc_v=36.0)
 
 

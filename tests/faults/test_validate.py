@@ -19,9 +19,11 @@ from pipeline.records.finding import Finding
 from tests.faults.healthy import (
     TESTS,
     Motor,
+    capture_of,
     cogging,
     column,
     current_step,
+    dq_columns,
     drive,
     flux_map,
     hand_turn,
@@ -498,6 +500,23 @@ def test_reversed_angle_under_current(make, rng: np.random.Generator) -> None:
     for name in ("theta_mech_rad", "omega_mech_rad_s"):
         capture = with_column(capture, name, -column(capture, name))
     assert refused(capture).code == "swapped_phases"
+
+
+def test_field_weakening_beyond_the_magnet(rng: np.random.Generator) -> None:
+    """Let through: d current that more than cancels a weak magnet turns v_q's sign, rightly."""
+    weak = replace(MOTOR, psi_wb=0.001)
+    t = np.arange(16000) * 5e-5
+    id_ = np.repeat(weak.rated_a * np.array([-0.2, -0.6, -1.0, -0.8]), 4000)
+    iq = np.tile(np.repeat([0.3 * weak.rated_a, -0.3 * weak.rated_a], 2000), 4)
+    assert weak.ld_h * id_.mean() < -weak.psi_wb
+    for d_current in (id_, np.full(t.size, -weak.rated_a)):
+        columns = dq_columns(weak, rng, t, 100.0, d_current, iq)
+        capture = capture_of("torque_map", columns, weak)
+        assert validate(capture, {})[1] == ()
+        reverse = with_column(capture, "omega_mech_rad_s", -column(capture, "omega_mech_rad_s"))
+        reverse = with_column(reverse, "theta_mech_rad", -column(reverse, "theta_mech_rad"))
+        if d_current is id_:
+            assert refused(reverse).code == "swapped_phases"
 
 
 def test_torque_of_the_other_sign(rng: np.random.Generator) -> None:

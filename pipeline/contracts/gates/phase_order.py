@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed
-from pipeline.contracts.rotation import turning
+from pipeline.contracts.rotation import Array, turning
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
@@ -15,6 +15,8 @@ CODE = "swapped_phases"
 REMEDY = "swap two phases, or turn the sign of the angle and the speed, in conf/source"
 FREE_TURNING = ("open_circuit", "hand_turn")
 BLOCKS = 100
+SMALL = 0.05
+CONDITION = 1e3
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -46,33 +48,50 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def back_emf_slope(capture: Capture) -> tuple[float, float]:
-    """Slope of v_q on speed [V s/rad] at equal i_q and its standard error, from block means.
+    """Slope of v_q on speed [V s/rad] at no d current, and its standard error.
 
-    v_q = R i_q + omega_e (L_d i_d + psi): the slope is p (psi + L_d i_d), positive in a motor
-    whose phases and angle are right, as long as the magnet is not cancelled. (0, inf) where
-    the shaft hardly turns.
+    v_q = R i_q + p omega (psi + L_d i_d), regressed over block means on omega, i_q and, where it
+    varies, omega i_d: the slope is p psi, positive where phases and angle are right. (0, inf)
+    where the shaft hardly turns or where a steady i_d may cancel the magnet.
     """
-    names = ("vq_v", "iq_a", "omega_mech_rad_s")
-    if not capture.has(*names):
+    names = [n for n in ("vq_v", "omega_mech_rad_s", "iq_a", "id_a") if capture.has(n)]
+    if names[:3] != ["vq_v", "omega_mech_rad_s", "iq_a"]:
         return 0.0, np.inf
+    means = _block_means(capture, names)
+    if means is None:
+        return 0.0, np.inf
+    y, x = means[:, 0], means[:, 1:3]
+    if len(names) == 4:
+        d_current = means[:, 3]
+        small = SMALL * float(np.abs(means[:, 2:4]).max())
+        if float(np.ptp(d_current)) > small:
+            x = np.column_stack([x, x[:, 0] * d_current])
+        elif float(np.abs(d_current).max()) > small:
+            return 0.0, np.inf
+    return _first_slope(x, y)
+
+
+def _block_means(capture: Capture, names: list[str]) -> Array | None:
     data = capture.arrays(*names)
     rows = np.column_stack([data[name] for name in names])
     rows = rows[np.isfinite(rows).all(axis=1)]
     size = rows.shape[0] // BLOCKS
     if size == 0:
+        return None
+    means: Array = rows[: size * BLOCKS].reshape(BLOCKS, size, len(names)).mean(axis=1)
+    return means
+
+
+def _first_slope(x: Array, y: Array) -> tuple[float, float]:
+    """Least-squares coefficient of the first column [n, m] and its standard error."""
+    scale = np.sqrt(np.mean(x**2, axis=0))
+    if not scale.all() or np.linalg.cond(x / scale) > CONDITION:
         return 0.0, np.inf
-    means = rows[: size * BLOCKS].reshape(BLOCKS, size, 3).mean(axis=1)
-    x, y = means[:, [2, 1]], means[:, 0]
-    normal = x.T @ x
-    if (
-        np.linalg.cond(normal / np.maximum(np.outer(*(2 * [np.sqrt(np.diag(normal))])), 1e-300))
-        > 1e6
-    ):
-        return 0.0, np.inf
-    beta = np.linalg.solve(normal, x.T @ y)
-    left = y - x @ beta
-    spread = left @ left / (BLOCKS - 2) * np.linalg.inv(normal)
-    return float(beta[0]), float(np.sqrt(spread[0, 0]))
+    normal = (x / scale).T @ (x / scale)
+    beta = np.linalg.solve(normal, (x / scale).T @ y)
+    left = y - (x / scale) @ beta
+    variance = left @ left / (y.size - x.shape[1]) * np.linalg.inv(normal)[0, 0]
+    return float(beta[0] / scale[0]), float(np.sqrt(variance) / scale[0])
 
 
 GATE = Gate(

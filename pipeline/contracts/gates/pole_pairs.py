@@ -14,7 +14,7 @@ REMEDY = "correct `pole_pairs`; until then the count from the data is used"
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Warns where the count is no whole number, or another than the nameplate's."""
     seen = turning(capture)
-    if seen is None or seen.cycles < options["cycles"]:
+    if seen is None or seen.cycles < options["cycles"] or seen.u > options["largest_u"]:
         return Passed()
     count = abs(seen.cycles_per_turn)
     whole, stated = round(count), capture.meta.pole_pairs
@@ -38,6 +38,8 @@ GATE = Gate(
     {
         # Fewer cycles do not tell neighbouring counts apart.
         "cycles": 3.0,
+        # Five standard uncertainties within half a count; an angle this poor is not counted on.
+        "largest_u": 0.1,
         # Physics: p = f_elec / f_mech within 0.02 of a whole number.
         "from_whole": 0.02,
     },
