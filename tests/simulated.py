@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
+from functools import cache
 
 import polars as pl
 
+from pipeline.io.plain_yaml import load_plain
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
-from pipeline.simulator.design import Recording
+from pipeline.settings import configuration_folder
+from pipeline.simulator.catalogue import motor_from
+from pipeline.simulator.design import EXACT, Bench, Motor, Recording
+
+QUIET = Bench(noise_scale=0.0, instruments=EXACT, adc_bits=44, encoder_bits=44)
+"""A bench without noise, gain errors or visible resolution."""
 
 WHOLE = {"pole_pairs", "slots"}
 REAL = {
@@ -22,6 +29,13 @@ REAL = {
     "u_temp_degc",
 }
 IGNORED = {"contract"}
+
+
+@cache
+def design(name: str) -> Motor:
+    """A motor of `conf/motor/`."""
+    path = configuration_folder() / "motor" / f"{name}.yaml"
+    return motor_from(load_plain(path.read_bytes(), path.name))
 
 
 def meta_of(words: Mapping[str, str]) -> CaptureMeta:

@@ -107,7 +107,8 @@ FORMS: dict[str, Form] = {
     "saturation": Form(
         "1",
         "apparent Lq falls by size at rated q current (power law of flux), Ld by size_d at rated "
-        "d current along the magnet (root form); form 1 is a sinh of flux instead of the power",
+        "d current along the magnet (root form; 0.4 of size if not given); form 1 is a sinh of "
+        "flux instead of the power",
         lambda _: {"size": 0.18, "size_d": math.nan, "exponent": 3.0, "form": 0.0},
     ),
     "cross_saturation": Form(
@@ -199,15 +200,18 @@ def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, f
     if form is None:
         raise ValueError(f"no effect {name}; there are {', '.join(sorted(FORMS))}")
     full = form.typical(motor)
-    if size is None:
-        return full
-    given: Mapping[str, float] = size if isinstance(size, Mapping) else {"size": float(size)}
+    given: Mapping[str, float] = {}
+    if size is not None:
+        given = size if isinstance(size, Mapping) else {"size": float(size)}
     strange = set(given) - set(full)
     if strange:
         raise ValueError(
             f"{name} has no parameter {', '.join(sorted(strange))}; it has {', '.join(full)}"
         )
-    return {**full, **{key: float(value) for key, value in given.items()}}
+    full.update({key: float(value) for key, value in given.items()})
+    if math.isnan(full.get("size_d", 0.0)):
+        full["size_d"] = 0.4 * full["size"]
+    return full
 
 
 def active(motor: Motor) -> dict[str, dict[str, float]]:

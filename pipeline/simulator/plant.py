@@ -130,8 +130,6 @@ def _saturating(motor: Motor, own: dict[str, float], cross: dict[str, float]) ->
     rated = motor.current_rated_a
     fall = own.get("size", 0.0)
     fall_d = own.get("size_d", 0.0)
-    if math.isnan(fall_d):
-        fall_d = 0.4 * fall
     exponent = own.get("exponent", 3.0)
     sinh = own.get("form", 0.0) == 1.0
     knee, strength = motor.lq_h * rated, 0.0

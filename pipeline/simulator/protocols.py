@@ -67,7 +67,7 @@ class OpenCircuit:
 class HandTurn:
     """One mechanical turn by hand in about `duration_s`."""
 
-    duration_s: float = 2.5
+    duration_s: float = 1.2
     rate_hz: float = 2000.0
     direction: int = 1
     with_angle: bool = True
