@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.fit.estimators.cogging import name_orders, part_orders
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.torque_constant import USES, torque_constant
+from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.orders import (
@@ -31,6 +33,8 @@ from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import propagate, type_a
 
+Array = NDArray[np.float64]
+
 NAME = "holding_current"
 RESIDUAL = Term(
     "holding_residual_a",
@@ -47,6 +51,7 @@ EXPERIMENT = (
     "logging theta_mech_rad and iq_a"
 )
 SECTORS = 61
+REPLICATES = 200
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -65,21 +70,35 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
     spec = spectrum(turns, largest_order(turns, int(options["highest_order"])))
     lines, slow = part_orders(orders_present(spec, options["level"]), known, campaign)
-    rms_a = held_out_rms(turns, [line.order for line in [*lines, *slow]])
+    left = held_out_residual(turns, [line.order for line in [*lines, *slow]])
+    rms_a = None if left is None else float(np.sqrt(np.mean(left**2)))
     estimates = _cogging(captures, spec, lines, rms_a, known, campaign)
-    if rms_a is None:
+    if left is None or rms_a is None:
         note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
         residual = not_identifiable(RESIDUAL.name, "A", NAME, note)
     else:
         before = float(np.std(np.concatenate([turn.value for turn in turns])))
         note = f"{before:.3g} A before any order is taken off; half of the turn's sectors held out"
         paths = tuple(c.path for c in captures)
-        residual = Estimate(RESIDUAL.name, rms_a, "A", "measured", NAME, captures=paths, note=note)
+        scatter = type_a(f"scatter:{NAME}:{RESIDUAL.name}", _u_rms(left))
+        residual = Estimate(RESIDUAL.name, rms_a, "A", "measured", NAME, scatter, {}, paths, note)
     return Fit((*estimates, residual), _evidence(turns, spec, lines))
 
 
-def held_out_rms(turns: Sequence[Turn], orders: Sequence[int]) -> float | None:
-    """Rms of the current left in sectors of the turn that the fit did not see; None if too few.
+def _u_rms(residual: Array) -> float:
+    """Standard uncertainty of the rms, with the residual's correlation."""
+    draws = block_bootstrap(
+        lambda part: np.sqrt(np.mean(part**2, keepdims=True)),
+        residual,
+        block_length(residual),
+        REPLICATES,
+        np.random.default_rng(0),
+    )
+    return float(np.std(draws, ddof=1))
+
+
+def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | None:
+    """The current [n, A] left in sectors of the turn that the fit did not see; None if too few.
 
     The turn is cut into `SECTORS` (a prime); the orders, with one offset a direction, are fitted
     to those whose number is a square modulo the prime and judged on the others, then the other
@@ -93,15 +112,14 @@ def held_out_rms(turns: Sequence[Turn], orders: Sequence[int]) -> float | None:
     squared = np.isin(np.arange(SECTORS), np.arange(SECTORS) ** 2 % SECTORS).astype(np.int64)
     number = np.floor(np.mod(angle, TURN_RAD) * (SECTORS / TURN_RAD)).astype(np.int64)
     sector = squared[np.minimum(number, SECTORS - 1)]
-    squares = 0.0
+    left = np.zeros(value.size)
     for part in (0, 1):
         seen, unseen = sector == part, sector != part
         if np.count_nonzero(seen) < 4 * design.shape[1]:
             return None
         model = linear_fit(design[seen], value[seen])
-        residual = value[unseen] - design[unseen] @ model.coefficients
-        squares += float(residual @ residual)
-    return float(np.sqrt(squares / value.size))
+        left[unseen] = value[unseen] - design[unseen] @ model.coefficients
+    return left
 
 
 def _cogging(
@@ -125,7 +143,7 @@ def _cogging(
         names[0], lines[0].order, "1", "measured", NAME, captures=paths, note=note,
         bounds=(1.0, float(spec.orders[-1])),
     )  # fmt: skip
-    kt = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
+    kt = torque_constant(known)
     if kt is None:
         why = f"{lines[0].amplitude:.4g} A of order {lines[0].order}; a torque constant is missing"
         return (order, *(not_identifiable(n, _unit(n), NAME, why) for n in TORQUES))
@@ -154,7 +172,7 @@ def _evidence(
         fitted = spec.means[index] + waveform(lines, angle)
         series.append(Series(f"{label} {index + 1}", angle, turn.value[keep][order], fitted))
     shown = min(spec.orders.size, 1000)
-    heights: NDArray[np.float64] = np.abs(spec.coefficients.mean(axis=0))[:shown]
+    heights: Array = np.abs(spec.coefficients.mean(axis=0))[:shown]
     bars = Series("orders", spec.orders[:shown].astype(float), heights, np.array([]))
     return (
         Evidence(NAME, "Holding current over one turn", "theta_mech_rad", "iq_a", "scatter",
@@ -173,7 +191,7 @@ ESTIMATOR = Estimator(
     tests=("holding_current",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "kt_peak_nm_a", "kt_from_ke_nm_a"),
+    uses=("pole_pairs", *USES),
     rank=20,
     terms=(RESIDUAL,),
     options={"highest_order": 1000.0, "level": 0.01},

@@ -20,6 +20,7 @@ from pipeline.fit.instruments import (
 )
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
+from pipeline.fit.torque_constant import USES, torque_constant
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.capture import Campaign
@@ -82,7 +83,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
 
 def _torque(known: Constants) -> Torque | None:
-    kt = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
+    kt = torque_constant(known)
     if kt is None:
         return None
     alpha = known.best("temp_coeff_magnet_1_k")
@@ -209,8 +210,7 @@ ESTIMATOR = Estimator(
     experiment=EXPERIMENT,
     fit=fit,
     uses=(
-        "kt_peak_nm_a",
-        "kt_from_ke_nm_a",
+        *USES,
         "kt_reluctance_nm_a2",
         "temp_coeff_magnet_1_k",
         "ld_h",
