@@ -245,23 +245,6 @@ def terminal_inductance_h(
     return read
 
 
-def axis_inductances_h(
-    l_first_h: float, l_second_h: float, theta_first_rad: float, theta_second_rad: float, pair: str
-) -> tuple[float, float]:
-    """L_d and L_q [H] from one pair's inductance at two known electrical angles [rad].
-
-    Solves the two equations of `terminal_inductance_h`; ValueError where both angles give the
-    same equation (cos 2(θ − θ_pair) equal within 1e-3).
-    """
-    one = math.cos(2.0 * (theta_first_rad - PAIR_AXES_RAD[pair]))
-    two = math.cos(2.0 * (theta_second_rad - PAIR_AXES_RAD[pair]))
-    if abs(one - two) < 1e-3:
-        raise ValueError("the two rotor angles give the same equation")
-    half_swing = (l_first_h - l_second_h) / (one - two)
-    mean = l_first_h - half_swing * one
-    return (mean + half_swing) / 2.0, (mean - half_swing) / 2.0
-
-
 class UnalignedInductances(NamedTuple):
     """Axis inductances [H] without knowing which is d, and where the low one lies [rad, mod π]."""
 

@@ -1,8 +1,6 @@
-"""Space vectors: phases, the stator frame and the rotor frame, amplitude-invariant.
+"""Space vectors of three phases, amplitude-invariant: complex numbers α + jβ, α on phase a.
 
-Complex numbers carry two axes: α + jβ in the stator frame, d + jq in the rotor frame. References:
-[1] E. Clarke, Circuit Analysis of A-C Power Systems, 1943. [2] R. H. Park, Two-reaction theory
-of synchronous machines, AIEE Trans. 48, 1929.
+Reference: [1] E. Clarke, Circuit Analysis of A-C Power Systems, 1943.
 """
 
 from __future__ import annotations
@@ -12,7 +10,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _THIRD = complex(-0.5, math.sqrt(0.75))
@@ -41,25 +38,3 @@ def space_vector_of_lines(ab: ArrayLike, bc: ArrayLike) -> Complex:
     first, second = np.asarray(ab, dtype=np.float64), np.asarray(bc, dtype=np.float64)
     vector: Complex = space_vector(first, second, -(first + second)) * _LINE_TO_PHASE
     return vector
-
-
-def phases(vector: ArrayLike) -> tuple[Array, Array, Array]:
-    """Phase quantities a, b, c [n each] of a stator-frame vector [n], without common part."""
-    x = np.asarray(vector, dtype=np.complex128)
-    return x.real, (x * _THIRD.conjugate()).real, (x * _THIRD).real
-
-
-def to_rotor(vector: ArrayLike, theta_elec_rad: ArrayLike) -> Complex:
-    """Rotor-frame vector d + jq [n] of a stator-frame one at electrical angles [n, rad] [2]."""
-    turned: Complex = np.asarray(vector, dtype=np.complex128) * np.exp(
-        -1j * np.asarray(theta_elec_rad, dtype=np.float64)
-    )
-    return turned
-
-
-def to_stator(vector: ArrayLike, theta_elec_rad: ArrayLike) -> Complex:
-    """Stator-frame vector α + jβ [n] of a rotor-frame one at electrical angles [n, rad] [2]."""
-    turned: Complex = np.asarray(vector, dtype=np.complex128) * np.exp(
-        1j * np.asarray(theta_elec_rad, dtype=np.float64)
-    )
-    return turned

@@ -157,18 +157,6 @@ def test_three_pairs_at_an_unknown_angle(low: float, ratio: float, theta: float)
     assert found.high_h - found.low_h == pytest.approx(swing, rel=1e-6)
 
 
-@pytest.mark.parametrize("pair", ["ab", "bc", "ca"])
-def test_two_known_angles_give_both_axes(pair: str) -> None:
-    angles = (math.radians(10.0), math.radians(75.0))
-    read = [float(c.terminal_inductance_h(0.2e-3, 0.3e-3, angle, pair)) for angle in angles]
-    assert c.axis_inductances_h(*read, *angles, pair) == pytest.approx((0.2e-3, 0.3e-3))
-
-
-def test_two_angles_of_one_equation_are_refused() -> None:
-    with pytest.raises(ValueError, match="same equation"):
-        c.axis_inductances_h(1.0, 1.0, 0.3, 0.3 + math.pi, "ab")
-
-
 def test_saliency_words() -> None:
     assert c.saliency_words(3.6 / 1.8) == "interior magnets, salient"
     assert c.saliency_words(1.04) == "surface magnets, not salient"

@@ -7,13 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.physics.frames import (
-    phases,
-    space_vector,
-    space_vector_of_lines,
-    to_rotor,
-    to_stator,
-)
+from pipeline.physics.frames import space_vector, space_vector_of_lines
 
 VALUE = st.floats(-1e3, 1e3)
 
@@ -28,15 +22,6 @@ def test_a_balanced_system_is_one_length_and_turns_forward() -> None:
     vector = space_vector(*_balanced(theta, 5.0))
     assert np.abs(vector) == pytest.approx(5.0)
     assert np.unwrap(np.angle(vector)) == pytest.approx(theta)
-    assert to_rotor(vector, theta) == pytest.approx(np.full(50, 5.0 + 0.0j))
-    assert to_stator(to_rotor(vector, theta), theta) == pytest.approx(vector)
-
-
-@given(a=VALUE, b=VALUE, c=VALUE)
-def test_phases_come_back_without_their_common_part(a: float, b: float, c: float) -> None:
-    mean = (a + b + c) / 3.0
-    back = [float(x) for x in phases(space_vector(a, b, c))]
-    assert back == pytest.approx([a - mean, b - mean, c - mean], abs=1e-9)
 
 
 @given(a=VALUE, b=VALUE, c=VALUE)
