@@ -47,9 +47,10 @@ class Spin:
     omega_rad_s: Array | None
     temp_degc: Array | None
 
-    def vector_v(self) -> Complex:
+    def vector_v(self, centred: bool = True) -> Complex:
         """The space vector [n], phase to star point, least squares over the channels.
 
+        With `centred` each channel's mean is taken off, which whole turns make its offset.
         Raises ValueError with fewer than two independent channels.
         """
         rows = np.array([c.gain * np.exp(1j * c.angle_rad) for c in self.channels])
@@ -59,7 +60,7 @@ class Spin:
         inverse = np.linalg.pinv(design)
         vector: Complex = np.zeros(self.t_s.size, dtype=np.complex128)
         for weight, channel in zip((inverse[0] + 1j * inverse[1]), self.channels, strict=True):
-            vector += weight * (channel.v_v - np.mean(channel.v_v))
+            vector += weight * (channel.v_v - (np.mean(channel.v_v) if centred else 0.0))
         return vector
 
 

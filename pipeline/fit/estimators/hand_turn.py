@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from pipeline.fit.instruments import (
 )
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.terminals import first_temperature
-from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import decimated, white_noise_sigma
 from pipeline.physics.conventions import POLE_PAIRS_TOLERANCE, pole_pairs_from
 from pipeline.records.capture import Campaign, Capture
@@ -55,9 +56,10 @@ class Turn:
 def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Flux is the integral of the voltage, so the hand's speed does not enter.
 
-    With the angle: flux = offset + drift t + amplitude cos(p theta + phase), p real, least
-    squares. Without: swings of the flux between the voltage's zeros count half cycles, and their
-    mean height is twice the amplitude.
+    Cycles are counted against the angle where there, else by the phase of the flux vector where
+    two voltages were read, else by the swings of the one flux; without the angle the capture has
+    to be one whole turn. Amplitude by least squares of flux steps on steps of cos(phase), whose
+    noise is white though that of the flux itself is not.
     """
     turns: list[tuple[Capture, Turn]] = []
     notes: list[str] = []
@@ -67,7 +69,7 @@ def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, fl
         except KeyError:
             notes.append(f"{capture.path}: no terminal voltage")
             continue
-        found = [t for t in (_turn(spin, channel) for channel in spin.channels) if t is not None]
+        found = _turns(spin)
         turns += [(capture, turn) for turn in found]
         if not found:
             notes.append(f"{capture.path}: the voltage does not stand out of the noise")
@@ -79,12 +81,24 @@ def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, fl
     return Fit((pairs, psi), (_evidence(turns),))
 
 
-def _flux_of(spin: Spin, channel: Channel) -> Array:
-    """Integral of a voltage [Wb], phase to star point, less the offset seen at rest.
+def _turns(spin: Spin) -> list[Turn]:
+    loud = [
+        c
+        for c in spin.channels
+        if float(np.quantile(np.abs(c.v_v), 0.9)) > 5.0 * white_noise_sigma(c.v_v)
+    ]
+    if not loud:
+        return []
+    if spin.theta_rad is not None and np.isfinite(spin.theta_rad).all():
+        return _by_angle(spin, loud, spin.theta_rad)
+    if len(loud) >= 2:
+        return _by_vector(replace(spin, channels=tuple(loud)))
+    return [t for t in (_by_swings(spin, c) for c in loud) if t is not None]
 
-    The offset is the mean where the speed is least; what is left of it is fitted as a drift.
-    """
-    v = channel.v_v - float(np.median(channel.v_v[_quiet(channel.v_v)]))
+
+def _flux_of(spin: Spin, channel: Channel) -> Array:
+    """Integral of a voltage [Wb], phase to star point, less the offset seen at rest."""
+    v = channel.v_v - float(np.mean(channel.v_v[_quiet(channel.v_v)]))
     steps = 0.5 * (v[1:] + v[:-1]) * np.diff(spin.t_s)
     return np.concatenate([[0.0], np.cumsum(steps)]) / channel.gain
 
@@ -100,52 +114,99 @@ def _quiet(v: Array) -> NDArray[np.bool_]:
     return quiet if np.count_nonzero(quiet) >= 20 else np.ones(v.size, dtype=bool)
 
 
-def _turn(spin: Spin, channel: Channel) -> Turn | None:
-    sigma = white_noise_sigma(channel.v_v)
-    if float(np.quantile(np.abs(channel.v_v), 0.9)) < 5.0 * sigma:
-        return None
-    flux = _flux_of(spin, channel)
-    if spin.theta_rad is not None and np.isfinite(spin.theta_rad).all():
-        return _by_angle(spin, channel, flux)
-    return _by_swings(spin, channel, flux, sigma)
+def _by_angle(spin: Spin, loud: Sequence[Channel], theta: Array) -> list[Turn]:
+    """Cycles a turn as a real number: a scan of whole ones by the first voltage, then each own."""
+    if float(np.ptp(theta)) < 0.5 * TURN:
+        return []
+    rows = _knots(theta, float(np.ptp(theta)) / 1200.0)
+    if rows.size < 50:
+        return []
+    t, angle = spin.t_s[rows], theta[rows]
 
-
-def _by_angle(spin: Spin, channel: Channel, flux: Array) -> Turn | None:
-    """Least squares over a real number of cycles a turn, the start from a scan of whole ones."""
-    theta = spin.theta_rad
-    if theta is None or float(np.ptp(theta)) < 0.5 * TURN:
-        return None
-    time = (spin.t_s - spin.t_s[0]) / (spin.t_s[-1] - spin.t_s[0])
-    rows = decimated(theta.size, 4000)
-
-    def design(cycles: float, where: slice) -> Array:
-        angle = cycles * theta[where]
-        ones = np.ones(angle.size)
-        return np.column_stack([ones, time[where], np.cos(angle), np.sin(angle)])
-
-    def misfit(cycles: float) -> float:
-        residuals = linear_fit(design(cycles, rows), flux[rows]).residuals
+    def misfit(flux: Array, cycles: float) -> float:
+        residuals = _steps_fit(t, flux, cycles * angle).residuals
         return float(residuals @ residuals)
 
-    travel = np.abs(np.diff(theta[rows]))
-    highest = int(min(200, math.pi / max(float(travel.max()), 1e-9)))
-    best = min(range(1, max(highest, 2)), key=misfit)
-    cycles = _least(misfit, best - 0.5, best + 0.5)
-    fit = linear_fit(design(cycles, slice(None)), flux)
-    tau = autocorrelation_time(fit.residuals)
-    a, b = (float(c) for c in fit.coefficients[2:])
+    highest = int(min(200, math.pi / float(np.abs(np.diff(angle)).max())))
+    first = _flux_of(spin, loud[0])[rows]
+    best = min(range(1, max(highest, 2)), key=lambda cycles: misfit(first, cycles))
+    turns = []
+    for channel in loud:
+        flux = _flux_of(spin, channel)
+        cycles = _least(partial(misfit, flux[rows]), best - 0.4, best + 0.4)
+        turns.append(_amplitude(spin, channel, flux, cycles * theta, cycles))
+    return [turn for turn in turns if turn is not None]
+
+
+def _knots(phase: Array, step: float) -> NDArray[np.intp]:
+    """Rows at which a phase has moved on by `step` since the last one, both ends in."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(phase)))])
+    marks = np.arange(0.0, travelled[-1], step)
+    return np.unique(np.append(np.searchsorted(travelled, marks), phase.size - 1))
+
+
+def _steps_fit(t_s: Array, flux: Array, phase: Array) -> LinearFit:
+    """Flux steps [n - 1] on steps of t (an offset), cos and sin of the phase, all [n].
+
+    Noise of a step grows with the root of its duration.
+    """
+    design = np.diff(np.column_stack([t_s, np.cos(phase), np.sin(phase)]), axis=0)
+    weight = 1.0 / np.sqrt(np.diff(t_s))
+    return linear_fit(design * weight[:, None], np.diff(flux) * weight)
+
+
+def _amplitude(
+    spin: Spin, channel: Channel, flux: Array, phase: Array, cycles: float
+) -> Turn | None:
+    rows = _knots(phase, TURN / 24.0)
+    if rows.size < 12:
+        return None
+    fit = _steps_fit(spin.t_s[rows], flux[rows], phase[rows])
+    drift, a, b = (float(c) for c in fit.coefficients)
     amplitude = math.hypot(a, b)
-    slope = np.array([0.0, 0.0, a, b]) / amplitude
-    u = math.sqrt(float(slope @ fit.covariance @ slope) * tau)
-    return Turn(channel.name, cycles, amplitude, u, spin.t_s, flux, flux - fit.residuals)
+    slope = np.array([0.0, a, b]) / max(amplitude, 1e-300)
+    u = math.sqrt(float(slope @ fit.covariance @ slope) * autocorrelation_time(fit.residuals))
+    fitted = drift * spin.t_s + a * np.cos(phase) + b * np.sin(phase)
+    return Turn(
+        channel.name, cycles, amplitude, u, spin.t_s, flux, fitted + float(np.mean(flux - fitted))
+    )
+
+
+def _by_vector(spin: Spin) -> list[Turn]:
+    """Cycles from the phase that the flux vector turns through about its drifting centre.
+
+    The centre c0 + c1 t is where |flux - centre|² is constant: |f|² = 2 Re(conj(f) centre) + k,
+    linear in c0, c1 and k with the small |centre|² left in k.
+    """
+    rest = [replace(c, v_v=c.v_v - float(np.mean(c.v_v[_quiet(c.v_v)]))) for c in spin.channels]
+    vector = replace(spin, channels=tuple(rest)).vector_v(centred=False)
+    steps = 0.5 * (vector[1:] + vector[:-1]) * np.diff(spin.t_s)
+    flux = np.concatenate([[0.0], np.cumsum(steps)])
+    flux = flux - flux.mean()
+    time = (spin.t_s - spin.t_s.mean()) / float(np.ptp(spin.t_s))
+    rows = _knots(np.unwrap(np.angle(flux)), TURN / 24.0)
+    for _ in range(3):
+        f, t = flux[rows], time[rows]
+        design = np.column_stack(
+            [2.0 * f.real, 2.0 * f.imag, 2.0 * f.real * t, 2.0 * f.imag * t, np.ones(t.size)]
+        )
+        c = linear_fit(design, np.abs(f) ** 2).coefficients
+        flux = flux - (complex(c[0], c[1]) + complex(c[2], c[3]) * time)
+    phase = np.unwrap(np.angle(flux))
+    cycles = abs(float(phase[-1] - phase[0])) / TURN
+    found = (
+        _amplitude(spin, channel, _flux_of(spin, channel), phase, cycles)
+        for channel in spin.channels
+    )
+    return [turn for turn in found if turn is not None]
 
 
 def _least(value: Callable[[float], float], low: float, high: float) -> float:
-    """Minimum of a smooth function between two ends by golden section, to 1e-7."""
+    """Minimum of a smooth function between two ends by golden section, to 1e-6."""
     shrink = (math.sqrt(5.0) - 1.0) / 2.0
     left, right = high - shrink * (high - low), low + shrink * (high - low)
     at_left, at_right = value(left), value(right)
-    while high - low > 1e-7:
+    while high - low > 1e-6:
         if at_left < at_right:
             high, right, at_right = right, left, at_left
             left = high - shrink * (high - low)
@@ -157,29 +218,36 @@ def _least(value: Callable[[float], float], low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-def _by_swings(spin: Spin, channel: Channel, flux: Array, sigma: float) -> Turn | None:
+def _by_swings(spin: Spin, channel: Channel) -> Turn | None:
     """Half cycles between the extremes of the flux, the broken ones at both ends by arc cosine.
 
     Extremes are those that the flux leaves again by more than its own noise, so that noise about
-    a standstill makes none.
+    a standstill makes none. The line through the middles of the swings is the drift.
     """
+    flux = _flux_of(spin, channel)
     period = float(np.median(np.diff(spin.t_s)))
-    noise = sigma * period * math.sqrt(flux.size) / channel.gain
-    turning = _extremes(flux, max(8.0 * noise, 0.1 * float(np.ptp(flux))))
+    noise = white_noise_sigma(channel.v_v) * period * math.sqrt(flux.size) / channel.gain
+    reversal = max(4.0 * noise, 0.1 * float(np.ptp(flux)))
+    turning = _extremes(flux, reversal)
+    if turning.size >= 4:
+        middles = 0.5 * (flux[turning[:-1]] + flux[turning[1:]])
+        times = 0.5 * (spin.t_s[turning[:-1]] + spin.t_s[turning[1:]])
+        line = linear_fit(np.column_stack([np.ones(times.size), times]), middles).coefficients
+        flux = flux - line[0] - line[1] * spin.t_s
+        turning = _extremes(flux, reversal)
     if turning.size < 3:
         return None
     swings = np.abs(np.diff(flux[turning]))
     amplitude = float(np.median(swings)) / 2.0
     whole = swings[np.abs(swings / 2.0 - amplitude) < 0.2 * amplitude]
     amplitude = float(whole.mean()) / 2.0
-    centre = 0.5 * (flux[turning[:-1]] + flux[turning[1:]]).mean()
     ends = 0.0
     for end, extreme in ((0, turning[0]), (flux.size - 1, turning[-1])):
-        sense = math.copysign(1.0, flux[extreme] - centre)
-        ends += math.acos(float(np.clip(sense * (flux[end] - centre) / amplitude, -1.0, 1.0)))
+        sense = math.copysign(1.0, flux[extreme])
+        ends += math.acos(float(np.clip(sense * flux[end] / amplitude, -1.0, 1.0)))
     cycles = (math.pi * (turning.size - 1) + ends) / TURN
     scatter = float(whole.std(ddof=1)) / 2.0 if whole.size > 1 else noise
-    u = max(scatter / math.sqrt(whole.size), noise / 2.0)
+    u = max(scatter / math.sqrt(whole.size), noise / math.sqrt(whole.size))
     return Turn(channel.name, cycles, amplitude, u, spin.t_s, flux, np.zeros(0))
 
 
@@ -221,7 +289,7 @@ def _flux(
     turns: Sequence[tuple[Capture, Turn]], known: Constants, options: Mapping[str, float]
 ) -> Estimate:
     """Weighted mean of the channels at 25 degC."""
-    captures = tuple(dict.fromkeys(c for c, _ in turns))
+    captures = tuple({c.path: c for c, _ in turns}.values())
     coefficient = known.best("temp_coeff_magnet_1_k")
     alpha = options["alpha_assumed_1_k"] if coefficient is None else coefficient.number
     values, weights, excesses = [], [], []
