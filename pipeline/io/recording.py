@@ -134,7 +134,8 @@ def fit_traces(capture: Capture, evidence: Sequence[Evidence]) -> Iterator[FitTr
         for place, series in enumerate(one.series):
             if series.fitted.size == 0 or series.x.size == 0:
                 continue
-            residual = series.measured - series.fitted
+            with np.errstate(invalid="ignore"):
+                residual = series.measured - series.fitted
             columns = {"measured": series.measured, "fitted": series.fitted, "residual": residual}
             frame = pl.DataFrame({k: v.astype(np.float32) for k, v in columns.items()})
             trace = _timed(f"/model/{one.estimator}/{number}_{place}", series.x, frame)

@@ -238,14 +238,24 @@ def _end_labels(series: tuple[Series, ...], panel: Panel) -> list[str]:
         places.append(max(place, places[-1] + LABEL_PITCH) if places else place)
     lift = max(places[-1] - panel.y.start, 0.0) if places else 0.0
     return [
-        f'<text class="end" x="{panel.x.end + 6:.1f}" y="{place - lift + 4:.1f}">'
+        f'<text class="end {_tone(series, index)}" '
+        f'x="{panel.x.end + 6:.1f}" y="{place - lift + 4:.1f}">'
         f"<title>{escape(series[index].label)}</title>{escape(_short(series[index].label))}</text>"
         for place, (_, index) in zip(places, sorted(wanted), strict=True)
     ]
 
 
+def _tone(series: tuple[Series, ...], index: int) -> str:
+    """The colour class of a label: its curve's own where curves are told apart by colour."""
+    return "plain" if any(one.fitted.size for one in series) else f"t{index % PALETTE}"
+
+
 def _short(label: str) -> str:
-    return label if len(label) <= LABEL_CHARS else label[: LABEL_CHARS - 1] + "…"
+    """A label that fits the margin; files differ at their ends, so the middle is left out."""
+    if len(label) <= LABEL_CHARS:
+        return label
+    head = LABEL_CHARS // 3
+    return f"{label[:head]}…{label[head + 1 - LABEL_CHARS :]}"
 
 
 def _frame(panel: Panel) -> str:

@@ -20,7 +20,6 @@ from pipeline.report.words import KEY_CONSTANTS, constant_words, symbol
 STATUS_ORDER = ("refused", "provisional", "released")
 NO_LOT = "no lot"
 NO_TYPE = "type not stated"
-FEWEST_FOR_STRIP = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +118,7 @@ def _cell(estimate: Estimate | None, scale: Scale) -> Cell:
 def _strips(
     sheets: Sequence[Datasheet], shown: Sequence[tuple[str, Scale]]
 ) -> list[tuple[str, list[Strip]]]:
-    """Strip plots by motor type; a constant that fewer than two motors of a type have has none."""
+    """Strip plots by motor type; a constant that is the same in all motors has none."""
     by_type: dict[str, list[Datasheet]] = {}
     for sheet in sheets:
         by_type.setdefault(sheet.motor_type or NO_TYPE, []).append(sheet)
@@ -131,7 +130,7 @@ def _strips(
                 strip_plot(name, _known(name, members)[0].unit, _lots(name, members)),
             )
             for name, scale in shown
-            if len(_known(name, members)) >= FEWEST_FOR_STRIP
+            if len({estimate.number for estimate in _known(name, members)}) > 1
         ]
         if strips:
             sections.append((motor_type, strips))

@@ -12,12 +12,13 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.uncertainty import covariance
-from pipeline.report.axis import quantity_words, unit_of
 from pipeline.report.chart import chart
-from pipeline.report.numbers import MINUS, Reading, plain, quantity, reading, significant, unit_text
+from pipeline.report.conditions import conditions
+from pipeline.report.numbers import MINUS, Reading, plain, quantity, reading, significant
 from pipeline.report.page import render
 from pipeline.report.words import GROUPS, KEY_CONSTANTS, constant_words, grouped, symbol
 
+NEGLIGIBLE = 1e-3
 CHECK_ORDER = ("fail", "marginal", "not_evaluated", "pass")
 STATUS_WORDS = {
     "released": "Every capture verified, every check holds, approved.",
@@ -104,10 +105,10 @@ def _row(name: str, datasheet: Datasheet) -> Row:
         estimate=estimate,
         reading=shown,
         relative=_relative(estimate),
-        u_a=_in_scale(estimate.u_a, shown),
-        u_b=_in_scale(estimate.u_b, shown),
+        u_a=_in_scale(estimate.u_a, estimate.u, shown),
+        u_b=_in_scale(estimate.u_b, estimate.u, shown),
         dof=_dof(estimate),
-        at=", ".join(_condition(key, estimate.at[key]) for key in sorted(estimate.at)),
+        at=conditions(estimate.at),
         alternatives=tuple(sorted(others, key=lambda other: other.method)),
     )
 
@@ -129,11 +130,11 @@ def _percent(share: float) -> str:
     return f"{text.replace('-', MINUS)} %"
 
 
-def _in_scale(u: float, shown: Reading | None) -> str:
-    """A standard uncertainty in the unit that the value is shown in, two digits."""
+def _in_scale(u: float, total: float, shown: Reading | None) -> str:
+    """A part of the standard uncertainty in the unit that the value is shown in, two digits."""
     if shown is None or not shown.expanded:
         return ""
-    return significant(u / 10.0**shown.exponent, 2)
+    return significant(u / 10.0**shown.exponent, 2) if u >= NEGLIGIBLE * total else "≈ 0"
 
 
 def _relative(estimate: Estimate) -> str:
@@ -146,16 +147,6 @@ def _dof(estimate: Estimate) -> str:
     if not estimate.known or estimate.u == 0.0:
         return ""
     return f"{estimate.dof:.0f}" if estimate.dof < 1e4 else "∞"
-
-
-def _condition(key: str, value: float | int | str) -> str:
-    if isinstance(value, str):
-        shown = value
-    elif unit_of(key) in {"1", "degC", "deg"}:
-        shown = f"{plain(float(value), 4)} {unit_text(unit_of(key))}".strip()
-    else:
-        shown = quantity(float(value), unit_of(key))
-    return f"{quantity_words(key).replace('_', ' ')} {shown}"
 
 
 def _ordered(checks: tuple[Check, ...]) -> list[Check]:

@@ -13,8 +13,8 @@ from decimal import ROUND_HALF_EVEN, Decimal
 COVERAGE_FACTOR = 2.0
 MINUS = "−"
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
-_WORDS = {"ohm": "Ω", "degC": "°C", "deg": "°", "N·m/sqrt(W)": "N·m/√W", "1": ""}
-_PREFIXABLE = ("V", "A", "N·m", "Ω", "H", "Wb", "s", "W", "Hz", "rad/s")
+_WORDS = {"ohm": "Ω", "degC": "°C", "deg": "°", "N·m/sqrt(W)": "N·m/√W", "1/K": "K⁻¹", "1": ""}
+_PREFIXABLE = ("V", "A", "N·m", "Ω", "H", "Wb", "s", "W", "Hz")
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -53,7 +53,7 @@ def unit_text(unit: str) -> str:
 def scale_for(magnitude: float, unit: str) -> Scale:
     """The SI prefix, or power of ten where a prefix would mislead, that fits a magnitude.
 
-    A prefix stands before the first unit of a product (mN·m, µH). Units such as kg·m², 1/K, °C
+    A prefix stands before the first unit of a product (mN·m, µH). Units such as kg·m², rad/s, °C
     and degrees take a power of a thousand instead, and only outside 0.001 to 10000.
     """
     shown = unit_text(unit)
@@ -63,7 +63,7 @@ def scale_for(magnitude: float, unit: str) -> Scale:
     if _takes_prefix(shown):
         exponent = min(max(exponent, -12), 6)
         return Scale(exponent, _PREFIXES[exponent] + shown)
-    if 1e-3 <= abs(magnitude) < 1e4 and shown != "1/K":
+    if 1e-3 <= abs(magnitude) < 1e4 and shown != "K⁻¹":
         return Scale(0, shown)
     return Scale(exponent, times_ten(exponent, shown))
 

@@ -38,7 +38,8 @@ def residual_of(series: Series) -> Array:
     """What the fit left over, measured - fitted [n]; empty where the series has no fit."""
     if series.fitted.size == 0:
         return np.empty(0)
-    return np.asarray(series.measured - series.fitted, dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(series.measured - series.fitted, dtype=np.float64)
 
 
 def residual_scale(series: Iterable[Series]) -> ResidualScale | None:

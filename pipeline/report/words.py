@@ -101,7 +101,8 @@ def constant_words(name: str) -> str:
     term = CONSTANTS.get(name)
     if term is None:
         return name.replace("_", " ")
-    return sentence(term.words.replace("degC", "°C"))
+    words = term.words.replace("degC", "°C")
+    return sentence(f"temperature coefficient {words}" if words.startswith("of ") else words)
 
 
 def grouped(names: Iterable[str]) -> list[tuple[str, list[str]]]:
@@ -116,4 +117,4 @@ def grouped(names: Iterable[str]) -> list[tuple[str, list[str]]]:
 def sentence(text: str) -> str:
     """The text with a capital first letter, unless its first word is a name such as `lq_h`."""
     first = text.split(" ", 1)[0]
-    return text if "_" in first or not first.islower() else text[0].upper() + text[1:]
+    return text if "_" in first else text[:1].upper() + text[1:]

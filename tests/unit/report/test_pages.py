@@ -1,0 +1,314 @@
+"""Pages: every number of the datasheet is on them, nothing foreign gets in, nothing is fetched."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.finding import Finding
+from pipeline.records.naming import file_stem
+from pipeline.report.conditions import conditions
+from pipeline.report.fleet_page import page_of, render_fleet
+from pipeline.report.motor_page import render_motor
+from pipeline.report.words import GROUPS, KEY_CONSTANTS, grouped
+
+VOID = {"meta", "br", "input", "path", "rect", "circle"}
+HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>\u202e'
+FINDINGS = (
+    Finding("joint-P0/x.mcap", "refused", "truncated", "the file ends early", "record it again"),
+    Finding("joint-P0/y.mcap", "warning", "gap", "12 are missing", "look at the cable", (400, 412)),
+)
+
+
+class Page(HTMLParser):
+    """Tags in order, texts of table rows by id, attributes; fails on a tag left open."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.rows: list[list[str]] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag == "tr":
+            self.rows.append([])
+        if tag in {"th", "td"}:
+            self.rows[-1].append("")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] in {"style", "script"}:
+            return
+        self.text += data
+        if self.rows and {"th", "td"} & set(self.open):
+            self.rows[-1][-1] += data
+
+    def row(self, code: str) -> list[str]:
+        return next(row for row in self.rows if row[0].endswith(code))
+
+
+def squeezed(text: str) -> str:
+    return re.sub(r"\s+", " ", text).strip()
+
+
+def test_the_table_of_constants_is_the_datasheet(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    """Golden structure: value ± U parsed back from the page equal the datasheet's to rounding."""
+    page = Page(render_motor(datasheet, evidence, FINDINGS))
+    factors = {"mΩ": 1e-3, "µH": 1e-6, "mWb": 1e-3, "mN·m/A": 1e-3, "mN·m": 1e-3}
+    for name, estimate in datasheet.constants.items():
+        row = page.row(name)
+        if estimate.value is None:
+            assert squeezed(row[1]) == "not identifiable"
+            assert estimate.note in squeezed(row[-1])
+            continue
+        value, _, rest = squeezed(row[1]).partition(" ± ")
+        if estimate.u == 0.0:
+            assert value == f"{estimate.value}"
+            continue
+        expanded, _, unit = rest.partition(" ")
+        power = re.search("×10⁻([³⁶])", unit)
+        factor = 10.0 ** -{"³": 3, "⁶": 6}[power[1]] if power else factors.get(unit, 1.0)
+        factor = 1e-6 if unit.startswith("µ") else factor
+        assert float(expanded) * factor == pytest.approx(2 * estimate.u, rel=0.05), name
+        assert float(value) * factor == pytest.approx(estimate.value, abs=0.06 * 2 * estimate.u)
+        assert float(row[3]) ** 2 + float(row[4]) ** 2 == pytest.approx(
+            (estimate.u / factor) ** 2, rel=0.06
+        )
+
+
+def test_the_other_method_stands_under_the_published_one(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    page = Page(render_motor(datasheet, evidence, ()))
+    place = next(i for i, row in enumerate(page.rows) if row[0].endswith("ld_h"))
+    other = [squeezed(cell) for cell in page.rows[place + 1]]
+    chosen, lcr = datasheet.constants["ld_h"], datasheet.alternatives[0]
+    shared = 0.64 * chosen.u * lcr.u  # both carry 0.8 u of the same current sensor
+    spread = np.sqrt(chosen.u**2 + lcr.u**2 - 2 * shared)
+    gap = (lcr.number - chosen.number) / spread
+    assert other[0] == "also by lcr"
+    assert other[1] == "211.5 ± 1.8 µH"
+    assert other[2] == f"+0.67 % apart, {gap:.1f} u of the difference"
+
+
+def test_checks_stand_worst_first_with_value_limit_and_suspect(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    page = Page(render_motor(datasheet, evidence, ()))
+    names = {check.name.replace("_", " ") for check in datasheet.checks}
+    rows = [[squeezed(c) for c in row] for row in page.rows if len(row) == 5 and row[1] in names]
+    assert [row[0] for row in rows] == ["✗ fail", "! marginal", "– not evaluated", "✓ pass"]
+    assert rows[0][2:4] == ["1.1547", "0.01"]
+    assert rows[0][4].startswith("torque test against back-EMF")
+    assert rows[0][4].endswith("Suspect: 2/sqrt(3)")
+    assert rows[1][2:4] == ["940.0 µs", "920.0 µs"]
+    assert rows[2][2:4] == ["–", "–"]
+
+
+def test_status_reason_bound_and_provenance_are_said(datasheet: Datasheet) -> None:
+    constants = dict(datasheet.constants)
+    constants["j_rotor_kgm2"] = replace(constants["j_rotor_kgm2"], bounds=(0, 1), at_bound=True)
+    unverified = CaptureReference("joint-P0/z.csv", "ef" * 32, "drive", "unverified")
+    sheet = replace(datasheet, constants=constants, captures=(*datasheet.captures, unverified))
+    page = Page(render_motor(sheet, (), FINDINGS))
+    text = squeezed(page.text)
+    assert "joint-P0 ! provisional" in text
+    assert "not approved" in text
+    assert "2 captures, 1 of them unverified" in text
+    assert "at its bound" in page.row("j_rotor_kgm2")[1]
+    for digest in (sheet.version, sheet.config_sha256, sheet.code_version, "ef" * 32):
+        assert digest in text
+    assert "400–412" in text
+    assert "record it again" in text
+
+
+def test_every_fit_has_its_residual_panel(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    page = render_motor(datasheet, evidence, ())
+    figures = re.findall("<figure.*?</figure>", page, re.DOTALL)
+    assert len(figures) == len(evidence)
+    fitted = sum(any(s.fitted.size for s in e.series) for e in evidence)
+    assert sum('class="scale"' in figure for figure in figures) == fitted == 5
+
+
+def test_hostile_names_stay_text() -> None:
+    hostile = Estimate(HOSTILE, 1.0, "1", "measured", HOSTILE, at={"x": HOSTILE}, note=HOSTILE)
+    sheet = Datasheet(
+        motor_id=HOSTILE,
+        motor_type=HOSTILE,
+        lot=HOSTILE,
+        version=HOSTILE,
+        status="refused",
+        why=(HOSTILE,),
+        captures=(CaptureReference(HOSTILE, HOSTILE, HOSTILE, HOSTILE),),
+        config_sha256=HOSTILE,
+        code_version=HOSTILE,
+        constants={HOSTILE: hostile, "ld_h": not_identifiable("ld_h", "H", HOSTILE, HOSTILE)},
+        alternatives=(replace(hostile, captures=(HOSTILE,)),),
+        checks=(Check(HOSTILE, "fail", HOSTILE, 1.0, 2.0, HOSTILE, HOSTILE),),
+    )
+    series = (Series(HOSTILE, np.arange(3.0), np.arange(3.0), np.empty(0)),) * 2
+    shown = Evidence(HOSTILE, HOSTILE, "t_s", "ia_a", "line", series, HOSTILE, HOSTILE)
+    found = (Finding(HOSTILE, "refused", HOSTILE, HOSTILE, HOSTILE),)
+    for html in (render_motor(sheet, (shown,), found), render_fleet([sheet, sheet], found)):
+        page = Page(html)
+        scripts = [attrs for tag, attrs in page.tags if tag == "script"]
+        assert scripts == [{}]
+        assert not [tag for tag, _ in page.tags if tag == "img"]
+        assert not [a for _, attrs in page.tags for a in attrs if a.startswith("on")]
+        assert HOSTILE in page.text
+        assert "49" not in page.text
+
+
+def test_pages_fetch_nothing(datasheet: Datasheet, evidence: tuple[Evidence, ...]) -> None:
+    motor = render_motor(datasheet, evidence, FINDINGS)
+    fleet = render_fleet([datasheet], FINDINGS)
+    for html in (motor, fleet):
+        page = Page(html)
+        assert not [a for _, attrs in page.tags for a in attrs if a in {"src", "srcset", "data"}]
+        links = [attrs["href"] for _, attrs in page.tags if "href" in attrs]
+        assert all(link.startswith("#") or re.fullmatch(r"[\w~.-]+\.html", link) for link in links)
+        assert "@import" not in html
+        assert "url(" not in html
+        assert not {tag for tag, _ in page.tags} & {"link", "iframe", "object", "embed", "base"}
+    anchors = {
+        attrs["href"][1:] for _, attrs in Page(motor).tags if attrs.get("href", "")[:1] == "#"
+    }
+    ids = [attrs["id"] for _, attrs in Page(motor).tags if "id" in attrs]
+    assert anchors <= set(ids)
+    assert len(ids) == len(set(ids))
+
+
+def test_tables_have_headers_and_drawings_have_names(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    for html in (render_motor(datasheet, evidence, FINDINGS), render_fleet([datasheet], FINDINGS)):
+        tags = Page(html).tags
+        assert all(attrs.get("scope") in {"col", "row"} for tag, attrs in tags if tag == "th")
+        assert all(attrs.get("aria-label") for tag, attrs in tags if tag == "svg")
+        levels = [int(tag[1]) for tag, _ in tags if re.fullmatch("h[1-6]", tag)]
+        assert levels[0] == 1
+        assert all(b - a <= 1 for a, b in pairwise(levels))
+
+
+def test_equal_input_gives_equal_text_in_any_order(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    turned = replace(datasheet, constants=dict(reversed(datasheet.constants.items())))
+    assert render_motor(datasheet, evidence, FINDINGS) == render_motor(
+        turned, evidence, FINDINGS[::-1]
+    )
+    other = replace(datasheet, motor_id="joint-P1")
+    assert render_fleet([datasheet, other], FINDINGS) == render_fleet(
+        [other, turned], FINDINGS[::-1]
+    )
+
+
+def test_the_fleet_shows_each_motor_once_on_one_scale(datasheet: Datasheet) -> None:
+    twice = datasheet.constants["r_phase_ohm"]
+    other = replace(
+        datasheet,
+        motor_id="p0 <x>",
+        lot=None,
+        status="released",
+        why=(),
+        checks=(),
+        constants={"r_phase_ohm": replace(twice, value=2.0)},
+    )
+    html = render_fleet([other, datasheet], FINDINGS)
+    page = Page(html)
+    rows = {squeezed(row[0]): [squeezed(c) for c in row] for row in page.rows if len(row) > 8}
+    assert set(rows) == {"Motor", "joint-P0", "p0 <x>"}
+    place = next(i for i, c in enumerate(rows["Motor"]) if c.startswith("Rphase"))
+    assert rows["Motor"][place] in {"Rphase [Ω]", "Rphase [mΩ]"}
+    unit = 1e-3 if "mΩ" in rows["Motor"][place] else 1.0
+    for motor_id, ohms in (("joint-P0", 0.31004), ("p0 <x>", 2.0)):
+        assert float(rows[motor_id][place].split(" ± ")[0]) * unit == pytest.approx(ohms, abs=5e-4)
+    links = {attrs["href"] for tag, attrs in page.tags if tag == "a" and "html" in attrs["href"]}
+    assert links == {"joint-P0.html", f"{file_stem('p0 <x>')}.html"}
+    assert "kt vs ke" in rows["joint-P0"][4]
+    assert "the file ends early" in page.text
+    assert "record it again" in page.text
+
+
+def test_an_empty_fleet_says_why() -> None:
+    text = squeezed(Page(render_fleet([], FINDINGS)).text)
+    assert "No datasheet came out" in text
+    assert "the file ends early" in text
+
+
+def test_strips_need_two_motors_that_differ(datasheet: Datasheet) -> None:
+    def strips(*sheets: Datasheet) -> int:
+        return render_fleet(sheets, ()).count('class="strip"')
+
+    other = replace(datasheet, motor_id="joint-P1", lot="B")
+    ohms = replace(datasheet.constants["r_phase_ohm"], value=0.33)
+    worse = replace(other, constants={**datasheet.constants, "r_phase_ohm": ohms})
+    assert strips(datasheet) == 0
+    assert strips(datasheet, other) == 0
+    assert strips(datasheet, worse) == 1
+    assert strips(datasheet, replace(worse, motor_type="another")) == 0
+
+
+def test_a_motor_called_index_does_not_take_the_first_page() -> None:
+    assert page_of("index") != "index.html"
+    assert page_of("INDEX").lower() not in {"index.html", page_of("index")}
+
+
+def test_conditions_are_short() -> None:
+    at = {
+        "temp_winding_degc": 25.0,
+        "omega_low_rad_s": 40,
+        "omega_high_rad_s": 240.5,
+        "iq_a": -0.016,
+        "winding": "delta",
+        "current_high_a": 2.0,
+    }
+    assert conditions(at) == (
+        "current high 2 A, iq −16 mA, speed 40 to 240.5 rad/s, winding 25 °C, winding delta"
+    )
+    assert conditions({}) == ""
+
+
+def test_groups_know_every_published_constant() -> None:
+    from pipeline.physics.glossary import CONSTANTS
+
+    assert {name for names in GROUPS.values() for name in names} == set(CONSTANTS)
+    assert set(KEY_CONSTANTS) <= set(CONSTANTS)
+    assert grouped(["zeta", "ld_h", "alpha"]) == [
+        ("Electrical", ["ld_h"]),
+        ("Further constants", ["alpha", "zeta"]),
+    ]
+
+
+def test_a_page_of_fourteen_charts_is_quick(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    render_motor(datasheet, evidence, ())
+    start = time.process_time()
+    render_motor(datasheet, evidence * 2, ())
+    assert time.process_time() - start < 0.5
