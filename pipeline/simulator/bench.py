@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.simulator import driven, standing, turning
 from pipeline.simulator.design import Bench, Motor, Recording
@@ -16,6 +17,8 @@ from pipeline.simulator.sensors import Session
 from pipeline.simulator.truth import truth
 
 __all__ = ["CAMPAIGN", "campaign", "record", "truth"]
+
+Table = dict[str, NDArray[np.float64]]
 
 _TESTS: Mapping[str, Callable[[Session, Any], Recording]] = {
     "resistance": standing.resistance,
@@ -85,7 +88,24 @@ def record(
         raise ValueError(f"no test {test}; there are {', '.join(_TESTS)}")
     how = PROTOCOLS[test](**protocol)
     session = Session(motor, plant_of(motor), bench, bench.drawn(rng), rng)
-    return _TESTS[test](session, how)
+    recording = _TESTS[test](session, how)
+    if bench.temperature_hz is None:
+        return recording
+    return replace(recording, tables=_parted(recording.tables[0], bench.temperature_hz))
+
+
+def _parted(table: Table, rate_hz: float) -> tuple[Table, ...]:
+    """Thermometers on a slower clock of their own, first and last instant kept."""
+    slow = [name for name in table if name.startswith("temp_")]
+    if "t_s" not in table or not slow or len(slow) + 1 == len(table):
+        return (table,)
+    t_s = table["t_s"]
+    stride = round(1.0 / (rate_hz * float(t_s[1] - t_s[0])))
+    if stride < 2:
+        return (table,)
+    rows = np.unique(np.append(np.arange(0, t_s.size, stride), t_s.size - 1))
+    fast = {name: column for name, column in table.items() if name not in slow}
+    return fast, {name: table[name][rows] for name in ("t_s", *slow)}
 
 
 def campaign(

@@ -144,7 +144,8 @@ class Bench:
     torque, rated speed), so that one bench suits any size. `instruments` None draws the gains
     from the stated uncertainties; `EXACT` is a perfect station. `drift_rel`, `hum_rel` are the
     size of a random walk at the end of a capture and of a mains pick-up, in units of the
-    channel's noise. `jitter_s` scatters the time stamps only.
+    channel's noise. `jitter_s` scatters the time stamps only. `temperature_hz` puts thermometers
+    of fast captures on a clock of their own.
     """
 
     station: str = "sim-1"
@@ -172,6 +173,7 @@ class Bench:
     hum_rel: float = 0.0
     hum_hz: float = 50.0
     jitter_s: float = 0.0
+    temperature_hz: float | None = None
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:

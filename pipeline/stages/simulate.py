@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +36,9 @@ FORMATS: Mapping[str, Format] = {
     "cdr": Format("cdr", compression="none"),
     "cdr_samples": Format("cdr", block_rows=None),
 }
-MIXED_SMALL = ("csv", "json_samples", "protobuf_samples", "cdr_samples", "json", "cdr")
-LARGE_ROWS = 1900
-CDR_ZSTD = Format("cdr")
+SMALL = ("csv", "json_samples", "protobuf_samples", "cdr_samples", "json", "cdr")
+LARGE = (Format("protobuf"), Format("cdr"))
+LARGE_ROWS = 3000
 
 
 def main(settings: SimulateSettings) -> Outcome:
@@ -86,7 +87,8 @@ def _fleet(settings: SimulateSettings) -> Iterable[Job]:
     words = _document("fleet", str(settings.fleet))
     document = _document("motor", str(words.get("motor")))
     fleet = fleet_from(words, document)
-    bench = replace(bench_from(document.get("bench") or {}), station=fleet.station)
+    settled = {**(document.get("bench") or {}), **(words.get("bench") or {})}
+    bench = replace(bench_from(settled), station=fleet.station)
     drawn = EXACT if settings.exact else bench.drawn(np.random.default_rng(fleet.seed))
     for motor in fleet.motors:
         there = replace(bench, instruments=drawn, started_at=fleet.started_at[motor.motor_id])
@@ -105,19 +107,22 @@ def _document(kind: str, name: str) -> dict[str, Any]:
 
 
 def _write(folder: Path, recordings: Iterable[Recording], encoding: str) -> int:
-    """`mixed` goes through the encodings in turn; long captures stay in compact ones."""
+    """`mixed` goes through the encodings in turn; long captures stay in compact ones.
+
+    Tables without a clock are CSV always, captures of several clocks MCAP always.
+    """
+    large, small = cycle(LARGE), cycle(SMALL)
     count = 0
     for recording in recordings:
         table = recording.tables[0]
-        rows = next(iter(table.values())).size
         if "t_s" not in table:
             form = FORMATS["csv"]
-        elif encoding != "mixed":
+        elif encoding != "mixed" and (encoding != "csv" or len(recording.tables) == 1):
             form = FORMATS[encoding]
-        elif rows > LARGE_ROWS:
-            form = (FORMATS["protobuf"], CDR_ZSTD)[count % 2]
+        elif table["t_s"].size > LARGE_ROWS or len(recording.tables) > 1:
+            form = next(large)
         else:
-            form = FORMATS[MIXED_SMALL[count % len(MIXED_SMALL)]]
+            form = FORMATS[next(small)]
         write_capture(folder, recording.stem, recording.meta, recording.tables, form)
         count += 1
     return count
