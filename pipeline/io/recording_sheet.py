@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from pipeline.physics.notation import reading
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 
@@ -30,18 +31,16 @@ def sheet_markdown(datasheet: Datasheet, path: str) -> str:
 
 
 def _table(datasheet: Datasheet, names: list[str]) -> list[str]:
-    head = ["| constant | value | U (k = 2) | unit | method |", "| --- | --: | --: | --- | --- |"]
+    head = ["| constant | value ± U (k = 2) | method |", "| --- | --- | --- |"]
     return head + [_line(datasheet.constants[name]) for name in names]
 
 
 def _line(estimate: Estimate) -> str:
-    method = _plain(estimate.method)
-    if estimate.value is None:
-        return f"| {_plain(estimate.name)} | not identifiable | | {estimate.unit} | {method} |"
-    spread = f"{2.0 * estimate.u:.2g}" if estimate.u > 0.0 else ""
-    flag = " (at its bound)" if estimate.at_bound else ""
-    value = f"{estimate.value:.6g}{flag}"
-    return f"| {_plain(estimate.name)} | {value} | {spread} | {estimate.unit} | {method} |"
+    text = "not identifiable"
+    if estimate.known:
+        text = reading(estimate.number, estimate.u, estimate.unit).text()
+        text += " (at its bound)" if estimate.at_bound else ""
+    return f"| {_plain(estimate.name)} | {text} | {_plain(estimate.method)} |"
 
 
 def _plain(text: str) -> str:

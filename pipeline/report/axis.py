@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.physics.glossary import suffix_of
+from pipeline.physics.notation import MINUS, Scale, scale_for
 from pipeline.physics.units import SUFFIX_UNITS
-from pipeline.report.numbers import MINUS, Scale, scale_for
 
 Array = NDArray[np.float64]
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)

@@ -13,9 +13,9 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.axis import Axis, axis_for, padded, symmetric_axis, unit_of
-from pipeline.report.numbers import quantity
 from pipeline.report.residual import ResidualScale, residual_of, residual_scale
 from pipeline.report.thinning import cloud_points, line_points
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from statistics import median
 from urllib.parse import quote
 
+from pipeline.physics.notation import Reading, Scale, reading, scale_for
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-from pipeline.report.numbers import Reading, Scale, reading, scale_for
 from pipeline.report.page import render
 from pipeline.report.strip import Dot, strip_plot
 from pipeline.report.words import KEY_CONSTANTS, constant_words, symbol

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pipeline.physics.notation import MINUS, Reading, plain, quantity, reading, significant
 from pipeline.records.datasheet import Check, Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -14,7 +15,6 @@ from pipeline.records.finding import Finding
 from pipeline.records.uncertainty import covariance
 from pipeline.report.chart import chart
 from pipeline.report.conditions import conditions
-from pipeline.report.numbers import MINUS, Reading, plain, quantity, reading, significant
 from pipeline.report.page import render
 from pipeline.report.words import GROUPS, KEY_CONSTANTS, constant_words, grouped, symbol
 

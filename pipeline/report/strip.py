@@ -10,8 +10,8 @@ from statistics import median
 
 import numpy as np
 
+from pipeline.physics.notation import COVERAGE_FACTOR, reading
 from pipeline.report.axis import Axis, axis_for, padded
-from pipeline.report.numbers import COVERAGE_FACTOR, reading
 
 WIDTH, LEFT, RIGHT, ROW, TOP, BOTTOM = 340.0, 76.0, 14.0, 24.0, 6.0, 24.0
 LABEL_CHARS = 10

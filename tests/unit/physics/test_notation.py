@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.report.numbers import MINUS, plain, quantity, reading, scale_for, significant
+from pipeline.physics.notation import MINUS, plain, quantity, reading, scale_for, significant
 
 PREFIX = {"p": -12, "n": -9, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6}
 
