@@ -94,9 +94,10 @@ def read_csv(
     check_text(data)
     metadata, begin = split_comments(data) if dialect.comment_lines else ({}, 0)
     stated = metadata.get("sha256_rows")
-    _check_last_line(data, dialect, stated)
     body = data[begin:].replace(b"\r\n", b"\n")
     head, rows = _split_head(body, dialect)
+    if stated is None and dialect.whole_last_line:
+        _check_last_line(body, rows)
     names, units = _header(head, dialect)
     rows = _even_out(rows, dialect)
     names = _check_shape(rows, names, dialect)
@@ -116,14 +117,14 @@ def read_csv(
     )
 
 
-def _check_last_line(data: bytes, dialect: CsvDialect, stated: str | None) -> None:
-    if stated is None and dialect.whole_last_line and data and not data.endswith(b"\n"):
-        last = max(data.count(b"\n") - 1, 0)
+def _check_last_line(body: bytes, rows: bytes) -> None:
+    if not body.endswith(b"\n"):
+        last = rows.count(b"\n")
         raise _refuse(
             "truncated",
             "the last line does not end in a line break, so its last number may be cut",
             "copy the file again; if it is whole, end it with a line break",
-            (last, last),
+            (last, last) if rows else None,
         )
 
 

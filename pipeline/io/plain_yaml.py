@@ -14,7 +14,10 @@ from pipeline.records.errors import CaptureError
 
 _MAX_BYTES = 2**17
 _MAX_DEPTH = 12
-_PLAIN_TAGS = ("tag:yaml.org,2002:",)
+_PLAIN_TAGS = frozenset(
+    f"tag:yaml.org,2002:{kind}"
+    for kind in ("str", "int", "float", "bool", "null", "timestamp", "seq", "map")
+)
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 Plain = Any
 """str, list of Plain, or dict from str to Plain."""
@@ -60,7 +63,7 @@ def _check_events(text: str, what: str) -> None:
 
 
 def _plain(node: Any, what: str) -> Plain:
-    if not node.tag.startswith(_PLAIN_TAGS) or node.tag.endswith((":binary", ":merge")):
+    if node.tag not in _PLAIN_TAGS:
         raise _bad(what, f"uses the tag {node.tag}")
     if isinstance(node, yaml.ScalarNode):
         return "" if node.tag.endswith(":null") else node.value

@@ -69,7 +69,7 @@ def _numbers(line: str, separator: str) -> int:
 
 def _is_header(line: str, separator: str, width: int) -> bool:
     cells = _cells(line, separator)
-    return len(cells) >= min(width, 2) and not any(_NUMBER.match(cell) for cell in cells[:1])
+    return len(cells) >= width and not any(_NUMBER.match(cell) for cell in cells[:1])
 
 
 def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:

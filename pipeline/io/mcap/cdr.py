@@ -76,13 +76,16 @@ class _Pass:
         self.origin = batch.start + _ENCAPSULATION
         self.size = batch.length - _ENCAPSULATION
         self.at: Any = 0
-        self.scalars: dict[str, NDArray[Any]] = {}
+        self.whole: dict[str, Leaf] = {}
         self.arrays: dict[str, list[tuple[Integers, NDArray[Any]]]] = {}
 
     def collected(self) -> dict[str, Leaf]:
         """The leaves, pieces of arrays put in message order."""
-        found = {name: Leaf(values) for name, values in self.scalars.items()}
+        found = dict(self.whole)
         for name, pieces in self.arrays.items():
+            if not pieces:
+                found[name] = Leaf(np.empty(0), np.zeros(self.origin.size, np.int64))
+                continue
             owner = np.concatenate([piece[0] for piece in pieces])
             values = np.concatenate([piece[1] for piece in pieces])
             if np.any(owner[1:] < owner[:-1]):
@@ -122,7 +125,7 @@ class _Pass:
 
     def keep(self, name: str, values: NDArray[Any], rows: Integers | None) -> None:
         if rows is None:
-            self.scalars[name] = values
+            self.whole[name] = Leaf(values)
         else:
             self.arrays.setdefault(name, []).append((rows, values))
 
@@ -151,7 +154,7 @@ class _Pass:
             )
         else:
             values = view_at_every_byte(self.raw, dtype)[spread(start, count, width)]
-        self.arrays.setdefault(prefix + part.name, []).append((np.repeat(whose, count), values))
+        self.whole[prefix + part.name] = Leaf(values, count)
 
     def elements(self, part: Field, prefix: str, rows: Integers | None) -> None:
         """An array of messages or strings, element by element over all messages at once."""
@@ -163,7 +166,7 @@ class _Pass:
             raise _bad("has an array that is longer than the message")
         self.at = np.broadcast_to(self.at, self.origin.shape).copy()
         element = Field(part.name, part.dtype, part.parts, None)
-        for name in part.names(prefix) if self.wanted(prefix + part.name) else ():
+        for name in filter(self.wanted, part.names(prefix)):
             self.arrays.setdefault(name, [])
         for number in range(int(count.max(initial=0))):
             self.single(element, prefix, whose[count > number])

@@ -52,7 +52,7 @@ class JsonDecoder:
 
 def _object(payload: bytes, row: int) -> dict[str, Any]:
     try:
-        found = json.loads(payload, object_pairs_hook=_unique)
+        found = json.loads(payload.decode("utf-8"), object_pairs_hook=_unique)
     except RecursionError:
         raise _bad("nests too deep", row) from None
     except ValueError as fault:

@@ -22,6 +22,7 @@ from pipeline.io.mcap.protobuf_plan import (
     Message,
     Scalar,
 )
+from pipeline.io.mcap.protobuf_rows import shaped_rows
 from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
 from pipeline.records.errors import CaptureError
 
@@ -96,7 +97,7 @@ class _Pass:
             for number, part in plan.fields.items()
             if any(map(self.wanted, _names(part, prefix)))
         }
-        events = self.events(fields, start, end, owner)
+        events = self.occurrences(plan, fields, start, end, owner)
         present = np.zeros(rows, bool)
         present[owner] = True
         for number, part in fields.items():
@@ -111,6 +112,25 @@ class _Pass:
                 self.found[prefix + part.name] = self.repeated(part, seen, rows)
             else:
                 raise _bad(f"has the array {prefix + part.name!r} inside an array")
+
+    def occurrences(
+        self,
+        plan: Message,
+        fields: dict[int, Scalar | Message],
+        start: Integers,
+        end: Integers,
+        owner: Integers,
+    ) -> dict[int, _Events]:
+        """Occurrences of `fields`: messages of the common shapes at once, the rest by cursor."""
+        if np.any(np.diff(owner) <= 0):
+            return self.events(fields, start, end, owner)
+        places, left = shaped_rows(self.raw, plan, start, end - start)
+        events = self.events(fields, start[left], end[left], owner[left])
+        for number, part in fields.items():
+            for rows, at in places.get(number, ()):
+                if isinstance(part, Scalar):
+                    events[number].add(owner[rows], at, at, part.wire)
+        return events
 
     def nested(
         self,
@@ -257,6 +277,10 @@ class _Pass:
 
     def repeated(self, part: Scalar, seen: _Events, rows: int) -> Leaf:
         """Values of an array field, packed or not, in message order."""
+        if len(seen.owner) == 1 and seen.wire[0] == LENGTH and np.all(np.diff(seen.owner[0]) > 0):
+            counts = np.zeros(rows, np.int64)
+            counts[seen.owner[0]], values = self.packed(part, seen.start[0], seen.extent[0])
+            return Leaf(values, counts)
         owners: list[Integers] = []
         pieces: list[NDArray[Any]] = []
         for owner, start, extent, wire in zip(

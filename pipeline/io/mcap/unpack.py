@@ -42,7 +42,8 @@ def _unzstd(packed: memoryview, chunk: Chunk) -> bytes:
 
     try:
         frame = zstandard.get_frame_parameters(packed)
-        if frame.content_size == chunk.size and frame.window_size <= _ZSTD_MAX_WINDOW_BYTES:
+        known = chunk.size and frame.content_size == chunk.size
+        if known and frame.window_size <= _ZSTD_MAX_WINDOW_BYTES:
             plain: bytes = zstandard.ZstdDecompressor().decompress(packed, allow_extra_data=False)
             return plain
         reader = zstandard.ZstdDecompressor(max_window_size=_ZSTD_MAX_WINDOW_BYTES).stream_reader(

@@ -1,0 +1,100 @@
+"""`inspect` on a stranger's files: what is in them, and a source map that works once finished."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.io.ingest import read_capture, survey
+from pipeline.io.inspect_file import describe
+from pipeline.io.source_map import parse_source_map
+from pipeline.stages.inspect_file import render
+from tests.unit.io.recordings import META, json_messages, mcap_file, small_capture
+
+STRANGER = (
+    "Bench 7;recorded by K;;;\n"
+    "Time (ms);Speed [RPM];i_q;phase_current_a;state\n"
+    "0,0;100,5;1,5;2;ok\n"
+    "1,0;101;1,5;2,5;ok\n"
+    "2,0;102;1,5;2,5;ok\n"
+)
+
+
+def test_a_strange_table_is_understood_and_its_starter_map_reads_it(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(STRANGER)
+    report = describe(path, {})
+    assert report.form == "text"
+    (stream,) = report.streams
+    guesses = {seen.name: seen.guess for seen in stream.fields}
+    assert {n: (g.column, g.unit) for n, g in guesses.items() if g} == {
+        "Time (ms)": ("t_s", "ms"),
+        "Speed [RPM]": ("omega_mech_rad_s", "rpm"),
+        "i_q": ("iq_a", None),
+        "phase_current_a": ("ia_a", None),
+    }
+    text = render(report)
+    assert "spin_down: enough" in text
+    assert "holding_current: needs theta_mech_rad" in text
+    finished = report.starter.replace("# motor_id: the serial number", "motor_id: m1")
+    finished = finished.replace("# test: one of the contract's", "test: spin_down")
+    source = parse_source_map(finished.encode(), "bench")
+    found = survey(tmp_path, {"bench": source})
+    (table,) = read_capture(tmp_path, found.entries[0]).tables
+    np.testing.assert_allclose(table["t_s"], [0, 1e-3, 2e-3])
+    np.testing.assert_allclose(table["omega_mech_rad_s"], np.array([100.5, 101, 102]) * np.pi / 30)
+    assert table["ia_a"].to_list() == [2, 2.5, 2.5]
+
+
+def test_a_table_without_header_gets_numbered_names(tmp_path: Path) -> None:
+    path = tmp_path / "x.txt"
+    path.write_text("0.0\t1.5\n0.1\t1.6\n")
+    report = describe(path, {})
+    assert [seen.name for seen in report.streams[0].fields] == ["column_1", "column_2"]
+    parse_source_map(report.starter.encode(), "bench")
+
+
+def test_a_strange_mcap_gets_topics_fields_and_a_map_to_start_from(tmp_path: Path) -> None:
+    rows = json_messages([{"motor": {"Iq": n, "RPM": 60.0 * n, "odd": 1}} for n in range(5)])
+    path = tmp_path / "x.mcap"
+    path.write_bytes(mcap_file(rows, metadata={"bench": "7"}))
+    report = describe(path, {})
+    assert report.streams[0].rate_hz == pytest.approx(1000)
+    text = report.starter.replace("# motor_id: the serial number", "motor_id: m1")
+    source = parse_source_map(
+        text.replace("# test: one of the contract's", "test: drive").encode(), "b"
+    )
+    found = survey(tmp_path, {"b": source})
+    (table,) = read_capture(tmp_path, found.entries[0]).tables
+    np.testing.assert_allclose(table["omega_mech_rad_s"], 2 * np.pi * np.arange(5.0))
+    np.testing.assert_allclose(table["t_s"], np.arange(5) * 1e-3)
+
+
+def test_a_capture_of_the_contract_needs_no_map(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(small_capture())
+    report = describe(path, {})
+    assert dict(report.metadata) == META
+    assert report.starter == ""
+    assert "no source map is needed" in render(report)
+    assert report.columns == {"t_s", "iq_a", "theta_mech_rad"}
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"\x89MCAP0\r\n1234", "fault:"),
+        (small_capture()[:700], "fault:"),
+        (bytes(range(256)) * 4, "binary"),
+        (b"", "no table of numbers"),
+        (b"just some words\nand more\n", "no table of numbers"),
+        (b"{\n}", "no table of numbers"),
+        (b'a,b\n1,"2\n', "x"),
+    ],
+)
+def test_any_bytes_are_described_and_never_fail(tmp_path: Path, content: bytes, says: str) -> None:
+    path = tmp_path / "x"
+    path.write_bytes(content)
+    assert says in render(describe(path, {}))

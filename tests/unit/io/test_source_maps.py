@@ -1,0 +1,299 @@
+"""The shipped source maps on files in the dialects as they really look, and what a map may say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline.io.ingest import read_capture, survey
+from pipeline.io.source_map import load_source_maps, parse_source_map
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError, UsageError
+from tests.unit.io.recordings import SHARED
+
+CONF = Path(pipeline.__file__).parents[1] / "conf" / "source"
+SAID = "motor_id: 000123\ntest: drive\npole_pairs: 7\n"
+RPM = 2 * np.pi / 60
+
+RIGOL = "X,CH1,CH2,Start,Increment,\nSequence,Volt,{unit},-2.000000e-03,5.000000e-06,\n"
+RIGOL += "0,1.20e+00,1.00e-01,\n1,1.40e+00,2.00e-01,\n2,1.60e+00,3.00e-01,\n"
+RIGOL_SHORT = "CH1,Start,Increment,\nVolt,-1.0e-03,1.0e-06\n1.20e+00,,\n1.40e+00,,\n1.60e+00,,\n"
+RIGOL_TIME = "Time,X(CH1),X(CH2),\nSecond,Volt,Ampere,\n-0.002,1.2,0.1,\n-0.001,1.4,0.2,\n"
+SIGLENT = """Record Length,Analog:3,
+Sample Interval,Analog:1.000000E-03,
+Vertical Units,CH1:V,CH2:A,,
+Vertical Scale,CH1:5.0E-01,CH2:1.0E-01,,
+Vertical Offset,CH1:0.0E+00,CH2:0.0E+00,,
+Horizontal Units,s,
+Horizontal Scale,1.00E-03,
+Model Number,SDS2104X,
+Serial Number,SDS00001,
+Software Version,1.3.7R5,
+Source,CH1,CH2
+Second,Volt,Amp
+ -0.001, 1.2, 0.1
+  0.000, 1.4, 0.2
+  0.001, 1.6, 0.3
+"""
+SIGLENT_SHORT = """Record Length,Analog:3
+Sample Rate,1000.0
+Vertical Scale,CH1: 0.05
+Vertical Offset,CH1:0.00000
+Horizontal Scale, 0.000010000
+Second,Volt
+-0.00100000000, 1.20000
+ 0.00000000000, 1.40000
+ 0.00100000000, 1.60000
+"""
+MDO = """Model,MDO3014
+Firmware Version,1.20
+
+Waveform Type,ANALOG,,
+Point Format,Y,,
+Horizontal Units,s,,
+Sample Interval,1e-03,,
+Record Length,3,,
+Probe Attenuation,10,,
+Vertical Units,V,A,
+,,,
+Label,,,
+TIME,CH1,CH2
+-1.0000e-03,1.2,0.1
+0.0000e+00,1.4,0.2
+1.0000e-03,1.6,0.3
+"""
+TDS = """Record Length,3.000000e+00,,-0.001000000000,1.20000,
+Sample Interval,1.000000e-03,,0.000000000000,1.40000,
+Trigger Point,1.000000e+00,,0.001000000000,1.60000,
+"""
+PICO = "Time,Channel A,Channel B\n(ms),(mV),(mA)\n\n-1.0,1200,100\n0.0,1400,200\n1.0,1600,300\n"
+VESC = "ms_today;input_voltage;temp_motor;current_in;d_axis_current;q_axis_current;erpm;fault_code;"
+VESC += """
+86399980;48.5;31.5;1.5;-0.25;10;7000;FAULT_CODE_NONE;
+0;48.4;31.6;1.6;0;11;7070;FAULT_CODE_NONE;
+20;48.3;31.7;1.7;0.25;12;7140;FAULT_CODE_NONE;
+"""
+MOTEUS = "time,MODE,POSITION,VELOCITY,TORQUE,Q_CURRENT,D_CURRENT,VOLTAGE,TEMPERATURE,FAULT\n"
+MOTEUS += "0.01,10,0.25,-2.0,0.1,1.5,0.0,24.5,30.0,0\n0.03,10,0.5,2.0,0.1,1.25,0.5,24.0,31.0,0\n"
+MOTEUS += "0.04,10,0.75,2.0,0.1,1.0,0.5,24.0,31.0,0\n"
+KEYSIGHT = "x-axis,1,2\nsecond,Volt,Ampere\n"
+
+
+def one(folder: Path, text: str, name: str = "scope.csv", said: str = SAID) -> Capture:
+    """The capture that the shipped maps make of one file with its sidecar."""
+    (folder / name).write_bytes(text.encode())
+    (folder / f"{Path(name).stem}.meta.yaml").write_text(said)
+    found = survey(folder, load_source_maps(CONF))
+    assert found.findings == ()
+    (entry,) = found.entries
+    return read_capture(folder, entry)
+
+
+MILLISECONDS = [-1e-3, 0.0, 1e-3]
+VOLTS, AMPERES = [1.2, 1.4, 1.6], [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            RIGOL.format(unit="Amp"),
+            {"t_s": [-2e-3, -1.995e-3, -1.99e-3], "vab_v": VOLTS, "ia_a": AMPERES},
+        ),
+        (RIGOL_SHORT, {"t_s": [-1e-3, -0.999e-3, -0.998e-3], "vab_v": VOLTS}),
+        (RIGOL_TIME, {"t_s": [-2e-3, -1e-3], "vab_v": VOLTS[:2], "ia_a": AMPERES[:2]}),
+        (SIGLENT, {"t_s": MILLISECONDS, "vab_v": VOLTS, "ia_a": AMPERES}),
+        (SIGLENT_SHORT, {"t_s": MILLISECONDS, "vab_v": VOLTS}),
+        (MDO, {"t_s": MILLISECONDS, "vab_v": VOLTS, "ia_a": AMPERES}),
+        (MDO.replace("\n", "\r\n"), {"t_s": MILLISECONDS, "vab_v": VOLTS, "ia_a": AMPERES}),
+        (TDS, {"t_s": MILLISECONDS, "vab_v": VOLTS}),
+        (PICO, {"t_s": MILLISECONDS, "vab_v": VOLTS, "ia_a": AMPERES}),
+        (
+            VESC,
+            {
+                "t_s": [86399.98, 86400.0, 86400.02],
+                "vdc_v": [48.5, 48.4, 48.3],
+                "temp_winding_degc": [31.5, 31.6, 31.7],
+                "idc_a": [1.5, 1.6, 1.7],
+                "id_a": [-0.25, 0.0, 0.25],
+                "iq_a": [10.0, 11.0, 12.0],
+                "omega_mech_rad_s": [1000 * RPM, 1010 * RPM, 1020 * RPM],
+            },
+        ),
+        (
+            MOTEUS,
+            {
+                "t_s": [0.01, 0.03, 0.04],
+                "theta_mech_rad": [np.pi / 2, np.pi, 1.5 * np.pi],
+                "omega_mech_rad_s": [-4 * np.pi, 4 * np.pi, 4 * np.pi],
+                "iq_a": [1.5, 1.25, 1.0],
+                "id_a": [0.0, 0.5, 0.5],
+                "vdc_v": [24.5, 24.0, 24.0],
+            },
+        ),
+    ],
+    ids=[
+        "rigol",
+        "rigol-short",
+        "rigol-time",
+        "siglent",
+        "siglent-short",
+        "mdo",
+        "mdo-crlf",
+        "tds",
+        "pico",
+        "vesc",
+        "moteus",
+    ],
+)
+def test_real_dialects_become_the_contracts_columns(
+    tmp_path: Path, text: str, expected: dict[str, list[float]]
+) -> None:
+    capture = one(tmp_path, text)
+    assert capture.meta.motor_id == "000123"
+    assert capture.integrity == "unverified"
+    (table,) = capture.tables
+    assert set(table.columns) == set(expected)
+    assert table.columns[0] == "t_s"
+    for name, values in expected.items():
+        np.testing.assert_allclose(table[name].to_numpy(), values, rtol=1e-12, err_msg=name)
+
+
+def test_keysight_times_of_three_digits_are_put_back_on_their_line(tmp_path: Path) -> None:
+    """1,000 samples of 0.4 us from -2 ms print as repeating times; the grid comes back."""
+    true = -2e-3 + 4e-7 * np.arange(8000)
+    rows = "".join(f"{t:.2E},{n % 7},0.5\n" for n, t in enumerate(true))
+    printed = np.array([float(f"{t:.2E}") for t in true])
+    assert np.count_nonzero(np.diff(printed) == 0) > 1000
+    time = one(tmp_path, KEYSIGHT + rows).tables[0]["t_s"].to_numpy()
+    assert np.diff(time).min() > 0
+    np.testing.assert_allclose(np.diff(time), 4e-7, rtol=2e-3)
+    assert np.abs(time - true).max() < 4e-6
+
+
+def test_keysight_times_with_a_gap_are_refused(tmp_path: Path) -> None:
+    true = np.concatenate([np.arange(500) * 1e-6, 2e-3 + np.arange(500) * 1e-6])
+    rows = "".join(f"{t:.2E},1,0.5\n" for t in true)
+    with pytest.raises(CaptureError) as refused:
+        one(tmp_path, KEYSIGHT + rows)
+    assert refused.value.code == "uneven_time"
+
+
+def test_a_current_shown_in_volts_is_refused_with_what_to_write(tmp_path: Path) -> None:
+    with pytest.raises(CaptureError) as refused:
+        one(tmp_path, RIGOL.format(unit="Volt"))
+    assert refused.value.code == "unknown_unit"
+
+
+def test_a_scope_file_that_nobody_described_asks_for_motor_and_test(tmp_path: Path) -> None:
+    with pytest.raises(CaptureError) as refused:
+        one(tmp_path, MDO, said="test: drive\n")
+    assert (refused.value.code, "motor_id" in refused.value.message) == ("missing_metadata", True)
+
+
+def test_electrical_speed_without_pole_pairs_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CaptureError) as refused:
+        one(tmp_path, VESC, said="motor_id: m\n")
+    assert (refused.value.code, "pole_pairs" in refused.value.message) == ("missing_metadata", True)
+
+
+def test_both_laas_recordings_are_read() -> None:
+    folder = SHARED / "real" / "laas_solo"
+    if not folder.is_dir():
+        pytest.skip(f"the recording is not there: {folder}")
+    found = survey(folder, load_source_maps(CONF))
+    assert found.others == ("LICENSE",)
+    drive, hold = (read_capture(folder, entry) for entry in found.entries)
+    assert (drive.meta.test, hold.meta.test) == ("drive", "holding_current")
+    assert (drive.meta.pole_pairs, drive.meta.slots) == (12, 18)
+    assert drive.meta.voltage_kind == "commanded"
+    assert drive.tables[0].columns == ["t_s", "theta_mech_rad", "omega_mech_rad_s", "iq_a", "vq_v"]
+    truth = np.loadtxt(folder / "acc_current.txt", delimiter=",", skiprows=1)
+    for n, name in enumerate(drive.tables[0].columns):
+        np.testing.assert_array_equal(drive.tables[0][name].to_numpy(), truth[:, n])
+    assert hold.tables[0].height == 31_666
+    # positive current drives positive rotation: acceleration follows iq
+    arrays = drive.arrays("t_s", "omega_mech_rad_s", "iq_a")
+    slope = np.gradient(arrays["omega_mech_rad_s"], arrays["t_s"])
+    assert np.corrcoef(slope, arrays["iq_a"])[0, 1] > 0.9
+
+
+def test_every_shipped_map_maps_something_and_says_how_to_know_its_files() -> None:
+    maps = load_source_maps(CONF)
+    assert len(maps) >= 11
+    for source in maps.values():
+        assert source.fields and (source.header or source.files or source.topics)
+
+
+MINIMAL = "recognise: {files: ['*.csv']}\nfields: {I: ia_a}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("recognice: {}\n", "did you mean 'recognise'"),
+        ("fields: {I: {colunm: ia_a}}\n", "is no column of the contract"),
+        ("fields: {I: {column: ia_a, sing: -1}}\n", "did you mean 'sign'"),
+        ("fields: {I: iaa}\n", "did you mean ia_a"),
+        ("fields: {I: {column: ia_a, sign: 2}}\n", "neither 1 nor -1"),
+        ("fields: {I: {column: ia_a, scale: x}}\n", "is no number"),
+        ("fields: {I: {column: ia_a, scale: 0}}\n", "is zero"),
+        ("fields: [ia_a]\n", "is no map of keys"),
+        ("recognise: {header: '('}\n", "is no regular expression"),
+        ("layout: {separator: ',,'}\n", "is not one character"),
+        ("layout: {decimal: ','}\n", "is the separator too"),
+        ("layout: {skip_lines: -1}\n", "is no whole number"),
+        ("layout: {units_row: maybe}\n", "neither true nor false"),
+        ("time: {from: clock}\n", "is unknown"),
+        ("time: {increment_s: 0}\n", "is not above zero"),
+        ("a: &x 1\nb: *x\n", "uses an alias"),
+        ("a: !!python/object/apply:os.system [ls]\n", "uses the tag"),
+        ("a: " + "[" * 5000 + "\n", "nests deeper"),
+        ("a: 1\na: 2\n", "has the key 'a' twice"),
+        ("a: 'x\n", "is no YAML"),
+        ("---\na: 1\n---\nb: 2\n", "more than one document"),
+        ("# " + "x" * 200_000, "is larger than"),
+        ("\xff", "is not UTF-8"),
+        ("? [a]\n: 1\n", "key that is no text"),
+        ("<<: {a: 1}\n", "uses the tag"),
+    ],
+)
+def test_a_wrong_or_hostile_map_is_a_usage_error_that_names_the_place(text: str, says: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        parse_source_map(text.encode("latin-1"), "bench")
+    assert says in str(refused.value)
+    assert "bench" in str(refused.value)
+
+
+def test_signs_scales_and_offsets_apply_in_the_documented_order(tmp_path: Path) -> None:
+    """Column = sign * scale * (value in its unit, converted) + offset."""
+    text = (
+        "recognise: {files: ['*.csv']}\n"
+        "fields:\n"
+        "  t: {column: t_s, unit: ms}\n"
+        "  T: {column: temp_winding_degc, unit: K, offset: 1.5}\n"
+        "  M: {column: torque_shaft_nm, unit: Nmm, sign: -1, scale: 2}\n"
+        "metadata: {motor_id: 000123, test: spin_down}\n"
+    )
+    (tmp_path / "x.csv").write_text("t,T,M\n0,300,1000\n1,273.15,-500\n")
+    source = parse_source_map(text.encode(), "bench")
+    found = survey(tmp_path, {"bench": source})
+    capture = read_capture(tmp_path, found.entries[0])
+    assert capture.meta.motor_id == "000123"
+    (table,) = capture.tables
+    np.testing.assert_allclose(table["t_s"], [0, 1e-3], rtol=1e-15)
+    np.testing.assert_allclose(table["temp_winding_degc"], [28.35, 1.5], atol=1e-12)
+    np.testing.assert_allclose(table["torque_shaft_nm"], [-2.0, 1.0], rtol=1e-15)
+
+
+def test_an_unknown_unit_refuses_the_capture_and_not_the_run(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("I\n1\n")
+    text = "recognise: {files: [x.csv]}\nfields: {I: {column: ia_a, unit: furlong}}\n"
+    text += "metadata: {motor_id: m, test: drive}\n"
+    found = survey(tmp_path, {"bench": parse_source_map(text.encode(), "bench")})
+    with pytest.raises(CaptureError) as refused:
+        read_capture(tmp_path, found.entries[0])
+    assert refused.value.code == "unknown_unit"
