@@ -151,7 +151,12 @@ def _write(
 
         with watch.stage("recordings"):
             for capture in campaign.captures:
-                files.append(f"recordings/{stem}/{file_stem(capture.path)}.rrd")
+                files.append(f"recordings/{stem}/{_place(capture.path)}.rrd")
                 own = tuple(f for f in findings if f.file == capture.path)
                 write_recording(capture, evidence, output / files[-1], datasheet, own)
     return tuple(files)
+
+
+def _place(path: str) -> str:
+    """A capture's path with each part made safe as a file name."""
+    return "/".join(file_stem(part) for part in path.split("/"))
