@@ -57,12 +57,19 @@ def main(settings: SimulateSettings) -> Outcome:
     lines = []
     for folder, motor, bench, seed in jobs:
         with watch.stage("simulate"):
-            recordings, true = campaign(motor, bench, seed), truth(motor)
+            recordings, true = _simulated(motor, bench, seed)
         with watch.stage("write"):
             written = _write(output / folder, recordings, settings.encoding)
             write_whole(output / folder / TRUTH, canonical_json(true))
         lines.append(f"{motor.motor_id}: {written} captures in {output / folder}")
     return Outcome(text="\n".join(lines) + "\n", timings=watch.table())
+
+
+def _simulated(motor: Motor, bench: Bench, seed: int) -> tuple[list[Recording], dict[str, Any]]:
+    try:
+        return campaign(motor, bench, seed), truth(motor)
+    except ValueError as error:
+        raise UsageError(f"simulate: {motor.motor_id}: {error}", "choose another size") from error
 
 
 Job = tuple[str, Motor, Bench, int]
