@@ -11,7 +11,7 @@ from scipy.special import fdtrc
 
 from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.numerics.clusters import cluster_covariance
-from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
 
 Array = NDArray[np.float64]
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
 BUMPS = (0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.16)
 MOST_NUISANCES = 14
+MATERIAL = 0.02
+DIP = 0.05
 
 
 def _hat(index: int) -> Callable[[Array], Array]:
@@ -127,9 +129,12 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
     curve = np.column_stack(
         [driving_nm, *(-rows.columns[n] for n in CURVE), *(candidates[n] for n in plain)]
     )
-    free = _form_fails(rows, design, curve, y, level)
+    curve_names = ("torque", *CURVE, *plain)
+    free = _form_fails(rows, design, names, curve, curve_names, y, level) or _implausible(
+        rows, design, names, y, sigma
+    )
     if free:
-        design, names = curve, ("torque", *CURVE, *plain)
+        design, names = curve, curve_names
         sigma = _balanced(rows, design, y)
     found = linear_fit(design, y, sigma)
     covariance, dof = cluster_covariance(design, found.residuals, sigma, rows.cluster)
@@ -153,8 +158,20 @@ def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
     return sigma
 
 
-def _form_fails(rows: ShaftRows, design: Array, curve: Array, y: Array, level: float) -> bool:
-    """Whether a free drag curve explains the rows better than chance (F, correlation counted)."""
+def _form_fails(
+    rows: ShaftRows,
+    design: Array,
+    names: Sequence[str],
+    curve: Array,
+    curve_names: Sequence[str],
+    y: Array,
+    level: float,
+) -> bool:
+    """Whether a free drag curve explains the rows better, beyond chance and beyond `MATERIAL`.
+
+    Chance by F with correlation counted; what a free curve moves drag by must also be more than
+    `MATERIAL` of the drag itself (rms over the rows), as coast-downs see a millionth of it.
+    """
     sigma = _balanced(rows, curve, y)
     loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
     costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
@@ -162,7 +179,38 @@ def _form_fails(rows: ShaftRows, design: Array, curve: Array, y: Array, level: f
     free = max((y.size - curve.shape[1]) / tau, 1.0)
     extra = max(len(CURVE) - 2, 1)
     statistic = (costs[1] - costs[0]) / extra / tau / (costs[0] / (y.size - curve.shape[1]))
-    return bool(fdtrc(extra, free, max(statistic, 0.0)) < level)
+    if fdtrc(extra, free, max(statistic, 0.0)) >= level:
+        return False
+    curved = _drag_part(curve, loose, curve_names)
+    straight = _drag_part(design, strict, names)
+    return bool(np.std(curved - straight) > MATERIAL * np.sqrt(np.mean(curved**2)))
+
+
+def _implausible(
+    rows: ShaftRows, design: Array, names: Sequence[str], y: Array, sigma: Array
+) -> bool:
+    """Whether the fitted drag is no friction: negative Coulomb or viscous part, or a dip.
+
+    Stribeck's excess is above Coulomb friction, never below (by more than `DIP` of it).
+    """
+    found = linear_fit(design, y, sigma)
+    u = np.sqrt(np.diag(cluster_covariance(design, found.residuals, sigma, rows.cluster)[0]))
+    values = dict(zip(names, found.coefficients, strict=True))
+    if any(found.coefficients[k] < -4.0 * u[k] for k in (1, 2)):
+        return True
+    x = np.linspace(0.0, 1.0, 101)
+    excess = np.zeros(x.size)
+    for name, value in values.items():
+        if name in FORMS and name != "windage":
+            excess += value * DRAG_FORMS[name](np.maximum(x, 1e-9))
+    return bool(np.min(excess) < -DIP * abs(values["coulomb"]))
+
+
+def _drag_part(design: Array, found: LinearFit, names: Sequence[str]) -> Array:
+    """Drag [w] in torque that a fit gives each row: its drag columns over g."""
+    mine = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
+    part: Array = design[:, mine] @ found.coefficients[mine] / found.coefficients[0]
+    return part
 
 
 def _low_end(curve: Array, fastest: float) -> tuple[float, float]:

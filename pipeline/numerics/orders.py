@@ -3,7 +3,8 @@
 Every turn of every pass is a replicate. What repeats from turn to turn is signal, what differs is
 noise; the noise spectrum is averaged over neighbouring orders only, so coloured (autocorrelated)
 noise is judged at its own order. The test of each order is corrected for the number of orders
-looked at, and an order is kept only if it also predicts turns it was not fitted to.
+looked at, and an order is kept only if it also predicts turns it was not fitted to. Orders are
+taken off the data one by one, strongest first, so that none is a ghost of a stronger one.
 """
 
 from __future__ import annotations
@@ -14,11 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.harmonics import harmonic_design
+from pipeline.numerics.least_squares import linear_fit
+
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 TURN_RAD = 2.0 * np.pi
 NEIGHBOURS = 10
+DENSE = 64
+MOST_LINES = 40
+ALIKE = 0.3
 WHOLE_TURN = 0.98
 
 
@@ -108,43 +115,76 @@ def whole_turns(theta_rad: Array, value: Array) -> list[Turn]:
 
 
 def largest_order(turns: Sequence[Turn], ceiling: int) -> int:
-    """The highest order that the sampling of every turn resolves with eight positions a cycle."""
+    """The highest order that every turn samples with more than two positions a cycle."""
     counts = [np.unique(turn.theta_rad).size for turn in turns]
-    return int(min(ceiling, min(counts) // 8))
+    return int(max(0, min(ceiling, (min(counts, default=0) - 1) // 2)))
+
+
+def even_positions(turns: Sequence[Turn]) -> int | None:
+    """How many evenly spaced positions every turn was sampled at; None where they are uneven.
+
+    On n even positions the orders k, n - k, n + k, ... cannot be told apart.
+    """
+    counts = set()
+    for turn in turns:
+        angle = np.unique(np.mod(turn.theta_rad, TURN_RAD))
+        gaps = np.diff(np.append(angle, angle[0] + TURN_RAD))
+        step = float(np.median(gaps[gaps > 0.3 * float(np.max(gaps))]))
+        regular = np.abs(gaps - step) < 0.05 * step
+        if np.count_nonzero(regular) < 0.95 * TURN_RAD / step:
+            return None
+        counts.add(round(TURN_RAD / step))
+    return counts.pop() if len(counts) == 1 else None
 
 
 def spectrum(turns: Sequence[Turn], highest: int) -> Spectrum:
     """Fourier coefficients of each turn for orders 1..`highest`.
 
-    Samples are averaged in equal angle bins (at least four a cycle of the highest order; empty
-    ones are bridged linearly), each bin standing at its mean angle; averaging over a bin of width
-    w damps order k by sinc(k w / 2), which is undone.
+    c_k = 2/2pi sum_i w_i y_i exp(-j k theta_i) with the trapezoidal rule's weights w_i, by fast
+    transforms on a fine grid whose rounding of the angle is undone to third order. Samples far
+    denser than needed are averaged first, which keeps all weights alike.
     """
-    bins = int(2 ** np.ceil(np.log2(4 * max(highest, 4))))
     rows, means = [], []
     for turn in turns:
-        profile = _binned(turn, bins)
-        transform = np.fft.rfft(profile) / bins
-        rows.append(2.0 * transform[1 : highest + 1])
+        transform = _transform(*_points(turn, highest), highest)
+        rows.append(2.0 * transform[1:])
         means.append(float(transform[0].real))
-    orders = np.arange(1, highest + 1)
-    damping = np.sinc(orders / bins)
-    shift = np.exp(-1j * orders * np.pi / bins)
-    coefficients = np.array(rows) * (shift / damping)
+    orders = np.arange(1, highest + 1, dtype=np.int64)
     senses = np.array([turn.sense for turn in turns], dtype=np.int64)
-    return Spectrum(orders.astype(np.int64), coefficients, np.array(means), senses)
+    return Spectrum(orders, np.array(rows), np.array(means), senses)
 
 
-def _binned(turn: Turn, bins: int) -> Array:
-    position = np.mod(turn.theta_rad, TURN_RAD) * (bins / TURN_RAD)
-    index = np.minimum(position.astype(np.int64), bins - 1)
-    count = np.bincount(index, minlength=bins)
-    total = np.bincount(index, weights=turn.value, minlength=bins)
+def _points(turn: Turn, highest: int) -> tuple[Array, Array]:
+    """Distinct angles [m, rad] in one turn, ascending, and the mean value at each."""
+    angle = np.mod(turn.theta_rad, TURN_RAD)
+    if angle.size > DENSE * highest:
+        bins = 2 ** int(np.log2(angle.size / 8))
+        index = np.minimum((angle * (bins / TURN_RAD)).astype(np.int64), bins - 1)
+    else:
+        index = np.unique(angle, return_inverse=True)[1]
+    count = np.bincount(index)
     filled = np.flatnonzero(count)
-    grid = np.arange(bins, dtype=np.float64)
-    means = total[filled] / count[filled]
-    profile: Array = np.interp(grid, filled.astype(np.float64), means, period=float(bins))
-    return profile
+    where = np.bincount(index, weights=angle)[filled] / count[filled]
+    value = np.bincount(index, weights=turn.value)[filled] / count[filled]
+    return where, value
+
+
+def _transform(angle: Array, value: Array, highest: int) -> ComplexArray:
+    """Means of value exp(-j k angle) over a turn for k = 0..highest."""
+    after = np.diff(np.append(angle, angle[0] + TURN_RAD))
+    weighted = value * (after + np.roll(after, 1)) / (2.0 * TURN_RAD)
+    cells = int(2 ** np.ceil(np.log2(16 * max(highest, 4))))
+    nearest = np.round(angle * (cells / TURN_RAD))
+    off: Array = angle - nearest * (TURN_RAD / cells)
+    index = nearest.astype(np.int64) % cells
+    orders = np.arange(highest + 1)
+    total: ComplexArray = np.zeros(highest + 1, dtype=np.complex128)
+    factor: ComplexArray = np.ones(highest + 1, dtype=np.complex128)
+    for power in range(4):
+        moment = np.bincount(index, weights=weighted * off**power, minlength=cells)
+        total += factor * np.fft.rfft(moment)[: highest + 1]
+        factor = np.asarray(factor * (-1j * orders) / (power + 1.0), dtype=np.complex128)
+    return total
 
 
 def noise_power(spec: Spectrum) -> tuple[Array, Array, float]:
@@ -205,6 +245,47 @@ def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> 
         for k in np.flatnonzero(there)
     ]
     return sorted(lines, key=lambda line: (-line.amplitude, line.order))
+
+
+def find_orders(
+    turns: Sequence[Turn], highest: int, level: float = 0.01
+) -> tuple[Spectrum, list[OrderLine]]:
+    """Spectrum of the turns and the orders present, strongest first.
+
+    The strongest order present joins (with others nearly as strong), all orders found are fitted
+    to each turn together by least squares and taken off, and the rest is looked at again until
+    nothing is left (or `MOST_LINES` are found). Published is the mean of an order's fits over the
+    turns, with the uncertainty of `orders_present`. Reference: Högbom, Astron. Astrophys. Suppl.
+    15, 1974 (CLEAN).
+    """
+    whole = rest = spectrum(turns, highest)
+    orders: list[int] = []
+    fits = np.zeros((len(turns), 0), dtype=np.complex128)
+    while len(orders) < MOST_LINES:
+        new = [line for line in orders_present(rest, level) if line.order not in orders]
+        if not new:
+            break
+        orders += [line.order for line in new if line.amplitude > ALIKE * new[0].amplitude]
+        fitted = [_fit_orders(turn, orders) for turn in turns]
+        fits = np.array([coefficients for coefficients, _ in fitted])
+        rest = spectrum([left for _, left in fitted], highest)
+    back = rest.coefficients.copy()
+    for column, order in enumerate(orders):
+        back[:, order - 1] += fits[:, column]
+    cleaned = Spectrum(whole.orders, back, whole.means, whole.senses)
+    present = {line.order: line for line in orders_present(cleaned, level)}
+    lines = [present[order] for order in orders if order in present]
+    return cleaned, sorted(lines, key=lambda line: (-line.amplitude, line.order))
+
+
+def _fit_orders(turn: Turn, orders: Sequence[int]) -> tuple[ComplexArray, Turn]:
+    """Coefficients of the orders in one turn by least squares, and the turn without them."""
+    design = harmonic_design(turn.theta_rad, list(orders))
+    found = linear_fit(design, turn.value)
+    mean = float(found.coefficients[0])
+    left = Turn(turn.theta_rad, found.residuals + mean, turn.sense)
+    coefficients: ComplexArray = found.coefficients[1::2] - 1j * found.coefficients[2::2]
+    return coefficients, left
 
 
 def waveform(lines: Sequence[OrderLine], theta_rad: Array) -> Array:

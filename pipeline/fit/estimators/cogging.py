@@ -16,12 +16,11 @@ from pipeline.numerics.orders import (
     Spectrum,
     Turn,
     detection_limit,
+    find_orders,
     half_peak_to_peak,
     largest_order,
     noise_power,
-    orders_present,
     phase_modulated,
-    spectrum,
     waveform,
     whole_turns,
 )
@@ -56,11 +55,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if len(turns) < 2:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
-    spec = spectrum(turns, largest_order(turns, int(options["highest_order"])))
-    lines = orders_present(spec, options["level"])
+    highest = largest_order(turns, int(options["highest_order"]))
+    spec, lines = find_orders(turns, highest, options["level"])
     body, slow = part_orders(lines, known, campaign)
     estimates = _cogging(captures, spec, body, slow, known, campaign, options)
-    estimates += (_friction(captures, turns, spec),)
+    estimates += (_friction(captures, turns, spec, known),)
     return Fit(estimates, _evidence(turns, spec, body))
 
 
@@ -151,7 +150,9 @@ def _torque(
     return Estimate(name, value, _unit(name), "measured", NAME, budget, at, paths, note)
 
 
-def _friction(captures: Sequence[Capture], turns: Sequence[Turn], spec: Spectrum) -> Estimate:
+def _friction(
+    captures: Sequence[Capture], turns: Sequence[Turn], spec: Spectrum, known: Constants
+) -> Estimate:
     name = "torque_coulomb_nm"
     forward, backward = spec.means[spec.senses > 0], spec.means[spec.senses < 0]
     if forward.size == 0 or backward.size == 0:
@@ -164,13 +165,24 @@ def _friction(captures: Sequence[Capture], turns: Sequence[Turn], spec: Spectrum
         note = "the shaft torque drives the motion; check the sign of torque_shaft_nm"
         return not_identifiable(name, _unit(name), NAME, note)
     zero = float(backward.mean() + forward.mean()) / 2.0
-    note = (
-        f"drag at creep speed, where Stribeck's excess and the viscous part are in it; transducer "
-        f"zero {zero:.2g} N·m parted by direction; {len(turns)} turns"
-    )
     speed = _speed(captures)
+    share, words = _viscous_share(speed, known)
+    value, u = value * (1.0 - share), u * (1.0 - share)
+    note = (
+        f"drag at creep speed, with Stribeck's excess in it{words}; transducer zero {zero:.2g} N·m "
+        f"parted by direction; {len(turns)} turns"
+    )
     gains = instrument_uncertainties(captures, ("torque",))
     return _torque(name, value, u, dof, gains, tuple(c.path for c in captures), note, speed)
+
+
+def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, str]:
+    """Share of the drag at this speed that is viscous, by the coast-down's ratio B/T_c."""
+    coulomb, viscous = known.best("coast_coulomb_rad_s2"), known.best("coast_viscous_1_s")
+    if speed_rad_s is None or coulomb is None or viscous is None or coulomb.number <= 0.0:
+        return 0.0, " and the viscous part"
+    slope = max(viscous.number, 0.0) * speed_rad_s
+    return slope / (coulomb.number + slope), ", the viscous part taken off by the coast-down"
 
 
 def _variance_of_mean(
@@ -243,7 +255,7 @@ ESTIMATOR = Estimator(
     tests=("cogging",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs",),
+    uses=("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s"),
     rank=10,
     options={"highest_order": 1000.0, "level": 0.01},
 )

@@ -44,7 +44,7 @@ CLUSTER_S = 0.25
 COPPER_1_K = 1.0 / 259.5
 MAGNET_1_K = -0.0011
 U_UNKNOWN_K = 15.0
-CANDIDATES = ("zero", "acceleration", "turned", "d flux")
+CANDIDATES = ("zero", "acceleration", "turned", "d flux", "cross flux")
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +158,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         "inductive": weak.integral(i_q, 1),
         "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
         "zero": np.ones(weak.count),
+        "cross flux": weak.integral(speed * i_q**2),
         "acceleration": weak.integral(theta, 2),
     }
     if capture.has("id_a"):

@@ -19,10 +19,10 @@ from pipeline.numerics.orders import (
     Spectrum,
     Turn,
     detection_limit,
+    even_positions,
+    find_orders,
     half_peak_to_peak,
     largest_order,
-    orders_present,
-    spectrum,
     waveform,
     whole_turns,
 )
@@ -65,14 +65,16 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     for capture in captures:
         data = capture.arrays("theta_mech_rad", "iq_a")
         turns += whole_turns(data["theta_mech_rad"], data["iq_a"])
-    if len(turns) < 2 or largest_order(turns, int(options["highest_order"])) < 1:
+    highest = largest_order(turns, int(options["highest_order"]))
+    if len(turns) < 2 or highest < 1:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
-    spec = spectrum(turns, largest_order(turns, int(options["highest_order"])))
-    lines, slow = part_orders(orders_present(spec, options["level"]), known, campaign)
+    spec, present = find_orders(turns, highest, options["level"])
+    lines, slow = part_orders(present, known, campaign)
+    positions = even_positions(turns)
     left = held_out_residual(turns, [line.order for line in [*lines, *slow]])
     rms_a = None if left is None else float(np.sqrt(np.mean(left**2)))
-    estimates = _cogging(captures, spec, lines, rms_a, known, campaign)
+    estimates = _cogging(captures, spec, lines, rms_a, positions, known, campaign)
     if left is None or rms_a is None:
         note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
         residual = not_identifiable(RESIDUAL.name, "A", NAME, note)
@@ -127,6 +129,7 @@ def _cogging(
     spec: Spectrum,
     lines: Sequence[OrderLine],
     rms_a: float | None,
+    positions: int | None,
     known: Constants,
     campaign: Campaign,
 ) -> tuple[Estimate, ...]:
@@ -139,8 +142,10 @@ def _cogging(
     note = f"A by order: {name_orders(lines, known, campaign)}"
     if rms_a is not None:
         note += f"; {rms_a:.3g} A rms left in held-out sectors"
+    leading, alias = _true_order(lines[0].order, positions, known, campaign)
+    note += alias
     order = Estimate(
-        names[0], lines[0].order, "1", "measured", NAME, captures=paths, note=note,
+        names[0], leading, "1", "measured", NAME, captures=paths, note=note,
         bounds=(1.0, float(spec.orders[-1])),
     )  # fmt: skip
     kt = torque_constant(known)
@@ -157,6 +162,26 @@ def _cogging(
             Estimate(name, amps * kt.number, _unit(name), "measured", NAME, budget, {}, paths, note)
         )
     return (order, *torques)
+
+
+def _true_order(
+    seen: int, positions: int | None, known: Constants, campaign: Campaign
+) -> tuple[int, str]:
+    """The order behind one seen on even positions, and a note where it could be another.
+
+    On n positions the orders k and m n ± k look alike; the one that slots and poles make is taken
+    if there is exactly one of them.
+    """
+    slots, pairs = campaign.nameplate("slots"), known.best("pole_pairs")
+    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    if positions is None or not isinstance(slots, int) or not isinstance(poles, int):
+        return seen, ""
+    own = int(np.lcm(slots, 2 * poles))
+    alike = [seen, *(m * positions + s * seen for m in (1, 2, 3) for s in (-1, 1))]
+    made = [k for k in alike if k % own == 0]
+    if seen % own == 0 or len(made) != 1:
+        return seen, ""
+    return made[0], f"; {positions} even positions show order {made[0]} as {seen}: hold at more"
 
 
 def _evidence(

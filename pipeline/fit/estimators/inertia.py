@@ -40,7 +40,8 @@ EXPERIMENT = (
 MAGNET_COEFFICIENT_1_K = -0.0011
 NUISANCES = (
     "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
-    "d current sin", "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
+    "d current sin", "q current cubed", "d squared q current", "d q current cubed",
+    "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
 )  # fmt: skip
 
 

@@ -45,6 +45,7 @@ EXPERIMENT = (
 MAGNET_COEFFICIENT_1_K = -0.0011
 U_MAGNET_COEFFICIENT_1_K = 0.0005
 FORM_SHARE = 0.1
+BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
 ASSUMED_COEFFICIENT = "assumed:temp_coeff_magnet"
 
 
@@ -136,7 +137,6 @@ def _candidates(points: Sequence[Point]) -> dict[str, Array]:
     columns = {
         "iq^3": i_q**3,
         "iq^5": i_q**5,
-        "|iq| iq": np.abs(i_q) * i_q,
         "|iq| sense": np.abs(i_q) * sense,
     }
     if _has_reluctance(points):
@@ -199,6 +199,7 @@ def _estimates(
     type_b = contributions(values, gains)
     slope = float((values({ASSUMED_COEFFICIENT: 1e-4}) - values({}))[0]) / 1e-4
     type_b[0] += propagate([(slope, tuple(alpha_parts))])
+    type_b[0].append(Contribution("assumed:torque_form", _form_doubt(points, alpha, chosen), "B"))
     note = _note(captures, table, points, chosen)
     paths = tuple(sorted({p.capture.path for p in points}))
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
@@ -277,6 +278,19 @@ def _untested_form(
 
 def _reluctance(model: Regression) -> float:
     return model.of("id iq")
+
+
+def _form_doubt(points: Sequence[Point], alpha: float, chosen: Sequence[str]) -> float:
+    """How far K moves with the last column that bends the torque: the series may go on.
+
+    Without any the torque is straight and there is no doubt.
+    """
+    bent = [name for name in chosen if name in BENDING]
+    if not bent:
+        return 0.0
+    without = [name for name in chosen if name != bent[-1]]
+    shorter = _regress(points, alpha, without).kt_nm_a
+    return abs(_regress(points, alpha, chosen).kt_nm_a - shorter) / 2.0
 
 
 def _note(
