@@ -599,6 +599,15 @@ def test_speed_against_angle(
     assert words in error.message
 
 
+def test_speed_a_tenth_off(rng: np.random.Generator) -> None:
+    """Warned, not refused: the speed is not needed where the angle is there."""
+    capture = spin_down(MOTOR, rng)
+    speed = 1.1 * column(capture, "omega_mech_rad_s")
+    _, finding = warned(with_column(capture, "omega_mech_rad_s", speed))
+    assert finding.code == "speed_against_angle"
+    assert "1.1 times" in finding.message
+
+
 # --- rate and coverage ------------------------------------------------------------------------
 
 
@@ -616,6 +625,29 @@ def test_aliased_back_emf(rng: np.random.Generator) -> None:
     """Refused: two samples in the shortest electrical period, by the nameplate's count."""
     capture = open_circuit(MOTOR, rng)
     error = refused(with_rows(capture, np.arange(24000) % 20 == 0))
+    assert "sampling_rate" in error.code + error.message
+
+
+def test_rotor_frame_aliased(rng: np.random.Generator) -> None:
+    """Warned: dq columns at 1.4 samples an electrical period hide all that turns with the angle."""
+    capture = drive(MOTOR, rng)
+    period_s = 2.0 * np.pi / (MOTOR.pole_pairs * 0.8 * MOTOR.top_rad_s)
+    every = round(period_s / 1.4 / 1e-4)
+    _, finding = warned(with_rows(capture, np.arange(40000) % every == 0))
+    assert finding.code == "sampling_rate"
+    assert float(finding.message.split()[0]) == pytest.approx(1.4, rel=0.05)
+
+
+def test_cogging_too_coarse(rng: np.random.Generator) -> None:
+    """Order 84 (12 slots, 14 poles): warned at 5 samples in its period, refused at 2."""
+    capture = cogging(MOTOR, rng)
+    period_rows = 2.0 * np.pi / 84.0 / 0.25 / 1e-3
+    rows = np.arange(26000)
+    _, finding = warned(with_rows(capture, rows % round(period_rows / 5.0) == 0))
+    assert finding.code == "sampling_rate"
+    assert "order 84" in finding.message
+    assert float(finding.message.split()[0]) == pytest.approx(5.0, rel=0.02)
+    error = refused(with_rows(capture, rows % round(period_rows / 2.0) == 0))
     assert "sampling_rate" in error.code + error.message
 
 
@@ -647,6 +679,14 @@ def test_milliampere(rng: np.random.Generator) -> None:
     _, finding = warned(capture)
     assert finding.code == "implausible_resistance"
     assert "mA" in finding.remedy
+
+
+def test_more_volts_than_the_link(rng: np.random.Generator) -> None:
+    """Warned: 9.6 V between two terminals of an inverter on 5 V; silent on 12 V."""
+    capture = current_step(MOTOR, rng)
+    on = {v: replace(capture, meta=replace(capture.meta, vdc_v=v)) for v in (5.0, 12.0)}
+    assert warned(on[5.0])[1].code == "voltage_above_link"
+    assert validate(on[12.0], {})[1] == ()
 
 
 def test_half_a_turn(rng: np.random.Generator) -> None:
@@ -755,6 +795,16 @@ def test_one_direction_of_cogging(rng: np.random.Generator) -> None:
     findings = agree(_campaign(*others, cogging(MOTOR, rng)))
     assert [f.code for f in findings] == ["direction_coverage"]
     assert agree(_campaign(*others, cogging(MOTOR, rng, -1.0))) == ()
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_both_directions_in_one_capture(sense: float, rng: np.random.Generator) -> None:
+    """Silent: one capture that turns there and back, whichever way it starts."""
+    capture = cogging(MOTOR, rng)
+    angle = column(capture, "theta_mech_rad")
+    there_and_back = sense * 2.0 * np.minimum(angle, angle[::-1])
+    capture = with_column(capture, "theta_mech_rad", there_and_back)
+    assert agree(_campaign(resistance(MOTOR, rng), capture)) == ()
 
 
 def test_one_sign_of_torque(rng: np.random.Generator) -> None:
