@@ -20,8 +20,10 @@ def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict
     stated and several are there, or where it is missing from a message.
     """
     found = {name: leaf for name, leaf in leaves.items() if leaf.counts is None}
-    names = leaves["name"]
-    counts = names.counts if names.counts is not None else np.zeros(batch.start.size, np.int64)
+    names = leaves.get("name")
+    if names is None or names.counts is None:
+        raise _bad("a joint state has no list of names")
+    counts = names.counts
     at = _place(batch, names, counts, joint)
     for quantity in QUANTITIES:
         leaf = leaves.get(quantity)

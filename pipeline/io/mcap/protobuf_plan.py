@@ -117,6 +117,8 @@ class _Planner:
         return Message(name, repeated, fields)
 
     def field(self, part: Any, file: Any, depth: int) -> Scalar | Message | None:
+        if not isinstance(part.name, str) or not isinstance(part.type_name, str):
+            raise _bad(self.schema, "has a name that is not UTF-8")
         repeated = part.label == _REPEATED
         if part.type == _MESSAGE_TYPE:
             found = self.types.get(part.type_name)
