@@ -262,8 +262,9 @@ def unaligned_inductances_h(lab_h: float, lbc_h: float, lca_h: float) -> Unalign
     """
     read = dict(zip(("ab", "bc", "ca"), (lab_h, lbc_h, lca_h), strict=True))
     mean = (lab_h + lbc_h + lca_h) / 3.0
-    cosine = sum((v - mean) * math.cos(2.0 * PAIR_AXES_RAD[k]) for k, v in read.items()) / 1.5
-    sine = sum((v - mean) * math.sin(2.0 * PAIR_AXES_RAD[k]) for k, v in read.items()) / 1.5
+    # The pairs lie 120° apart, so their mean drops out of both sums.
+    cosine = sum(v * math.cos(2.0 * PAIR_AXES_RAD[k]) for k, v in read.items()) / 1.5
+    sine = sum(v * math.sin(2.0 * PAIR_AXES_RAD[k]) for k, v in read.items()) / 1.5
     swing = math.hypot(cosine, sine)
     theta_low = math.atan2(-sine, -cosine) / 2.0 % math.pi
     return UnalignedInductances((mean - swing) / 2.0, (mean + swing) / 2.0, theta_low)

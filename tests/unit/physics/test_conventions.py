@@ -211,6 +211,12 @@ def test_an_uncertain_ratio_names_the_nearest_two() -> None:
     assert [part.split(":")[0] for part in named.split(" or ")][:2] == ["1.1027", "1.1547"]
 
 
+def test_the_reach_is_relative_to_the_ratio() -> None:
+    """0.1 in 6.6 is 1.5 %: 2 pi, 5 % below, is out of 1 % + 2 u."""
+    assert c.convention_suspect(6.6, 0.1, None) is None
+    assert c.convention_suspect(6.6, 0.15, None) is not None
+
+
 def test_two_pole_pairs_are_ambiguous_with_two() -> None:
     named = c.convention_suspect(2.0, 0.001, 2)
     assert named is not None
