@@ -34,7 +34,7 @@ class Layout:
 
     Own ones in order: R, current offset where the voltage has two levels or more, the edges to
     place, the first current where the capture starts unsettled, the inverter's drop where
-    commanded.
+    commanded, and each level's error in units of its standard error, known to be 0 ± 1.
     """
 
     starts: tuple[int, ...]
@@ -49,7 +49,12 @@ class Layout:
 def layout_of(records: Sequence[StepRecord]) -> Layout:
     """The layout for these captures."""
     sizes = [
-        1 + (r.wave.levels_v.size > 1) + len(r.wave.free) + (not r.starts_settled) + r.commanded
+        1
+        + (r.wave.levels_v.size > 1)
+        + len(r.wave.free)
+        + (not r.starts_settled)
+        + r.commanded
+        + r.wave.u_levels_v.size
         for r in records
     ]
     starts = np.cumsum([len(SHARED), *sizes[:-1]])
@@ -58,13 +63,14 @@ def layout_of(records: Sequence[StepRecord]) -> Layout:
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """One capture's own parameters for m variants at once [m each]; edges are [m, s + 1]."""
+    """One capture's own parameters for m variants [m each]; edges [m, s + 1], levels [m, s]."""
 
     r_ohm: Array
     offset_a: Array
     edges_s: Array
     first_a: Array
     drop_v: Array
+    levels_v: Array
 
 
 def unpack(record: StepRecord, own: Array) -> Own:
@@ -78,11 +84,14 @@ def unpack(record: StepRecord, own: Array) -> Own:
     for index in record.wave.free:
         edges[:, index] = record.wave.edges_s[index] + own[:, at] * record.wave.period_s
         at += 1
-    first = record.wave.levels_v[0] / own[:, 0]
+    levels = np.tile(record.wave.levels_v, (count, 1))
+    if record.wave.u_levels_v.size:
+        levels = levels + own[:, -record.wave.u_levels_v.size :] * record.wave.u_levels_v
+    first = levels[:, 0] / own[:, 0]
     if not record.starts_settled:
         first, at = own[:, at], at + 1
     drop = own[:, at] if record.commanded else np.zeros(count)
-    return Own(own[:, 0], offset, edges, first, drop)
+    return Own(own[:, 0], offset, edges, first, drop, levels)
 
 
 def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
@@ -164,8 +173,7 @@ class StepModel:
             lengths = np.diff(mine.edges_s, axis=1)[:, segment]
             pad = self._count - segment.size
             width.append(np.pad(lengths * (end - begin), ((0, 0), (0, pad))))
-            levels = np.pad(record.wave.levels_v[segment], (0, pad), mode="edge")
-            volts.append(np.broadcast_to(levels, (rows.shape[0], self._count)))
+            volts.append(np.pad(mine.levels_v[:, segment], ((0, 0), (0, pad)), mode="edge"))
             shared.append(rows[:, : len(SHARED)])
             cos_g.append(np.full(rows.shape[0], math.cos(record.axis_rad)))
             own.append(mine)
@@ -217,11 +225,12 @@ class StepModel:
     ) -> tuple[Array, Array]:
         """Weighted residuals [n] and their Jacobian [n, k] over the parameters that are free.
 
+        After the samples of each capture come its levels' errors, as observations of 0 ± 1.
         One-sided differences of width 1e-6 of each parameter's natural scale.
         """
         widths = self._widths(parameters)
         free = np.flatnonzero(jacobian)
-        columns = [self._columns_of(c, free) for c in range(len(self.records))]
+        columns = [self.columns_of(c, free) for c in range(len(self.records))]
         variants = []
         for mine in columns:
             rows = np.tile(parameters, (mine.size + 1, 1))
@@ -236,9 +245,18 @@ class StepModel:
             place = np.searchsorted(free, mine)
             slope[:, place] = (current[:, 1:] - current[:, :1]) / widths[mine] * weight[:, None]
             slopes.append(slope)
+            levels = self.level_columns(c)
+            blocks.append(parameters[levels])
+            slopes.append((levels[:, None] == free[None, :]).astype(np.float64))
         return np.concatenate(blocks), np.vstack(slopes)
 
-    def _columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:
+    def level_columns(self, capture: int) -> NDArray[np.intp]:
+        """Where the errors of a capture's voltage levels sit among the parameters."""
+        end = self.layout.starts[capture] + self.layout.sizes[capture]
+        return np.arange(end - self.records[capture].wave.u_levels_v.size, end)
+
+    def columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Those of the free parameters that a capture depends on."""
         start, size = self.layout.starts[capture], self.layout.sizes[capture]
         own = (free >= start) & (free < start + size)
         return free[own | (free < len(SHARED))]
@@ -257,8 +275,10 @@ class StepModel:
             widths[at + 1 : at + size] = 1e-5 * max(record.largest_a, 1e-9)
             shift = 2 if record.wave.levels_v.size > 1 else 1
             widths[at + shift : at + shift + len(record.wave.free)] = 1e-4
+            last = at + size - record.wave.u_levels_v.size
             if record.commanded:
-                widths[at + size - 1] = 1e-5 * record.largest_a * parameters[at]
+                widths[last - 1] = 1e-5 * record.largest_a * parameters[at]
+            widths[last : at + size] = 1e-2
         return widths
 
 

@@ -27,12 +27,16 @@ MOST_BINS = 3000
 
 @dataclass(frozen=True, slots=True)
 class Waveform:
-    """Voltage levels [s] between edges [s + 1]; `free` are the edges that the fit must place."""
+    """Voltage levels [s] between edges [s + 1]; `free` are the edges that the fit must place.
+
+    `u_levels_v` [s] are the standard errors of levels that are means, empty for single samples.
+    """
 
     edges_s: Array
     levels_v: Array
     free: tuple[int, ...]
     period_s: float
+    u_levels_v: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +139,7 @@ def waveform_of(t_s: Array, v_v: Array, timing: VoltageTiming) -> Waveform:
         stops = [*(int(g[0]) + 1 for g in groups), v_v.size]
         parts = [v_v[a:b] for a, b in zip(bounds[:-1], stops, strict=True)]
         if all(_is_level(part, sigma) for part in parts):
-            return _levels(t_s, v_v, groups, parts, timing, period)
+            return _levels(t_s, v_v, groups, parts, timing, period, sigma)
     return _sampled(t_s, v_v, timing, period)
 
 
@@ -155,6 +159,7 @@ def _levels(
     parts: list[Array],
     timing: VoltageTiming,
     period_s: float,
+    sigma_v: float,
 ) -> Waveform:
     levels = np.array([float(part.mean()) for part in parts])
     edges, free = [float(t_s[0])], []
@@ -170,7 +175,10 @@ def _levels(
         else:
             free.append(number + 1)
             edges.append(float(t_s[after]) - 0.25 * period_s)
-    return Waveform(np.array([*edges, float(t_s[-1]) + period_s]), levels, tuple(free), period_s)
+    least = max(sigma_v, 1e-9 * float(np.max(np.abs(levels))))
+    errors = np.array([least / math.sqrt(part.size) for part in parts])
+    ends = np.array([*edges, float(t_s[-1]) + period_s])
+    return Waveform(ends, levels, tuple(free), period_s, errors)
 
 
 def _sampled(t_s: Array, v_v: Array, timing: VoltageTiming, period_s: float) -> Waveform:
@@ -187,7 +195,7 @@ def _sampled(t_s: Array, v_v: Array, timing: VoltageTiming, period_s: float) -> 
     cuts = np.append(np.arange(0, means.size, group), means.size)
     areas = np.add.reduceat(means * np.diff(edges), cuts[:-1])
     kept = edges[cuts]
-    return Waveform(kept, areas / np.diff(kept), (), period_s)
+    return Waveform(kept, areas / np.diff(kept), (), period_s, np.zeros(0))
 
 
 def _bins(t_s: Array, i_a: Array, wave: Waveform) -> tuple[Array, Array, Array]:

@@ -158,17 +158,20 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -
     fit = gauss_newton(residuals_and_jacobian, start[where], low, tolerance=1e-3)
     parameters = start.copy()
     parameters[where] = fit.parameters
-    found, factors, first = [], [], 0
-    for record, sigma in zip(model.records, sigmas, strict=True):
-        part = fit.residuals[first : first + record.i_a.size]
-        tau = autocorrelation_time(part)
-        rms = float(np.sqrt(np.mean(part**2)))
-        factors.append(np.full(part.size, rms * math.sqrt(tau)))
-        found.append(sigma * max(rms, 1e-9) * math.sqrt(tau))
-        first += part.size
-    spread = fit.jacobian * np.concatenate(factors)[:, None]
     scale = np.linalg.norm(fit.jacobian, axis=0)
-    meat = (spread / scale).T @ (spread / scale)
+    meat = np.zeros((where.size, where.size))
+    found, first = [], 0
+    for capture, (record, sigma) in enumerate(zip(model.records, sigmas, strict=True)):
+        stop = first + record.i_a.size
+        rms = float(np.sqrt(np.mean(fit.residuals[first:stop] ** 2)))
+        noise = rms * math.sqrt(autocorrelation_time(fit.residuals[first:stop]))
+        found.append(sigma * max(noise, 1e-9))
+        mine = np.searchsorted(where, model.columns_of(capture, where))
+        last = stop + record.wave.u_levels_v.size
+        rows = fit.jacobian[first:last, mine] / scale[mine]
+        rows[: stop - first] *= noise
+        meat[np.ix_(mine, mine)] += rows.T @ rows
+        first = last
     bread = fit.covariance * np.outer(scale, scale)
     covariance = bread @ meat @ bread / np.outer(scale, scale)
     honest = NonlinearFit(
@@ -268,7 +271,7 @@ def _gains(name: str, solution: Solution) -> list[Contribution]:
                 change[first:stop] += part + (record.i_a - offset) * weight
             if current_source(record.capture.meta) == source:
                 change[first:stop] -= (record.i_a - offset) * weight
-            first = stop
+            first = stop + record.wave.u_levels_v.size
         found.append(Contribution(source, u * float(lever @ change), "B"))
     return found
 
