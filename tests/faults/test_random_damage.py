@@ -48,8 +48,9 @@ def protobuf_file() -> bytes:
 
 def joint_file() -> bytes:
     head = b"\0\1\0\0" + bytes(8) + b"\2\0\0\0b\0\0\0" + b"\1\0\0\0\2\0\0\0j\0\0\0"
-    array = b"\1\0\0\0" + bytes(4) + np.array([0.5]).tobytes()
-    messages = [("/s", START_NS + n, head + array * 3) for n in range(10)]
+    one, half = b"\1\0\0\0", np.array([0.5]).tobytes()
+    body = head + one + half + (one + bytes(4) + half) * 2  # each double aligned to 8 bytes
+    messages = [("/s", START_NS + n, body) for n in range(10)]
     schema = ("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE.encode())
     return mcap_file(messages, schema, "cdr", **BARE)
 
