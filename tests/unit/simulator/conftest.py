@@ -1,0 +1,16 @@
+"""Compiled kernels are kept by their own file's date; one that calls another file's is not."""
+
+from pathlib import Path
+
+import pipeline.simulator
+
+ROOM = Path(pipeline.simulator.__file__).parent
+KERNELS = ("field.py", "motion.py", "converter.py")
+
+
+def pytest_configure() -> None:
+    """Forget kernels compiled before the newest of their sources, so that no edit goes untested."""
+    newest = max((ROOM / name).stat().st_mtime for name in KERNELS)
+    for kept in (ROOM / "__pycache__").glob("*.nb[ic]"):
+        if kept.stat().st_mtime < newest:
+            kept.unlink(missing_ok=True)
