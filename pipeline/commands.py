@@ -37,6 +37,13 @@ COMMANDS = _index(
         "what a file holds, which columns it knows, a source map to start from",
         positional=("file",),
     ),
+    Command(
+        "plan",
+        "plan",
+        s.PlanSettings,
+        "which test to record next, for which constant or doubt",
+        positional=("motor",),
+    ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
     Command("schemas", "schemas", s.Settings, "JSON Schemas and glossary, built into the checkout"),
     Command(

@@ -11,12 +11,13 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from pipeline.contracts.registry import gates
 from pipeline.crosscheck.registry import rules
 from pipeline.fit.registry import estimators
-from pipeline.io.ingest import Entry, survey
+from pipeline.io.ingest import Entry, Survey, survey
 from pipeline.io.limits import limits_file, required_constants
 from pipeline.io.publish import canonical_json, write_whole
-from pipeline.io.source_map import SourceMap, load_source_maps
+from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, PipelineError, UsageError
 from pipeline.records.finding import Finding
@@ -37,25 +38,27 @@ def main(settings: RunSettings) -> Outcome:
         raise UsageError(f"input={settings.input} is no folder", "name the folder of captures")
     conf = configuration_folder()
     limits = limits_file(conf / "limits", settings.limits)
-    maps = load_source_maps(conf / "source", settings.source)
     with watch.stage("survey"):
-        entries, findings = survey(folder, maps)
-    jobs = _jobs(settings, entries, findings, limits, maps)
+        found = survey(folder, _source_maps(conf / "source", settings.source))
+    jobs = _jobs(settings, found, limits)
     with watch.stage("motors"):
         results = _process(jobs, settings.workers)
-    findings = tuple(sorted({*findings, *(f for r in results for f in r.findings)}))
+    findings = tuple(
+        sorted({*found.findings, *(f for r in results for f in r.findings)}, key=_order)
+    )
     with watch.stage("fleet"):
         _publish(settings, results, findings)
     for result in results:
         for name, seconds in result.seconds.items():
             watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
-    return _outcome(settings, results, findings, len(entries), watch)
+    return _outcome(settings, results, findings, found, watch)
 
 
 def _known_options(settings: RunSettings) -> None:
     """Refuses an option of an estimator or check that does not exist: a typo must not be silent."""
     plugs: tuple[tuple[str, Mapping[str, Any], Mapping[str, Mapping[str, float]]], ...] = (
         ("fit", settings.fit, {e.name: e.options for e in estimators()}),
+        ("gates", settings.gates, {g.name: g.settings() for g in gates()}),
         ("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()}),
     )
     for room, given, known in plugs:
@@ -68,38 +71,46 @@ def _known_options(settings: RunSettings) -> None:
                     raise UsageError(f"{room}.{name}.{option}: no such option", f"it has {has}")
 
 
-def _jobs(
-    settings: RunSettings,
-    entries: Sequence[Entry],
-    findings: Sequence[Finding],
-    limits: Path,
-    maps: Sequence[SourceMap],
-) -> list[MotorJob]:
-    digest = hashlib.sha256(canonical_json(result_document(settings)))
-    digest.update(limits.read_bytes())
-    for source_map in maps:
-        digest.update(source_map.sha256.encode())
+def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:
+    """Every source map, or the one that was asked for."""
+    maps = load_source_maps(folder)
+    return maps if name == "auto" else {name: find_map(maps, name)}
+
+
+def _order(finding: Finding) -> tuple[str, str, str, tuple[int, int]]:
+    return finding.file, finding.severity, finding.code, finding.rows or (-1, -1)
+
+
+def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     motors: dict[str, list[Entry]] = {}
-    for entry in entries:
-        motors.setdefault(entry.meta.motor_id, []).append(entry)
+    for entry in found.entries:
+        motors.setdefault(entry.said["motor_id"], []).append(entry)
+    required = required_constants(limits)
+    work = canonical_json(result_document(settings)) + limits.read_bytes()
     return [
         MotorJob(
             motor_id=motor_id,
             entries=tuple(own),
             input=settings.input,
             output=settings.output,
-            config_sha256=digest.hexdigest(),
-            required=required_constants(limits),
+            config_sha256=_digest(work, own),
+            required=required,
             release=settings.release,
             report=settings.report,
             recordings=settings.recordings,
             gates=settings.gates,
             fit=settings.fit,
             crosscheck=settings.crosscheck,
-            findings=tuple(f for f in findings if f.file in {e.path for e in own}),
+            findings=tuple(f for f in found.findings if f.file in {e.path for e in own}),
         )
         for motor_id, own in sorted(motors.items())
     ]
+
+
+def _digest(work: bytes, entries: Sequence[Entry]) -> str:
+    """Digest of the settings, the limits file and the source maps that these captures need."""
+    maps = sorted({repr(entry.source) for entry in entries if entry.source is not None})
+    return hashlib.sha256("\n".join([work.decode(), *maps]).encode()).hexdigest()
 
 
 def _process(jobs: Sequence[MotorJob], workers: int) -> list[MotorResult]:
@@ -162,7 +173,7 @@ def _outcome(
     settings: RunSettings,
     results: Sequence[MotorResult],
     findings: Sequence[Finding],
-    captures: int,
+    found: Survey,
     watch: Stopwatch,
 ) -> Outcome:
     datasheets = _datasheets(results)
@@ -173,8 +184,10 @@ def _outcome(
         4 if not datasheets or any(seen == {"not_evaluated"} for seen in statuses) else 0,
     )
     lines = tuple(finding.line() for finding in findings)
-    if not captures:
-        nothing = f"undecided: no captures in {settings.input}; see `pipeline inspect FILE`"
+    if not found.entries:
+        nothing = f"undecided: no usable capture in {settings.input}; `inspect FILE` says why"
         lines = (*lines, nothing)
+    if found.note:
+        lines = (*lines, f"note: {found.note}")
     text = summary(datasheets, findings, settings.output, report=settings.report)
     return Outcome(code, text, lines, watch.table())
