@@ -1,0 +1,193 @@
+"""What a physical effect is: one file in `effects/`, one `EFFECT`, found by the registry.
+
+One object serves simulation, residual, fit and report. An effect enters the machine's equations
+by the hooks it fills in; all of them are zero at zero parameters, so that any effect can be added
+to any model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of an effect. Sizes are in multiples of the machine's own `scale`.
+
+    `scale` names an entry of `Machine.scales` (`torque_nm`, `voltage_v`, ...) or is `1`.
+    `typical` is a size seen on real benches, `negligible` one that nobody would act on; both are
+    magnitudes. `scan`: trial values of a shape parameter, which has no influence while the
+    amplitudes of its effect are zero; empty for an amplitude.
+    """
+
+    name: str
+    unit: str
+    typical: float
+    negligible: float
+    scale: str = "1"
+    low: float = -math.inf
+    high: float = math.inf
+    words: str = ""
+    scan: tuple[float, ...] = ()
+
+    @property
+    def amplitude(self) -> bool:
+        """Whether the effect vanishes with this parameter."""
+        return not self.scan
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What the captures say of the motor's size, before any fit.
+
+    `scales` [unit of the name's suffix]: the largest current, speed, torque and voltage seen,
+    the sample period, and what follows from them. `torque_orders` are the orders per turn that
+    stand out of a slow turn, `slots` the nameplate's.
+    """
+
+    pole_pairs: int
+    slots: int | None
+    scales: Mapping[str, float]
+    torque_orders: tuple[int, ...] = ()
+
+    def scale(self, parameter: Parameter) -> float:
+        """Size [parameter.unit] of one relative unit of a parameter."""
+        return 1.0 if parameter.scale == "1" else self.scales[parameter.scale]
+
+
+@dataclass(slots=True)
+class Operating:
+    """Where the machine is at each sample [n]; what hooks are evaluated on.
+
+    Currents are true machine currents in the true rotor frame (amplitude-invariant), angles and
+    speed are true shaft quantities. `inverter`: the machine is fed and logged by a drive, so that
+    inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
+    `travel_rad` is the angle turned since the last reversal, infinite before the first.
+    `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks.
+    """
+
+    machine: Machine
+    base: Mapping[str, float]
+    id_a: Any
+    iq_a: Any
+    eps_rad: Any
+    theta_rad: Array
+    omega_rad_s: Array
+    winding_k: Array
+    magnet_k: Array
+    travel_rad: Array
+    inverter: bool
+    freq_hz: Array
+    psi_wb: Complex | None = None
+    torque_em_nm: Array | None = None
+
+    @property
+    def i_a(self) -> Complex:
+        """Complex rotor-frame current d + jq [A]."""
+        current: Complex = self.id_a + 1j * self.iq_a
+        return current
+
+    @property
+    def flux_wb(self) -> Complex:
+        """Complex rotor-frame flux linkage, once the flux hooks have run [Wb]."""
+        if self.psi_wb is None:
+            raise ValueError("flux linkage is not there yet: flux hooks come first")
+        return self.psi_wb
+
+    @property
+    def torque_nm(self) -> Array:
+        """Air-gap torque, once the flux hooks have run [N·m]."""
+        if self.torque_em_nm is None:
+            raise ValueError("torque is not there yet: flux hooks come first")
+        return self.torque_em_nm
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What sensor hooks may correct: complex dq current [A], shaft torque [N·m], on one clock.
+
+    `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument` tells the
+    instruments of one bench apart (`drive` or `bench`).
+    """
+
+    i_a: Complex
+    torque_nm: Array
+    eps_rad: Array
+    omega_e_rad_s: Array
+    ts_s: float
+    inverter: bool
+    instrument: str
+
+
+Values = Mapping[str, float]
+CoenergyHook = Callable[[Operating, Values], Any]
+DropHook = Callable[[Operating, Values], Complex]
+TorqueHook = Callable[[Operating, Values], Array]
+AngleHook = Callable[[Operating, Values], Array]
+CurrentHook = Callable[[Recorded, Values], Complex]
+LoadHook = Callable[[Recorded, Values], Array]
+VoltageHook = Callable[[Complex, Operating, Values, str], Complex]
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One effect. Every hook gets the parameters by name, in their own units.
+
+    coenergy(x, q): co-energy over 1.5 [Wb·A] as an analytic function of `x.id_a`, `x.iq_a`,
+        `x.eps_rad`, which arrive complex: flux is its gradient by the currents, torque gains
+        1.5 p times its gradient by the electrical angle (no abs, no branches on those three).
+    drop(x, q): complex voltage drop in the rotor frame [V], added to R i.
+    torque(x, q): torque that opposes positive rotation [N·m].
+    angle(x, q): recorded less true electrical angle [rad].
+    current(r, q): true complex current from the recorded one [A].
+    load(r, q): true shaft torque from the recorded one [N·m].
+    voltage(v, x, q, instrument): recorded voltage from the true one [V].
+    shaft(t, q): recorded shaft torque from the true one [N·m].
+
+    `parameters`, or `expand(machine)` where their number depends on the machine. `signals` are
+    capture columns without which the effect cannot be seen, `tests` those that excite it, the
+    best first. `rivals`: other effects and the test or calibration that parts them from this.
+    `allowed(q)` is False for parameters without physical meaning together.
+    """
+
+    name: str
+    words: str
+    signature: str
+    tests: tuple[str, ...]
+    experiment: str
+    reference: str
+    parameters: tuple[Parameter, ...] = ()
+    expand: Callable[[Machine], tuple[Parameter, ...]] | None = None
+    signals: tuple[str, ...] = ()
+    rivals: Mapping[str, str] = field(default_factory=dict)
+    coenergy: CoenergyHook | None = None
+    drop: DropHook | None = None
+    torque: TorqueHook | None = None
+    angle: AngleHook | None = None
+    current: CurrentHook | None = None
+    load: LoadHook | None = None
+    voltage: VoltageHook | None = None
+    shaft: Callable[[Array, Values], Array] | None = None
+    allowed: Callable[[Values], bool] | None = None
+
+    @property
+    def hook(self) -> str:
+        """Where it enters: flux, drop, torque or sensor."""
+        if self.coenergy is not None:
+            return "flux"
+        if self.drop is not None:
+            return "drop"
+        return "torque" if self.torque is not None else "sensor"
+
+    def parameters_of(self, machine: Machine) -> tuple[Parameter, ...]:
+        """The parameters for one machine, `expand`ed where their number depends on it."""
+        return self.expand(machine) if self.expand is not None else self.parameters

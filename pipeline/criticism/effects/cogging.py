@@ -1,0 +1,52 @@
+"""Torque of the magnets on the slots."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Effect, Machine, Operating, Parameter, Values
+
+
+def _torque(x: Operating, q: Values) -> Array:
+    drag = np.zeros(x.omega_rad_s.shape)
+    for name, value in q.items():
+        wave, order = name.split("_")[:2]
+        angle = int(order) * x.theta_rad
+        drag += value * (np.sin(angle) if wave == "sin" else np.cos(angle))
+    return drag
+
+
+def orders(machine: Machine) -> tuple[int, ...]:
+    """Orders a turn that magnets and slots can make, of those that stand out of a slow turn.
+
+    Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them.
+    """
+    bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
+    seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
+    if machine.slots:
+        seen.add(math.lcm(machine.slots, 2 * machine.pole_pairs))
+    return tuple(sorted(seen)) or (6 * machine.pole_pairs,)
+
+
+def _expand(machine: Machine) -> tuple[Parameter, ...]:
+    return tuple(
+        Parameter(f"{wave}_{order}_nm", "N·m", 0.01, 0.0002, "torque_nm", -1.0, 1.0)
+        for order in orders(machine)
+        for wave in ("sin", "cos")
+    )
+
+
+EFFECT = Effect(
+    name="cogging",
+    words="Σ over orders k of a_k sin kθ + b_k cos kθ, k multiples of p or of the slots",
+    signature="zero-current torque against angle, orders LCM(slots, 2p) and multiples of p, slots",
+    tests=("cogging", "holding_current"),
+    experiment="a slow turn without current, in both senses",
+    reference="Zhu & Howe, IEEE Trans. Energy Convers. 15 (2000), cogging torque",
+    expand=_expand,
+    signals=("theta_mech_rad", "torque_shaft_nm"),
+    rivals={"bemf_harmonics": "a slow turn without current", "unbalance": "order 1 is no cogging"},
+    torque=_torque,
+)

@@ -1,0 +1,35 @@
+"""One phase's current sensor with a gain of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+
+
+def _current(r: Recorded, q: Values) -> Complex:
+    if not r.inverter:
+        return r.i_a
+    gamma = (q["cosine"] + 1j * q["sine"]) * np.exp(-2j * r.eps_rad)
+    mean = 1.0 + q["mean"]
+    # recorded = mean i + gamma conj(i), solved for i
+    true: Complex = (mean * r.i_a - gamma * np.conj(r.i_a)) / (mean**2 - np.abs(gamma) ** 2)
+    return true
+
+
+EFFECT = Effect(
+    name="current_gain",
+    words="recorded i = (1 + mean) i + γ i* e^{−j2ε}; one phase k off by g: |γ| = mean = g/3",
+    signature="second electrical order in current, voltage and torque, proportional to current",
+    tests=("torque_map",),
+    experiment="a torque map at two speeds",
+    reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
+    parameters=(
+        Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
+        Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
+        Parameter("mean", "1", 0.01, 0.004, low=-0.3, high=0.3),
+    ),
+    signals=("id_a", "iq_a"),
+    rivals={"phase_imbalance": "resistance through all three terminal pairs"},
+    current=_current,
+)

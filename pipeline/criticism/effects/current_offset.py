@@ -1,0 +1,32 @@
+"""Offsets of the phase current sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+
+
+def _current(r: Recorded, q: Values) -> Complex:
+    if not r.inverter:
+        return r.i_a
+    offset = (q["alpha_a"] + 1j * q["beta_a"]) * np.exp(-1j * r.eps_rad)
+    true: Complex = r.i_a - offset
+    return true
+
+
+EFFECT = Effect(
+    name="current_offset",
+    words="recorded stationary current = true one + constant α + jβ",
+    signature="first electrical order in dq currents, voltages and torque, at any current",
+    tests=("torque_map", "drive"),
+    experiment="a log with the current loop off: the sensors should read zero",
+    reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
+    parameters=(
+        Parameter("alpha_a", "A", 0.01, 0.0005, "current_a", low=-0.3, high=0.3),
+        Parameter("beta_a", "A", 0.01, 0.0005, "current_a", low=-0.3, high=0.3),
+    ),
+    signals=("id_a", "iq_a"),
+    rivals={},
+    current=_current,
+)

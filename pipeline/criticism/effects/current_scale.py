@@ -1,0 +1,28 @@
+"""Gain error common to all phase currents of one instrument."""
+
+from __future__ import annotations
+
+from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
+
+
+def _current(r: Recorded, q: Values) -> Complex:
+    return r.i_a / (1.0 + q[f"gain_{r.instrument}"])
+
+
+EFFECT = Effect(
+    name="current_scale",
+    words="recorded current = (1 + gain) true current; a drive and a bench have their own gain",
+    signature="every current of one instrument off by one factor",
+    tests=("torque_map", "resistance"),
+    experiment="the current reading against a second, calibrated meter",
+    reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
+    parameters=(
+        Parameter("gain_drive", "1", 0.02, 0.004, low=-0.5, high=0.5),
+        Parameter("gain_bench", "1", 0.02, 0.004, low=-0.5, high=0.5),
+    ),
+    rivals={
+        "voltage_scale": "resistance known to 0.2 % from a four-wire meter",
+        "torque_scale": "resistance known to 0.2 % from a four-wire meter",
+    },
+    current=_current,
+)

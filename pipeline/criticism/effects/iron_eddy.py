@@ -1,0 +1,30 @@
+"""Eddy currents in the iron, as the drag they make."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+
+
+def _torque(x: Operating, q: Values) -> Array:
+    flux = np.abs(x.flux_wb / x.base["psi_wb"]) ** 2
+    drag: Array = q["drag_nm"] * x.omega_rad_s / x.machine.scales["speed_rad_s"] * flux
+    return drag
+
+
+EFFECT = Effect(
+    name="iron_eddy",
+    words="drag proportional to ω |ψ|², given at the highest speed and the magnet's flux",
+    signature="torque lost with speed, and with the square of the flux",
+    tests=("torque_map", "spin_down"),
+    experiment="a torque map at two speeds with d current; a spin-down without the magnet",
+    reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
+    parameters=(Parameter("drag_nm", "N·m", 0.02, 0.001, "torque_nm", low=0.0, high=1.0),),
+    signals=("torque_shaft_nm",),
+    rivals={
+        "windage": "a wider speed range",
+        "load_dependent_friction": "d current without torque: it changes the flux only",
+    },
+    torque=_torque,
+)

@@ -1,0 +1,30 @@
+"""Hysteresis of the iron, as the drag it makes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+
+
+def _torque(x: Operating, q: Values) -> Array:
+    flux = np.abs(x.flux_wb) / x.base["psi_wb"]
+    drag: Array = q["drag_nm"] * np.sign(x.omega_rad_s) * flux
+    return drag
+
+
+EFFECT = Effect(
+    name="iron_hysteresis",
+    words="drag proportional to sign(ω) |ψ|, given at the magnet's flux",
+    signature="torque lost with direction, and with the flux",
+    tests=("torque_map",),
+    experiment="a torque map with d current; a slow turn without the magnet",
+    reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
+    parameters=(Parameter("drag_nm", "N·m", 0.01, 0.001, "torque_nm", low=0.0, high=1.0),),
+    signals=("torque_shaft_nm",),
+    rivals={
+        "coulomb_friction": "an open-circuit comparison against a rotor without magnet",
+        "load_dependent_friction": "d current without torque: it changes the flux only",
+    },
+    torque=_torque,
+)

@@ -1,0 +1,32 @@
+"""Voltage logged later or earlier than the current: dq voltages turned by ω_e τ."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
+
+
+def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
+    if not x.inverter:
+        return v_v
+    turn = x.machine.pole_pairs * x.omega_rad_s * q["delay_s"]
+    turned: Complex = v_v * np.exp(1j * turn)
+    return turned
+
+
+EFFECT = Effect(
+    name="sample_delay",
+    words="recorded dq voltage = true one turned by ω_e τ",
+    signature="v_d error proportional to ω_e v_q, hence even in speed",
+    tests=("torque_map", "drive"),
+    experiment="constant speeds in both senses, at two speeds at least",
+    reference="Bae & Sul, IEEE Trans. Ind. Appl. 39 (2003), time delay of digital control",
+    parameters=(Parameter("delay_s", "s", 0.5, 0.02, "period_s", low=-5.0, high=5.0),),
+    signals=("vd_v", "vq_v"),
+    rivals={
+        "angle_offset": "both rotation senses: a delay is even in speed, an angle odd",
+        "current_delay": "current steps at standstill",
+    },
+    voltage=_voltage,
+)

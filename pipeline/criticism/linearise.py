@@ -1,0 +1,333 @@
+"""Weak residuals and their columns: one model against all segments, whitened by sensor noise.
+
+Each segment is projected once for all parameters together; what remains of it is its Gram matrix
+a group of (channel, order), so that any subset of effects or captures is then small algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Effect, Operating, Values
+from pipeline.criticism.model import (
+    BASE,
+    Model,
+    Pieces,
+    effect_flux,
+    evaluate,
+    values_of,
+)
+from pipeline.criticism.residuals import RIPPLES, measured, operate, predicted, residual
+from pipeline.criticism.segments import Segment
+
+_CHUNK = 32
+_REPLICATES = 2
+_POOLED = 128
+_ALLOWANCE = 5e-5
+_OFFSET = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One direction of the parameter space: a base constant, or a parameter of an effect.
+
+    `at` fixes the effect's shape parameters while its amplitudes are zero.
+    """
+
+    name: str
+    step: float
+    effect: Effect | None = None
+    at: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Weak samples of one segment: residual [R] and columns [R, P], both over the noise.
+
+    `group` [R] numbers (channel, order) pairs listed in `groups`; `window` [R] the window.
+    """
+
+    residual: Array
+    columns: Array
+    group: NDArray[np.int64]
+    window: NDArray[np.int64]
+    groups: tuple[tuple[str, int], ...]
+
+
+def projected(segment: Segment, sampled: Array) -> Array:
+    """Weak samples [C, W, M] of sampled channels [C, n]; a table is its own projection."""
+    if segment.weak is None:
+        return sampled[:, :, None]
+    return segment.weak.project(sampled)
+
+
+def row_index(
+    segment: Segment,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], tuple[tuple[str, int], ...]]:
+    """Group and window of every weak sample [C, W, M], which are valid, and the group names."""
+    weak = segment.weak
+    orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
+    windows = segment.size if weak is None else weak.starts.size
+    valid = np.ones((windows, 1), dtype=bool) if weak is None else weak.valid
+    distinct = sorted(set(orders.tolist()))
+    groups = tuple((c, k) for c in segment.channels for k in distinct)
+    number = {group: n for n, group in enumerate(groups)}
+    shape = (len(segment.channels), windows, orders.size)
+    table = np.array([[number[(c, k)] for k in orders.tolist()] for c in segment.channels])
+    group = np.broadcast_to(table[:, None, :], shape)
+    window = np.broadcast_to(np.arange(windows)[None, :, None], shape)
+    return group, window, np.broadcast_to(valid[None], shape), groups
+
+
+def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
+    """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
+
+    White noise of each sensor's own level is added to the recording and the residual computed
+    again; the variance of the change is pooled over windows of one (channel, order).
+    """
+    group, _, valid, groups = row_index(segment)
+    plain = projected(segment, residual(segment, model, values))
+    total, count = np.zeros(len(groups)), np.zeros(len(groups))
+    wanted = _POOLED // max(int(valid.sum()) // max(len(groups), 1), 1)
+    for replicate in range(min(max(wanted, _REPLICATES), _POOLED)):
+        generator = np.random.default_rng([seed, replicate])
+        noisy = {
+            name: column + generator.normal(0.0, segment.noise.get(name, 0.0), column.size)
+            for name, column in segment.recorded.items()
+        }
+        change = projected(segment, residual(segment, model, values, noisy)) - plain
+        np.add.at(total, group[valid], change[valid] ** 2)
+        np.add.at(count, group[valid], 1.0)
+    return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
+
+
+def linearise(
+    segment: Segment, model: Model, values: Values, columns: Sequence[Column], sigma: Array
+) -> Rows:
+    """Whitened residual and columns of one segment at `values`."""
+    group, window, valid, groups = row_index(segment)
+    here = residual(segment, model, values)
+    whiten = 1.0 / np.hypot(sigma[group[valid]], reading_error(segment, model, values)[valid])
+    kept = np.zeros((int(valid.sum()), len(columns)))
+    pending: list[tuple[int, Array]] = []
+
+    def flush() -> None:
+        if pending:
+            stacked = np.concatenate([change for _, change in pending])
+            weak = projected(segment, stacked).reshape(len(pending), *valid.shape)
+            for (place, _), projection in zip(pending, weak, strict=True):
+                kept[:, place] = projection[valid] * whiten
+            pending.clear()
+
+    sampler = _Sampler(segment, model, dict(values), here)
+    for place, column in enumerate(columns):
+        change = sampler.change(column)
+        if change is not None:
+            pending.append((place, change))
+        if len(pending) >= _CHUNK:
+            flush()
+    flush()
+    both = np.column_stack([projected(segment, here)[valid] * whiten, kept])
+    for offset in _offsets(segment, valid, whiten):
+        both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
+    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], groups)
+
+
+def reading_error(segment: Segment, model: Model, values: Values) -> Array:
+    """What no sensor is linear to, 5e-5 of the reading in a window, as weak samples [C, W, M].
+
+    It counts in the plain windows: an error of the reading turns up there, not at an order.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros((len(segment.channels), segment.size, 1))
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+    sizes = []
+    for channel in segment.channels:
+        if channel == "torque_shaft_nm" and segment.kind == "dq":
+            sizes.append(kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"]))
+        elif channel in ("vd_v", "vq_v"):
+            names = ("vd_v", "vq_v") if segment.kind == "dq" else ("vab_v", "vbc_v")
+            present = [segment.recorded[n] for n in names if n in segment.recorded]
+            sizes.append(np.sqrt(sum(column**2 for column in present)))
+        else:
+            sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
+    error = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
+    error[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
+    return error
+
+
+def _offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
+    """Whitened weak samples of an offset of each channel's sensor, of its prior size."""
+    if segment.weak is None:
+        return []
+    made = []
+    for place, channel in enumerate(segment.channels):
+        names = ("vab_v",) if segment.kind == "open" else (channel,)
+        prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
+        if segment.kind == "open" or prior == 0.0:
+            continue
+        constant = np.zeros((len(segment.channels), segment.size))
+        constant[place] = prior
+        made.append(projected(segment, constant)[valid] * whiten)
+    return made
+
+
+def _absorbed(power: float) -> float:
+    """Weight c of x − c n (n·x) that whitens 1 + n nᵀ along n, |n|² = power."""
+    return (1.0 - 1.0 / np.sqrt(1.0 + power)) / max(power, 1e-300)
+
+
+_VOLTAGE_BASE = (
+    "r_ohm",
+    "ld_h",
+    "lq_h",
+    "ripple_slope",
+    "ripple_mean",
+    "ripple_edge",
+    "ripple_shift",
+    "ripple_torque",
+)
+_NEEDS: dict[str, tuple[str, ...]] = {
+    "dq": (*_VOLTAGE_BASE, "psi_wb", "j_kgm2", "b_nm_s_rad"),
+    "shaft": ("j_kgm2", "b_nm_s_rad"),
+    "open": ("psi_wb", "bench_angle_rad"),
+    "terminal": ("r_ohm", "ld_h", "lq_h"),
+    "lcr": ("r_ohm", "ld_h", "lq_h"),
+    "flux_map": ("ld_h", "lq_h", "psi_wb"),
+}
+
+
+class _Sampler:
+    """Sampled change of a segment's residual along columns; hooks are linear, sensors are not."""
+
+    def __init__(
+        self, segment: Segment, model: Model, values: dict[str, float], here: Array
+    ) -> None:
+        self.segment, self.model, self.values, self.here = segment, model, values, here
+        self.x = operate(segment, segment.recorded, model, values)
+        pieces = evaluate(model, self.x, values)
+        self.start = predicted(segment, self.x, pieces, model, values)
+        # a hook's own column does without the small terms between samples
+        self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES, 0.0)}
+
+    def change(self, column: Column) -> Array | None:
+        """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
+        if column.effect is None:
+            return self._base(column)
+        if self.segment.kind == "lcr" or column.effect.hook == "sensor":
+            return self._anew(column)
+        return self._hook(column, column.effect)
+
+    def _base(self, column: Column) -> Array | None:
+        if column.name not in _NEEDS[self.segment.kind]:
+            return None
+        moved = {**self.values, column.name: self.values[column.name] + column.step}
+        if column.name == "bench_angle_rad":
+            there = measured(self.segment, self.segment.recorded, self.model, moved)
+            start = measured(self.segment, self.segment.recorded, self.model, self.values)
+            return (there - start) / column.step
+        x = replace(self.x, base=moved)
+        there = predicted(self.segment, x, evaluate(self.model, x, moved), self.model, moved)
+        return -(there - self.start) / column.step
+
+    def _anew(self, column: Column) -> Array | None:
+        model, start = self._with(column)
+        moved = {**start, column.name: start[column.name] + column.step}
+        if not self._concerns(column.effect):
+            return None
+        there = residual(self.segment, model, moved)
+        change: Array = (there - self.here) / column.step
+        return change if np.any(change) else None
+
+    def _concerns(self, effect: Effect | None) -> bool:
+        kind = self.segment.kind
+        if effect is None or kind == "flux_map":
+            return effect is None or effect.current is not None
+        if effect.angle is not None:
+            return kind in ("dq", "open", "shaft")
+        if effect.current is not None:
+            return kind in ("dq", "terminal")
+        if effect.voltage is not None:
+            return kind in ("dq", "open", "terminal")
+        if effect.load is not None or effect.shaft is not None:
+            return "torque_shaft_nm" in self.segment.channels
+        return True
+
+    def _with(self, column: Column) -> tuple[Model, dict[str, float]]:
+        effect = column.effect
+        if effect is None or effect in self.model.effects:
+            return self.model, self.values
+        return self.model.with_effects(effect), {**self.values, **zero(effect, self.model, column)}
+
+    def _hook(self, column: Column, effect: Effect) -> Array | None:
+        if not self._listens(effect):
+            return None
+        _, start = self._with(column)
+        moved = {**start, column.name: start[column.name] + column.step}
+        change = self._pieces(effect, moved)
+        if effect in self.model.effects:
+            before = self._pieces(effect, start)
+            change = Pieces(
+                change.psi_wb - before.psi_wb,
+                change.slope_wb - before.slope_wb,
+                change.drop_v - before.drop_v,
+                change.drag_nm - before.drag_nm,
+            )
+        plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
+        there = predicted(self.segment, self.x, change, plain, self.quiet)
+        return -there / column.step if np.any(there) else None
+
+    def _listens(self, effect: Effect) -> bool:
+        kind = self.segment.kind
+        if effect.hook == "torque":
+            return len(self.segment.channels) > (2 if kind == "dq" else 0) and kind in (
+                "dq",
+                "shaft",
+            )
+        if effect.hook == "drop":
+            return kind in ("dq", "terminal")
+        return kind in ("dq", "open", "terminal", "flux_map")
+
+    def _pieces(self, effect: Effect, values: Values) -> Pieces:
+        q = values_of(effect, self.model.machine, values)
+        x: Operating = self.x
+        shape = x.omega_rad_s.shape
+        nothing = np.zeros(shape)
+        flux, slope = effect_flux(effect, x, q)
+        drop = nothing + 0j if effect.drop is None else effect.drop(x, q)
+        drag = nothing if effect.torque is None else effect.torque(x, q)
+        return Pieces(flux, slope, drop, drag)
+
+
+def zero(effect: Effect, model: Model, column: Column | None = None) -> dict[str, float]:
+    """Values of an effect that is not there: amplitudes zero, shapes at `column.at` or first."""
+    shapes = {} if column is None else dict(column.at)
+    found = {}
+    for p in effect.parameters_of(model.machine):
+        name = f"{effect.name}.{p.name}"
+        scale = model.machine.scale(p)
+        found[name] = 0.0 if p.amplitude else shapes.get(p.name, p.scan[0] * scale)
+    return found
+
+
+def base_columns(scales: Mapping[str, float]) -> list[Column]:
+    """One column a base constant, with the step of its finite difference."""
+    return [Column(c.name, 1e-3 * scales.get(c.name, 1.0)) for c in BASE]
+
+
+def effect_columns(
+    effect: Effect, model: Model, at: tuple[tuple[str, float], ...] = ()
+) -> list[Column]:
+    """One column a parameter: amplitudes, and shapes too once the effect is in the model."""
+    inside = effect in model.effects
+    made = []
+    for p in effect.parameters_of(model.machine):
+        if p.amplitude or inside:
+            step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
+            made.append(Column(f"{effect.name}.{p.name}", step, effect, at))
+    return made

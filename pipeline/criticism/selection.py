@@ -1,0 +1,287 @@
+"""Which effects the captures ask for: score, forward steps with refits, backward checks.
+
+References: [1] Rao, Math. Proc. Camb. Phil. Soc. 44 (1948), score test; [2] Schwarz, Ann. Stat.
+6 (1978), the price of a parameter; [3] Benjamini & Foster, Biometrika 109 (2022), price of a
+search over candidates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Effect, Machine, Parameter
+from pipeline.criticism.linearise import Column, effect_columns, zero
+from pipeline.criticism.segments import Segment
+from pipeline.criticism.system import (
+    Fitted,
+    System,
+    gauss_newton,
+    misfit_of,
+    own_columns,
+    system,
+)
+
+LEAST_SHARE = 0.1
+TIE = 12.0
+_MOST = 8
+_REFITS = 2
+_CLOSE = 0.7
+_WORTH = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An effect that is not in the model, its shape parameters at one of their trial values."""
+
+    effect: Effect
+    columns: tuple[Column, ...]
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a candidate would do, to first order.
+
+    `fall` is the fall of χ², `price` what its parameters and the search cost, `step` its own
+    parameters, `share` the part of the removable excess of the channel it helps most, `size` the
+    largest of its amplitudes over its negligible size.
+    """
+
+    candidate: Candidate
+    fall: float
+    price: float
+    step: Mapping[str, float]
+    share: float
+    size: float
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is worth its price, large enough to matter and helps enough."""
+        return self.fall > self.price and self.size >= 1.0 and self.share >= LEAST_SHARE
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One step of the ladder: the fit with these effects and every candidate's score on it."""
+
+    added: tuple[str, ...]
+    fitted: Fitted
+    around: System
+    scores: tuple[Score, ...]
+
+
+def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate, ...]:
+    """Every effect that is not in the model, once for each combination of trial shapes."""
+    model = fitted.model
+    found = []
+    for effect in library.values():
+        if effect in model.effects:
+            continue
+        shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
+        grids = [[(p.name, v * model.machine.scale(p)) for v in p.scan] for p in shapes]
+        for at in product(*grids):
+            columns = tuple(effect_columns(effect, model, at))
+            start = zero(effect, model)
+            start.update({f"{effect.name}.{name}": value for name, value in at})
+            found.append(Candidate(effect, columns, start))
+    return tuple(found)
+
+
+def widened(segments: Sequence[Segment], fitted: Fitted, offered: Sequence[Candidate]) -> System:
+    """The system around a fit with the candidates' columns behind its own, in order."""
+    return system(segments, fitted, [c for candidate in offered for c in candidate.columns])
+
+
+def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> tuple[Score, ...]:
+    """Every candidate's score, the best fall first; of one effect the best shape only."""
+    own = np.arange(len(own_columns(fitted.model)))
+    own_step, _, _ = around.solve(own)
+    before = around.groups_after(own, own_step)
+    price = math.log(float(around.count))
+    search_price = 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
+    best: dict[str, Score] = {}
+    first = own.size
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        score = _score(around, fitted, own, places, candidate, before)
+        known = best.get(candidate.effect.name)
+        if score is not None and (known is None or score.fall > known.fall):
+            dof = len(candidate.effect.parameters_of(fitted.model.machine))
+            best[candidate.effect.name] = replace(score, price=dof * price + search_price)
+    return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
+
+
+def _score(
+    around: System,
+    fitted: Fitted,
+    own: NDArray[np.int64],
+    places: NDArray[np.int64],
+    candidate: Candidate,
+    before: Sequence[Array],
+) -> Score | None:
+    """Score of one candidate with parameters on the wrong side of a bound left at zero."""
+    machine = fitted.model.machine
+    known = {
+        f"{candidate.effect.name}.{p.name}": (p, machine.scale(p))
+        for p in candidate.effect.parameters_of(machine)
+    }
+    live = places
+    while live.size:
+        step, _, _ = around.solve(np.concatenate([own, live]))
+        mine = dict(zip((around.columns[n].name for n in live), step[own.size :], strict=True))
+        wrong = [
+            n
+            for n in live
+            if _outside(mine[around.columns[n].name], known[around.columns[n].name][0])
+        ]
+        if not wrong:
+            break
+        live = np.array([n for n in live if n not in wrong], dtype=int)
+    if live.size == 0:
+        return None
+    sizes = [
+        abs(value) / (known[name][0].negligible * known[name][1])
+        for name, value in mine.items()
+        if known[name][0].negligible > 0
+    ]
+    after = around.groups_after(np.concatenate([own, live]), step)
+    fall = misfit_of(around.rows, before) - misfit_of(around.rows, after)
+    share = _share(around, before, after)
+    return Score(candidate, fall, 0.0, mine, share, max(sizes, default=math.inf))
+
+
+def _outside(value: float, parameter: Parameter) -> bool:
+    return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
+
+
+def _share(around: System, before: Sequence[Array], after: Sequence[Array]) -> float:
+    """Largest share, over recorded signals, of the removable misfit that went away."""
+    had: dict[str, float] = {}
+    gone: dict[str, float] = {}
+    for rows, old, new in zip(around.rows, before, after, strict=True):
+        n = np.bincount(rows.group, minlength=len(rows.groups))
+        excess, left = np.log(np.maximum(old, 1.0)), np.log(np.maximum(new, 1.0))
+        for place, (channel, _) in enumerate(rows.groups):
+            had[channel] = had.get(channel, 0.0) + n[place] * excess[place]
+            gone[channel] = gone.get(channel, 0.0) + n[place] * (excess[place] - left[place])
+    return max((gone[c] / had[c] for c in had if had[c] > _WORTH), default=0.0)
+
+
+def search(
+    segments: Sequence[Segment], fitted: Fitted, around: System, library: Mapping[str, Effect]
+) -> tuple[Rung, ...]:
+    """The ladder: adds the best effect, refits, checks backwards, until nothing passes."""
+    rungs: list[Rung] = []
+    base = len(fitted.model.effects)
+    refused: set[str] = set()
+    for _ in range(_MOST):
+        offered = candidates(library, fitted)
+        wide = widened(segments, fitted, offered)
+        scores = score_all(wide, fitted, offered)
+        added = tuple(e.name for e in fitted.model.effects[base:])
+        rungs.append(Rung(added, fitted, wide, scores))
+        passing = [s for s in scores if s.passes and s.candidate.effect.name not in refused]
+        if not passing:
+            break
+        chosen = _refit_best(segments, fitted, passing)
+        if chosen is None:
+            refused |= {s.candidate.effect.name for s in passing[:_REFITS]}
+            continue
+        fitted, _ = _backward(segments, *chosen, base)
+        now = tuple(e.name for e in fitted.model.effects[base:])
+        if now in {r.added for r in rungs}:
+            break
+    return tuple(rungs)
+
+
+def _refit_best(
+    segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score]
+) -> tuple[Fitted, System] | None:
+    """Refits with the best candidates, those close to the best fall, and takes the best."""
+    close = [s for s in passing[:_REFITS] if s.fall >= _CLOSE * passing[0].fall]
+    best: tuple[Fitted, System] | None = None
+    for score in close:
+        model = fitted.model.with_effects(score.candidate.effect)
+        values = {**fitted.values, **score.candidate.values, **score.step}
+        tried = gauss_newton(segments, replace(fitted, model=model, values=values))
+        if not material(tried[0], score.candidate.effect):
+            continue
+        if best is None or tried[1].misfit < best[1].misfit:
+            best = tried
+    return best
+
+
+def material(fitted: Fitted, effect: Effect) -> bool:
+    """Whether some amplitude of an effect is over its negligible size."""
+    return size_of(fitted, effect, "negligible") >= 1.0
+
+
+def size_of(fitted: Fitted, effect: Effect, unit: str) -> float:
+    """The largest amplitude of an effect over its `negligible` or `typical` size."""
+    machine: Machine = fitted.model.machine
+    sizes = [
+        abs(fitted.values[f"{effect.name}.{p.name}"]) / (getattr(p, unit) * machine.scale(p))
+        for p in effect.parameters_of(machine)
+        if p.amplitude and getattr(p, unit) > 0
+    ]
+    return max(sizes, default=0.0)
+
+
+def _backward(
+    segments: Sequence[Segment], fitted: Fitted, around: System, base: int
+) -> tuple[Fitted, System]:
+    """Takes out effects that later ones have made superfluous."""
+    for effect in fitted.model.effects[base:-1]:
+        price = len(effect.parameters_of(fitted.model.machine)) * math.log(around.count)
+        if material(fitted, effect) and loss_without(around, fitted, (effect.name,)) > 4 * price:
+            continue
+        kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{effect.name}.")}
+        model = fitted.model.without(effect.name)
+        tried = gauss_newton(segments, replace(fitted, model=model, values=kept))
+        if tried[1].misfit - around.misfit < price:
+            fitted, around = tried
+    return fitted, around
+
+
+def loss_without(
+    around: System, fitted: Fitted, names: Iterable[str], instead: NDArray[np.int64] | None = None
+) -> float:
+    """Rise of χ² when effects go to zero amplitude and the rest, with `instead`, refits.
+
+    To second order around the fit.
+    """
+    gone = tuple(f"{name}." for name in names)
+    own = np.arange(len(own_columns(fitted.model)))
+    out = np.array([n for n in own if around.columns[n].name.startswith(gone)], dtype=int)
+    stay = np.array([n for n in own if n not in set(out.tolist())], dtype=int)
+    if instead is not None:
+        stay = np.concatenate([stay, instead])
+    machine = fitted.model.machine
+    amplitude = {
+        f"{e.name}.{p.name}": p.amplitude
+        for e in fitted.model.effects
+        for p in e.parameters_of(machine)
+    }
+    move = np.array(
+        [
+            -fitted.values[around.columns[n].name] if amplitude[around.columns[n].name] else 0.0
+            for n in out
+        ]
+    )
+    gram, slope = around.gram.sum(axis=0), around.slope.sum(axis=0) + around.pull
+    jump = 2 * slope[out] @ move + move @ gram[np.ix_(out, out)] @ move
+    normal = gram[np.ix_(stay, stay)] + np.diag(around.penalty[stay])
+    right = slope[stay] + gram[np.ix_(stay, out)] @ move
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    power, axes = np.linalg.eigh(normal / np.outer(scale, scale))
+    good = power > 1e-11 * max(float(power[-1]), 1.0)
+    along = (axes[:, good].T @ (right / scale)) ** 2 / power[good]
+    _, already, _ = around.solve(own)
+    return float(jump - along.sum() + already)

@@ -1,0 +1,134 @@
+"""How large the machine is: what the captures say before any fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Machine
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+
+_TRACED = ("torque_map", "drive", "heat_run")
+
+
+def machine_of(campaign: Campaign, start: Constants) -> Machine:
+    """Pole pairs, slots and scales of the motor on the bench.
+
+    Pole pairs come from the back-EMF against the angle, else from `start`, else the nameplate.
+    """
+    pole_pairs = pole_pairs_of(campaign, start)
+    slots = campaign.nameplate("slots")
+    logs = campaign.of(*_TRACED)
+    current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, ("ia_a", "ib_a"))
+    voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, ("vab_v",))
+    speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
+    current, voltage = current or 1.0, voltage or 1.0
+    psi = voltage / (pole_pairs * speed)
+    known = start.best("psi_pm_wb")
+    psi = known.number if known is not None else psi
+    period = min((_period(c) for c in logs), default=1e-4)
+    scales = {
+        "current_a": current,
+        "voltage_v": voltage,
+        "speed_rad_s": speed,
+        "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
+        "torque_nm": 1.5 * pole_pairs * psi * current,
+        "period_s": period,
+        "period_s2": period**2,
+        "flux_wb": psi,
+    }
+    orders = torque_orders(campaign.of("cogging"))
+    return Machine(pole_pairs, int(str(slots)) if slots else None, scales, orders)
+
+
+def base_scales(machine: Machine) -> dict[str, float]:
+    """Order of magnitude [unit of the name] of every base constant."""
+    s = machine.scales
+    impedance = s["voltage_v"] / s["current_a"]
+    return {
+        "r_ohm": impedance,
+        "ld_h": s["flux_wb"] / s["current_a"],
+        "lq_h": s["flux_wb"] / s["current_a"],
+        "psi_wb": s["flux_wb"],
+        "j_kgm2": s["torque_nm"] / s["speed_rad_s"] * 0.1,
+        "b_nm_s_rad": 0.1 * s["torque_nm"] / s["speed_rad_s"],
+    }
+
+
+def pole_pairs_of(campaign: Campaign, start: Constants) -> int:
+    """Electrical cycles a turn, counted in an open-circuit spin where there is one."""
+    for capture in campaign.of("open_circuit"):
+        if capture.has("vab_v", "vbc_v", "theta_mech_rad"):
+            found = capture.arrays("vab_v", "vbc_v", "theta_mech_rad")
+            plane = (2 * found["vab_v"] + found["vbc_v"]) / 3 + 1j * found["vbc_v"] / math.sqrt(3)
+            turned = np.ptp(np.unwrap(np.angle(plane)))
+            ratio = float(turned / np.ptp(found["theta_mech_rad"]))
+            if ratio > 0.5 and abs(ratio - round(ratio)) < 0.02:
+                return round(ratio)
+    known = start.best("pole_pairs")
+    if known is not None:
+        return round(known.number)
+    stated = campaign.nameplate("pole_pairs")
+    return int(str(stated)) if stated else 1
+
+
+def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:
+    top = 0.0
+    for capture in captures:
+        for name in names:
+            if capture.has(name):
+                top = max(top, float(np.nanquantile(np.abs(capture.arrays(name)[name]), 0.999)))
+    return top
+
+
+def _speed(capture: Capture) -> float:
+    for name in ("omega_mech_rad_s", "theta_mech_rad"):
+        if capture.has("t_s", name):
+            found = capture.arrays("t_s", name)
+            signal = found[name]
+            if name == "theta_mech_rad":
+                signal = np.gradient(signal, found["t_s"])
+            return float(np.nanquantile(np.abs(signal), 0.999))
+    return 0.0
+
+
+def _period(capture: Capture) -> float:
+    return float(np.median(np.diff(capture.arrays("t_s")["t_s"])))
+
+
+def torque_orders(captures: Iterable[Capture], highest: int = 400) -> tuple[int, ...]:
+    """Orders a turn that stand out of every slow turn's torque spectrum.
+
+    The torque is averaged in even bins of angle over whole turns; an order counts where its
+    amplitude is 6 times the spectrum's median (of a Rayleigh floor 1e-7 of orders pass that), in
+    every capture of at least one turn.
+    """
+    found: set[int] | None = None
+    for capture in captures:
+        if not capture.has("theta_mech_rad", "torque_shaft_nm"):
+            continue
+        signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
+        here = _standing_out(signals["theta_mech_rad"], signals["torque_shaft_nm"], highest)
+        if here is not None:
+            found = here if found is None else found & here
+    return tuple(sorted(found or ()))
+
+
+def _standing_out(theta: Array, torque: Array, highest: int) -> set[int] | None:
+    turns = int(np.ptp(theta) / (2 * math.pi))
+    if turns < 1:
+        return None
+    bins = 4 * highest
+    place = np.floor((theta - theta.min()) / (2 * math.pi) * bins).astype(np.int64)
+    inside = place < turns * bins
+    place = place[inside] % bins
+    count = np.bincount(place, minlength=bins)
+    if (count == 0).any():
+        return None
+    mean = np.bincount(place, torque[inside], minlength=bins) / count
+    spectrum = np.abs(np.fft.rfft(mean))[1 : highest + 1]
+    floor = float(np.median(spectrum))
+    return {int(k) + 1 for k in np.flatnonzero(spectrum > 6.0 * floor)}

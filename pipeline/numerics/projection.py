@@ -1,0 +1,114 @@
+"""Projection of sampled residuals on smooth windows times harmonics of the shaft angle.
+
+Test functions that vanish smoothly at both ends move time derivatives off the noisy signal
+without taking any, and the harmonics tell at which order of the shaft an error sits.
+
+References: [1] Messenger & Bortz, J. Comput. Phys. 443 (2021) 110525, section 3: test functions
+(1 − u²)^p.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """Test functions over one clock.
+
+    `starts` [W] are first samples of the windows, `functions` [W, M, N] the test functions, of
+    unit sum of squares each; `orders` [M] the order a turn of each function, 0 for the plain
+    window; `valid` [W, M] where a window holds enough cycles of the order and enough samples a
+    cycle.
+    """
+
+    starts: NDArray[np.int64]
+    functions: Array
+    orders: NDArray[np.int64]
+    valid: NDArray[np.bool_]
+
+    @property
+    def length(self) -> int:
+        """Samples a window."""
+        return int(self.functions.shape[2])
+
+    def project(self, residuals: Array) -> Array:
+        """Weak residuals [C, W, M] of sampled ones [C, n]."""
+        windows = sliding_window_view(residuals, self.length, axis=1)[:, self.starts, :]
+        by_window = np.ascontiguousarray(windows.transpose(1, 2, 0))
+        projected: Array = np.matmul(self.functions, by_window).transpose(2, 0, 1)
+        return projected
+
+    def means(self, signals: Array) -> Array:
+        """Window means [C, W] of signals [C, n], weighted with the plain window."""
+        plain = self.functions[:, :1, :]
+        weights = plain / plain.sum(axis=2, keepdims=True)
+        windows = sliding_window_view(signals, self.length, axis=1)[:, self.starts, :]
+        averaged: Array = np.matmul(weights, windows.transpose(1, 2, 0))[:, 0, :].T
+        return averaged
+
+    def only(self, windows: NDArray[np.bool_]) -> Projection:
+        """The same test functions in some of the windows [W]."""
+        return Projection(
+            self.starts[windows], self.functions[windows], self.orders, self.valid[windows]
+        )
+
+
+def bump(length: int) -> Array:
+    """The window (1 − u²)⁴ [length], u from −1 to 1 at the centres of equal cells."""
+    u = (2.0 * np.arange(length) + 1.0) / length - 1.0
+    window: Array = (1.0 - u * u) ** 4
+    return window
+
+
+def window_starts(
+    keep: NDArray[np.bool_], length: int, hop: int | None = None, most: int | None = None
+) -> NDArray[np.int64]:
+    """First samples [W] of the windows that hold usable samples only, one every `hop`.
+
+    `hop` is half a window unless told; of more than `most` windows an even selection stays.
+    """
+    starts = np.arange(0, max(keep.size - length, -1) + 1, hop or max(length // 2, 1))
+    missing = np.concatenate([[0], np.cumsum(~keep)])
+    starts = starts[missing[starts + length] == missing[starts]]
+    if most is not None and starts.size > most:
+        starts = starts[np.linspace(0, starts.size - 1, most).round().astype(np.int64)]
+    return starts
+
+
+def projection(
+    theta_rad: Array,
+    starts: NDArray[np.int64],
+    length: int,
+    orders: tuple[int, ...],
+    cycles: float = 3.0,
+    margin: float = 16.0,
+) -> Projection:
+    """Windows of `length` samples from `starts` [W], times {1, cos kθ, sin kθ}.
+
+    theta_rad [n] is the shaft angle. An order counts in windows that hold `cycles` of it with at
+    least `margin` samples each; an order that counts in none is left out.
+    """
+    window = bump(length)
+    tags, functions = [0], [np.broadcast_to(window, (starts.size, length))]
+    angle = sliding_window_view(theta_rad, length)[starts] if starts.size else np.empty((0, length))
+    turns = np.abs(angle[:, -1] - angle[:, 0]) / (2 * np.pi)
+    valid = [np.ones(starts.size, dtype=bool)]
+    for order in orders:
+        held = turns * order
+        enough = (held >= cycles) & (held * margin <= length)
+        if not enough.any():
+            continue
+        for wave in (np.cos(order * angle), np.sin(order * angle)):
+            tags.append(order)
+            functions.append(window * wave)
+            valid.append(enough)
+    stacked = np.stack(functions, axis=1)
+    stacked /= np.sqrt((stacked**2).sum(axis=2, keepdims=True))
+    return Projection(starts, stacked, np.array(tags), np.stack(valid, axis=1))
