@@ -21,6 +21,7 @@ BUMPS = (0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.16)
 MOST_NUISANCES = 14
 MATERIAL = 0.02
 DIP = 0.05
+ENOUGH_COASTING = 12
 
 
 def _hat(index: int) -> Callable[[Array], Array]:
@@ -169,9 +170,16 @@ def _form_fails(
 ) -> bool:
     """Whether a free drag curve explains the rows better, beyond chance and beyond `MATERIAL`.
 
-    Chance by F with correlation counted; what a free curve moves drag by must also be more than
-    `MATERIAL` of the drag itself (rms over the rows), as coast-downs see a millionth of it.
+    Coast-downs show drag alone, so where there are enough of them they decide: the form fails if
+    it leaves more than `MATERIAL` of their deceleration (they see a millionth of it). Else chance
+    is judged by F with correlation counted, and a free curve must also move the drag by more than
+    `MATERIAL` of itself (rms over the rows).
     """
+    coasting = rows.kind == COAST
+    if np.count_nonzero(coasting) >= ENOUGH_COASTING:
+        straight_fit = linear_fit(design, y, _balanced(rows, design, y))
+        left = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
+        return bool(left > MATERIAL * np.sqrt(np.mean(y[coasting] ** 2)))
     sigma = _balanced(rows, curve, y)
     loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
     costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]

@@ -86,7 +86,8 @@ class PointTable:
 def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> PointTable:
     """Settled points of the captures; transients after each step of current or torque are left out.
 
-    A stretch is settled where i_d, i_q and the torque all are. It is cut to whole turns, or to
+    A stretch is settled where i_d, i_q and the torque all are; where the torque never is (it rings
+    on in a soft coupling), the currents decide. It is cut to whole turns, or to
     whole electrical cycles where that would cost too much, so that ripple averages out.
     """
     found: list[Point] = []
@@ -97,7 +98,9 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         total += n
         if n < LEAST_ROWS:
             continue
-        for rows in _settled(data):
+        for rows in _settled(data, ("id_a", "iq_a", "torque_shaft_nm")) or _settled(
+            data, ("id_a", "iq_a")
+        ):
             kept = _whole_cycles(rows, data, pole_pairs)
             found.append(_point(capture, data, kept))
     groups: list[float] = []
@@ -139,12 +142,12 @@ def _columns(capture: Capture) -> dict[str, Array]:
     return {name: column[ok] for name, column in data.items()}
 
 
-def _settled(data: Mapping[str, Array]) -> list[slice]:
-    """Rows after each step, less twice the time that the step took to settle within TOLERANCE."""
+def _settled(data: Mapping[str, Array], names: Sequence[str]) -> list[slice]:
+    """Rows after each step of these columns, less twice the time that the step took to settle."""
     size = data["iq_a"].size
     flags = np.ones(size, dtype=bool)
     edges = {0, size}
-    for name in ("id_a", "iq_a", "torque_shaft_nm"):
+    for name in names:
         if not np.all(np.isfinite(data[name])):
             continue
         inside = np.zeros(size, dtype=bool)
@@ -158,14 +161,14 @@ def _settled(data: Mapping[str, Array]) -> list[slice]:
             continue
         start = a + min(a - last, (b - a) // 2)
         last = b
-        if b - start >= LEAST_ROWS and _steady(data, slice(start, b)):
+        if b - start >= LEAST_ROWS and _steady(data, slice(start, b), names):
             found.append(slice(start, b))
     return found
 
 
-def _steady(data: Mapping[str, Array], rows: slice) -> bool:
+def _steady(data: Mapping[str, Array], rows: slice, names: Sequence[str]) -> bool:
     """Whether the halves of a stretch agree to 2 % of the signal's span, or to its noise."""
-    for name in ("id_a", "iq_a", "torque_shaft_nm"):
+    for name in names:
         signal, part = data[name], data[name][rows]
         if not np.all(np.isfinite(signal)):
             continue

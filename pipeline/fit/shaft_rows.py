@@ -82,11 +82,13 @@ def shaft_rows(
     captures: Sequence[Capture],
     speed_functions: Mapping[str, SpeedFunction],
     cogging_orders: Sequence[int] = (),
+    ripple_orders: Sequence[int] = (),
 ) -> ShaftRows | None:
     """Rows of drive and spin_down captures, or None where none can be made.
 
     `speed_functions` are functions of speed over the fastest, f(w / w_max) [n], whose window
-    means become columns.
+    means become columns. `cogging_orders` and `ripple_orders` [per mechanical turn] make columns of
+    torque against angle, the latter in proportion to q current.
     Windows in which the shaft all but stands (friction undetermined), and those of a coast-down in
     which it is still being driven, are dropped and counted.
     """
@@ -95,7 +97,8 @@ def shaft_rows(
         return None
     fastest = max(float(np.max(np.abs(part.speed))) for part in parts)
     pieces = [
-        _rows(i, part, fastest, speed_functions, cogging_orders) for i, part in enumerate(parts)
+        _rows(i, part, fastest, speed_functions, cogging_orders, ripple_orders)
+        for i, part in enumerate(parts)
     ]
     joined = {name: np.concatenate([piece[name] for piece, _ in pieces]) for name in pieces[0][0]}
     rows = ShaftRows(
@@ -173,6 +176,7 @@ def _rows(
     fastest: float,
     speed_functions: Mapping[str, SpeedFunction],
     cogging_orders: Sequence[int],
+    ripple_orders: Sequence[int],
 ) -> tuple[dict[str, Array], int]:
     weak, theta, speed = part.weak, part.theta, part.speed
     ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
@@ -215,6 +219,10 @@ def _rows(
         ripple = np.exp(1j * order * theta)
         found[f"order {order} cos"] = weak.integral(ripple.real)
         found[f"order {order} sin"] = weak.integral(ripple.imag)
+    for order in ripple_orders:
+        ripple = part.current * np.exp(1j * order * theta)
+        found[f"order {order} q current cos"] = weak.integral(ripple.real)
+        found[f"order {order} q current sin"] = weak.integral(ripple.imag)
     for name, function in speed_functions.items():
         found[name] = weak.integral(function(speed / fastest))
     return {name: column[~slow] for name, column in found.items()}, int(slow.sum())

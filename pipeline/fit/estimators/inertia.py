@@ -18,6 +18,7 @@ from pipeline.fit.instruments import (
     torque_source,
     unstated_note,
 )
+from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.fit.torque_constant import USES, torque_constant
@@ -67,8 +68,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """
     torque = _torque(known)
     captures = campaign.of("drive", "spin_down")
-    orders = _cogging_orders(known)
-    rows = shaft_rows(captures, DRAG_FORMS, orders) if torque is not None else None
+    orders, ripple = _orders(known, campaign)
+    rows = shaft_rows(captures, DRAG_FORMS, orders, ripple) if torque is not None else None
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
         note = f"{missing}; {EXPERIMENT}"
@@ -104,9 +105,12 @@ def _torque(known: Constants) -> Torque | None:
     return Torque(kt.number, kt.budget, 0.0, (), magnet, f"{words}, reluctance torque unknown")
 
 
-def _cogging_orders(known: Constants) -> tuple[int, ...]:
+def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Orders a turn of cogging, and of the torque ripple that six-fold back-EMF harmonics make."""
     order = known.best("cogging_order")
-    return () if order is None else (round(order.number),)
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    cogging = () if order is None else (round(order.number),)
+    return cogging, () if pairs is None else (6 * pairs,)
 
 
 def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> Array:
@@ -166,6 +170,7 @@ def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimat
 
 def _note(rows: ShaftRows, torque: Torque, found: DragFit) -> str:
     words = [torque.words, drag_words(found)]
+    words.append("iron loss under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")
