@@ -42,7 +42,7 @@ $(READY): requirements.lock
 lock:
 	uv pip compile pyproject.toml --group dev --universal --python-version 3.11 \
 	  --fork-strategy fewest --generate-hashes --no-annotate --no-header \
-	  --no-emit-index-url --no-emit-find-links --output-file requirements.lock --quiet
+	  --output-file requirements.lock --quiet
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
