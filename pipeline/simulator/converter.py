@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.simulator.field import SQRT3, current, magnet, stiffness, torque_of
+from pipeline.simulator.field import SQRT3, current, magnet, torque_of
 from pipeline.simulator.motion import bristle_after, coupling, extra, heat, passive
 from pipeline.simulator.plant import Plant
 
@@ -366,62 +366,4 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
         newest = run_on(y, work, volt, want, warm, rest, history, newest, c, p)
         volt = ahead
         warm = heat(warm[0], warm[1], (work[1] - copper) / c.period_s, c.ambient, c.period_s, p)
-    return out
-
-
-@njit(cache=True)
-def pair_step(
-    source: Array,
-    step_s: float,
-    substeps: int,
-    pair: tuple[float, float, float],
-    source_ohm: float,
-    eps: float,
-    t_w: float,
-    t_m: float,
-    p: Plant,
-) -> Array:
-    """Voltage and current [n, 2] of one terminal pair, rotor locked at eps, third open.
-
-    `source` [n + 1] is the open voltage of the supply, linear between its points except that a
-    jump of more than half its largest value is an edge on the later point. `pair` holds the
-    current direction in alpha and beta and the pair's resistance at 25 degC. The state is the
-    flux vector; the open terminal's voltage is what keeps its current zero.
-    """
-    count = source.size - 1
-    out = np.empty((count, 2))
-    w_alpha, w_beta, ohm = pair
-    ohm *= resistance_rise(0.0, t_w, p)
-    c, s = math.cos(eps), math.sin(eps)
-    w_d, w_q = c * w_alpha + s * w_beta, c * w_beta - s * w_alpha
-    d, q, _, _ = magnet(eps, t_m, p)
-    edge = 0.5 * np.max(np.abs(source))
-    h = step_s / substeps
-    y = np.empty(2)
-    k1 = np.empty((4, 2))
-    for n in range(count):
-        i_d, i_q, _ = current(d, q, eps, t_m, p)
-        i = 0.75 * (w_d * i_d + w_q * i_q)
-        out[n, 0], out[n, 1] = source[n] - source_ohm * i, i
-        slope = (source[n + 1] - source[n]) / step_s
-        if abs(source[n + 1] - source[n]) > edge:
-            slope = 0.0
-        for m in range(substeps):
-            for stage in range(4):
-                part = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                y[0], y[1] = d, q
-                if stage > 0:
-                    y[0] += part * h * k1[stage - 1, 0]
-                    y[1] += part * h * k1[stage - 1, 1]
-                i_d, i_q, _ = current(y[0], y[1], eps, t_m, p)
-                g_dd, g_qq, g_dq = stiffness(y[0], y[1], eps, t_m, p)
-                det = g_dd * g_qq - g_dq * g_dq
-                l_d = (g_qq * w_d - g_dq * w_q) / det
-                l_q = (g_dd * w_q - g_dq * w_d) / det
-                i = 0.75 * (w_d * i_d + w_q * i_q)
-                v = source[n] + slope * (m + part) * h
-                rate = (v - (ohm + source_ohm) * i) / (1.5 * (w_d * l_d + w_q * l_q))
-                k1[stage, 0], k1[stage, 1] = l_d * rate, l_q * rate
-            d += h * (k1[0, 0] + 2.0 * k1[1, 0] + 2.0 * k1[2, 0] + k1[3, 0]) / 6.0
-            q += h * (k1[0, 1] + 2.0 * k1[1, 1] + 2.0 * k1[2, 1] + k1[3, 1]) / 6.0
     return out

@@ -59,7 +59,7 @@ def control(
     """Controller tuned on the motor's nameplate, with the sensors that sit in its loop."""
     from pipeline.simulator.converter import Control
 
-    m, bench = session.motor, session.bench
+    m = session.motor
     steps = substeps(session, period_s, max(abs(omega), m.speed_rated_rad_s))
     width = 2.0 * math.pi / (25.0 * period_s)
     values: dict[str, float | int | bool] = {
@@ -79,24 +79,32 @@ def control(
         "ki_speed": 0.0,
         "i_limit": 1.2 * m.current_rated_a,
         "held_speed": True,
-        "lsb_current": session.current_step_a,
-        "delay_s": session.fault("current_delay"),
-        "angle_offset": session.fault("angle_offset") / m.pole_pairs,
-        "angle_wobble": session.fault("angle_eccentricity"),
-        "angle_wobble_phase": session.fault("angle_eccentricity", "phase_rad"),
-        "lsb_angle": 2.0 * math.pi / 2.0**bench.encoder_bits,
-        "speed_lag_s": bench.speed_lag_s,
         "ambient": m.ambient_degc,
         "temp_winding": warm[0],
         "temp_magnet": warm[1],
         "theta": float(session.rng.uniform(0.0, 2.0 * math.pi)),
         "omega": omega,
+        **_in_the_loop(session),
+    }
+    values.update(change)
+    return Control(**values)  # type: ignore[arg-type]
+
+
+def _in_the_loop(session: Session) -> dict[str, float]:
+    """Current sensors and encoder as the controller reads them, with their faults."""
+    values = {
+        "lsb_current": session.current_step_a,
+        "delay_s": session.fault("current_delay"),
+        "angle_offset": session.fault("angle_offset") / session.motor.pole_pairs,
+        "angle_wobble": session.fault("angle_eccentricity"),
+        "angle_wobble_phase": session.fault("angle_eccentricity", "phase_rad"),
+        "lsb_angle": 2.0 * math.pi / 2.0**session.bench.encoder_bits,
+        "speed_lag_s": session.bench.speed_lag_s,
     }
     for k, phase in enumerate("abc"):
         values[f"gain_{phase}"] = session.phase_gain(k)
         values[f"offset_{phase}"] = session.phase_offset_a(k)
-    values.update(change)
-    return Control(**values)  # type: ignore[arg-type]
+    return values
 
 
 def loop_noise(session: Session, n: int, period_s: float) -> Array:

@@ -77,9 +77,20 @@ def resistance(session: Session, how: protocols.Resistance) -> Recording:
     return Recording(f"resistance_{how.pair}", meta, (table,))
 
 
+def _supply(volt: float, before: int, on: int, n: int, ramp: int) -> Array:
+    """Open voltage of the supply [n + 1]: off, on, off; edges ramp over so many samples."""
+    source = np.zeros(n + 1)
+    source[before : before + on] = volt
+    if ramp > 1:
+        rise = np.arange(ramp) / ramp
+        source[before : before + ramp] = volt * rise
+        source[before + on : before + on + ramp] = volt * (1.0 - rise)
+    return source
+
+
 def current_step(session: Session, how: protocols.CurrentStep) -> Recording:
     """Voltage step on one pair with the rotor locked, the third terminal open."""
-    from pipeline.simulator.converter import pair_step
+    from pipeline.simulator.locked import pair_step
 
     motor, plant = session.motor, session.plant
     tau = motor.tau_elec_s
@@ -93,13 +104,7 @@ def current_step(session: Session, how: protocols.CurrentStep) -> Recording:
     degc = _start_degc(session, how.temp_degc)
     warm = 1.0 + plant.alpha_copper * (degc - 25.0)
     volt = how.level * motor.current_rated_a * ohm * (warm + how.source_share)
-    source = np.zeros(n + 1)
-    source[before : before + on] = volt
-    ramp = round(how.rise_s * rate)
-    if ramp > 1:
-        rise = np.arange(ramp) / ramp
-        source[before : before + ramp] = volt * rise
-        source[before + on : before + on + ramp] = volt * (1.0 - rise)
+    source = _supply(volt, before, on, n, round(how.rise_s * rate))
     alpha, beta, first, _ = PAIRS[how.pair]
     steps = max(1, math.ceil(1.0 / (rate * tau * 0.02)))
     true = pair_step(

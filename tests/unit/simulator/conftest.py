@@ -5,7 +5,7 @@ from pathlib import Path
 import pipeline.simulator
 
 ROOM = Path(pipeline.simulator.__file__).parent
-KERNELS = ("field.py", "motion.py", "converter.py")
+KERNELS = ("field.py", "motion.py", "converter.py", "locked.py")
 
 
 def pytest_configure() -> None:

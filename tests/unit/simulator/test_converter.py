@@ -7,8 +7,9 @@ import pytest
 
 from pipeline.simulator import converter
 from pipeline.simulator.bench import record
-from pipeline.simulator.converter import COLUMNS, Control, pair_step
+from pipeline.simulator.converter import COLUMNS, Control
 from pipeline.simulator.field import energy
+from pipeline.simulator.locked import pair_step
 from pipeline.simulator.plant import plant_of
 from tests.simulated import QUIET, design
 

@@ -1,0 +1,80 @@
+"""Two terminals of a locked rotor, the third open: voltage steps, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipeline.simulator.converter import resistance_rise
+from pipeline.simulator.field import current, magnet, stiffness
+from pipeline.simulator.plant import Plant
+
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+
+
+@njit(cache=True)
+def pair_current(flux: Pair, way: Pair, eps: float, t_m: float, p: Plant) -> float:
+    """Current through the pair [A]; `way` is its direction in d and q, per ampere."""
+    i_d, i_q, _ = current(flux[0], flux[1], eps, t_m, p)
+    return float(0.75 * (way[0] * i_d + way[1] * i_q))
+
+
+@njit(cache=True)
+def pair_rate(
+    flux: Pair, way: Pair, volt: float, ohm: float, eps: float, t_m: float, p: Plant
+) -> Pair:
+    """Flux rate in d and q [V] that lets current change along the pair alone."""
+    g_dd, g_qq, g_dq = stiffness(flux[0], flux[1], eps, t_m, p)
+    det = g_dd * g_qq - g_dq * g_dq
+    l_d = (g_qq * way[0] - g_dq * way[1]) / det
+    l_q = (g_dd * way[1] - g_dq * way[0]) / det
+    i = pair_current(flux, way, eps, t_m, p)
+    rate = (volt - ohm * i) / (1.5 * (way[0] * l_d + way[1] * l_q))
+    return l_d * rate, l_q * rate
+
+
+@njit(cache=True)
+def pair_step(
+    source: Array,
+    step_s: float,
+    substeps: int,
+    pair: tuple[float, float, float],
+    source_ohm: float,
+    eps: float,
+    t_w: float,
+    t_m: float,
+    p: Plant,
+) -> Array:
+    """Voltage and current [n, 2] of one terminal pair, rotor locked at eps, third open, by RK4.
+
+    `source` [n + 1] is the open voltage of the supply, linear between its points except that a
+    jump of more than half its largest value is an edge on the later point. `pair` holds the
+    current direction in alpha and beta and the pair's resistance at 25 degC. The state is the
+    flux vector; the open terminal's voltage is what keeps its current zero.
+    """
+    out = np.empty((source.size - 1, 2))
+    c, s = np.cos(eps), np.sin(eps)
+    way = (c * pair[0] + s * pair[1], c * pair[1] - s * pair[0])
+    whole = pair[2] * resistance_rise(0.0, t_w, p) + source_ohm
+    d, q, _, _ = magnet(eps, t_m, p)
+    edge = 0.5 * np.max(np.abs(source))
+    h = step_s / substeps
+    for n in range(source.size - 1):
+        i = pair_current((d, q), way, eps, t_m, p)
+        out[n, 0], out[n, 1] = source[n] - source_ohm * i, i
+        jump = source[n + 1] - source[n]
+        slope = 0.0 if abs(jump) > edge else jump / step_s
+        for m in range(substeps):
+            v1 = source[n] + slope * m * h
+            v2, v4 = v1 + 0.5 * slope * h, v1 + slope * h
+            a1, b1 = pair_rate((d, q), way, v1, whole, eps, t_m, p)
+            at = (d + 0.5 * h * a1, q + 0.5 * h * b1)
+            a2, b2 = pair_rate(at, way, v2, whole, eps, t_m, p)
+            at = (d + 0.5 * h * a2, q + 0.5 * h * b2)
+            a3, b3 = pair_rate(at, way, v2, whole, eps, t_m, p)
+            a4, b4 = pair_rate((d + h * a3, q + h * b3), way, v4, whole, eps, t_m, p)
+            d += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+            q += h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
+    return out
