@@ -23,6 +23,7 @@ WEIGHTS: dict[DoubtKind, float] = {
     "not_evaluated": 0.5,
 }
 REQUIRED = 3.0
+ASSUMED = "assumed:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +94,22 @@ class Plan:
             again = ", again" if step.again else ""
             lines += ["", f"{number}. {step.test}{again}: {TESTS.get(step.test, '')}"]
             lines += [f"   how: {experiment}" for experiment in step.experiments]
-            lines += [f"   for {doubt.name}: {doubt.words}" for doubt in step.doubts]
+            lines += _reasons(step)
         if self.beyond:
             lines += ["", "what no further capture settles"]
             lines += [f"   {doubt.name}: {doubt.words}" for doubt in self.beyond]
         return "\n".join(lines)
+
+
+def _reasons(step: Step) -> list[str]:
+    """One line a reason, for all doubts that share it; what `how` tells is not said again."""
+    names: dict[str, list[str]] = {}
+    for doubt in step.doubts:
+        told = doubt.words in step.experiments
+        names.setdefault("" if told else doubt.words, []).append(doubt.name)
+    return [
+        f"   for {', '.join(own)}" + (f": {words}" if words else "") for words, own in names.items()
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +196,12 @@ def _settling(
     return frozenset(fresh or repeats)
 
 
+def _untried(constant: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:
+    """The tests of the ways to a constant that nothing has been recorded for."""
+    own = (way for way in ways if constant in way.gives and not way.computes)
+    return frozenset(t for way in own if not known.tests & set(way.tests) for t in way.tests)
+
+
 def _is_missing(known: Known, name: str) -> bool:
     estimate = known.constants.get(name)
     return estimate is None or not estimate.known
@@ -197,8 +215,10 @@ def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list
         if found is None:
             continue
         kind, words = found
-        by_instrument = kind == "uncertain" and _mostly_instrument(known.constants[name])
-        tests = frozenset[str]() if by_instrument else settling_tests(name, known, ways)
+        tests = settling_tests(name, known, ways)
+        if kind == "uncertain" and _mostly_instrument(known.constants[name]):
+            assumed = _largest_instrument(known.constants[name]).startswith(ASSUMED)
+            tests = _untried(name, known, ways) if assumed else frozenset()
         weight = WEIGHTS[kind] * (REQUIRED if name in aims.required else 1.0)
         doubts.append(Doubt(kind, name, words, tests, weight))
     return doubts
@@ -226,9 +246,15 @@ def _too_uncertain(name: str, estimate: Estimate, target: float) -> tuple[DoubtK
         return None
     words = f"known to {100.0 * relative:.2g} % (k=1), wanted to {100.0 * target:.2g} %"
     if _mostly_instrument(estimate):
-        source = max((c for c in estimate.budget if c.kind == "B"), key=lambda c: abs(c.u)).source
-        words += f"; most of it is {source}, which repeating does not reduce: calibrate that"
+        source = _largest_instrument(estimate)
+        cure = "" if source.startswith(ASSUMED) else ": calibrate that"
+        words += f"; most of it is {source}, which repeating does not reduce{cure}"
     return "uncertain", words
+
+
+def _largest_instrument(estimate: Estimate) -> str:
+    """The source of the largest type B contribution."""
+    return max((c for c in estimate.budget if c.kind == "B"), key=lambda c: abs(c.u)).source
 
 
 def _mostly_instrument(estimate: Estimate) -> bool:
