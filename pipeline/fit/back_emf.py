@@ -187,12 +187,30 @@ def _split(rows: Rows, phase: Array, omega: Array, number: Rows, change: float) 
     for stop in range(1, cycles + 1):
         level = float(speeds[start:stop].mean())
         if stop == cycles or abs(float(speeds[stop]) - level) > change * abs(level):
-            inset = 1 if stop - start >= LEAST_CYCLES + 2 else 0
-            if stop - start >= LEAST_CYCLES:
-                keep = np.flatnonzero((number >= start + inset) & (number < stop - inset))
+            first, last = _steady_core(speeds, start, stop)
+            if last - first >= LEAST_CYCLES:
+                keep = np.flatnonzero((number >= first) & (number < last))
                 found.append(Stretch(rows[keep], phase[keep], omega[keep]))
             start = stop
     return found
+
+
+def _steady_core(speeds: Array, start: int, stop: int) -> tuple[int, int]:
+    """The cycles between the ramps' last traces at both ends, less one cycle at each.
+
+    A trace of a ramp is a speed that stands out of the scatter of the stretch's middle.
+    """
+    quarter = (stop - start) // 4
+    middle = speeds[start + quarter : stop - quarter]
+    level = float(np.median(middle))
+    limit = 5.0 * 1.4826 * float(np.median(np.abs(middle - level))) + 1e-6 * abs(level)
+    if stop - start < 2 * LEAST_CYCLES + 2:
+        return start, stop
+    while start < stop and abs(float(speeds[start]) - level) > limit:
+        start += 1
+    while stop > start and abs(float(speeds[stop - 1]) - level) > limit:
+        stop -= 1
+    return start + 1, stop - 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,7 +119,8 @@ def _line(record: HeatRecord) -> Line | None:
 def _slope_budget(line: Line, options: Mapping[str, float]) -> Budget:
     """Contributions to dR/dT: scatter, gains, and a thermometer that lags.
 
-    A lag tau_l behind a temperature that settles at rate k reads the slope low by k tau_l.
+    A lag tau_l behind a temperature that settles at rate k changes the slope by k tau_l; one
+    exponential does not tell it from alpha, so a slow thermometer has to be stated (`u_lag_s`).
     """
     meta = line.record.capture.meta
     slope = line.slope_ohm_k
@@ -244,7 +245,7 @@ ESTIMATOR = Estimator(
     uses=("r_phase_ohm", "temp_coeff_magnet_1_k", *TURNING),
     options={
         "least_span_k": 5.0,
-        "u_lag_s": 0.05,
+        "u_lag_s": 0.01,
         "drop_measured_v": 0.0005,
         "drop_commanded_v": 0.3,
     },

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from pipeline.fit.heat_record import TURNING, HeatRecord, ambient_degc, read_heat
 from pipeline.fit.instruments import budget_of, current_source, temperature_source
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.least_squares import (
+    LinearFit,
+    autocorrelation_time,
+    gauss_newton,
+    linear_fit,
+)
+from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -99,7 +105,10 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
         across = -_integral(winding - second, t)
         double = _winding_fit(np.column_stack([ones, power, across, outward]), winding)
         body = linear_fit(np.column_stack([ones, -across, -_integral(second - ambient, t)]), second)
-        found = _two_nodes(double, body, winding, t)
+        start, direct = _start(double, body)
+        found = None
+        if start is not None:
+            found = _two_nodes(record, losses_w, ambient, start, direct)
         if found is not None:
             return found
     tau = autocorrelation_time(single.residuals)
@@ -117,55 +126,134 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
     return Balance(rth, u, max(single.dof / tau, 1.0), fitted, covered, words)
 
 
+def _start(double: LinearFit, body: LinearFit) -> tuple[Array | None, bool]:
+    """Rates k, a, b, c, d by the integral form, and whether heat goes straight to ambient.
+
+    None where the second body does not take heat beyond doubt.
+    """
+    direct = double.coefficients.size > 3
+    k, b = (float(v) for v in double.coefficients[1:3])
+    a = float(double.coefficients[3]) if direct else 0.0
+    c, d = (float(v) for v in body.coefficients[1:])
+    told = double.full_rank and body.full_rank and min(k, b, c, d) > 0.0
+    if not told or b < 3.0 * double.u(2) or c < 3.0 * body.u(1):
+        return None, direct
+    return np.array([k, a, b, c, d]), direct
+
+
 def _winding_fit(design: Array, winding: Array) -> LinearFit:
     """Winding's balance; heat straight to ambient, the last column, only where it shows."""
     full = linear_fit(design, winding)
-    tau = autocorrelation_time(full.residuals)
-    if full.coefficients[-1] > 3.0 * full.u(3) * math.sqrt(tau):
+    if full.coefficients[-1] > 3.0 * full.u(3) * math.sqrt(autocorrelation_time(full.residuals)):
         return full
     return linear_fit(design[:, :3], winding)
 
 
-def _two_nodes(double: LinearFit, body: LinearFit, winding: Array, t_s: Array) -> Balance | None:
-    """R = 1/(C (a + b d/(c + d))): a to ambient, b to the body, which gains c and loses d [1/s]."""
-    if not (double.full_rank and body.full_rank):
+def _two_nodes(
+    record: HeatRecord, losses_w: Array, ambient: float, start: Array, direct: bool
+) -> Balance | None:
+    """Least squares of the simulated network on both temperatures, from the integral form's rates.
+
+    R = k/(a + b d/(c + d)) with k = 1/C_w, a to ambient, b to the body, which gains c and loses d
+    [1/s]. The integral form alone is far from the bound, because its noise is not white.
+    """
+    second = record.temp_second_degc
+    if second is None:
         return None
-    inverse_c, b = (float(v) for v in double.coefficients[1:3])
-    a = float(double.coefficients[3]) if double.coefficients.size > 3 else 0.0
-    c, d = (float(v) for v in body.coefficients[1:])
-    if min(inverse_c, b, c, d) <= 0.0 or b < 3.0 * double.u(2) or c < 3.0 * body.u(1):
+    t, winding = record.t_s, record.temp_winding_degc
+    sigmas = [max(white_noise_sigma(x), 1e-6) for x in (winding, second)]
+    measured = np.concatenate([winding / sigmas[0], second / sigmas[1]])
+    free = np.array([True, direct, True, True, True, True, True])
+    x0 = np.concatenate([start, [winding[0] - ambient, second[0] - ambient]])
+    widths = 1e-5 * np.where(x0 != 0.0, np.abs(x0), np.abs(x0[:5]).max())
+
+    def residuals_and_jacobian(values: Array) -> tuple[Array, Array]:
+        full = x0.copy()
+        full[free] = values
+        places = np.flatnonzero(free)
+        variants = np.tile(full, (places.size + 1, 1))
+        variants[np.arange(1, places.size + 1), places] += widths[places]
+        course = network(t, losses_w, variants) + ambient
+        course = course / np.array(sigmas)[:, None, None]
+        predicted = course.transpose(1, 0, 2).reshape(places.size + 1, -1)
+        slopes = (predicted[1:] - predicted[0]) / widths[places][:, None]
+        return predicted[0] - measured, slopes.T
+
+    low = np.full(int(free.sum()), -np.inf)
+    low[:-2] = 0.0
+    fit = gauss_newton(residuals_and_jacobian, x0[free], low, tolerance=1e-4)
+    full = x0.copy()
+    full[free] = fit.parameters
+    k, a, b, c, d = (float(v) for v in full[:5])
+    total = a + b * d / (c + d) if c + d > 0.0 else 0.0
+    if k <= 0.0 or total <= 0.0 or d <= 0.0:
         return None
-    taus = autocorrelation_time(double.residuals), autocorrelation_time(body.residuals)
-    share = d / (c + d)
-    total = a + b * share
-    rth = inverse_c / total
-    first = (np.array([0.0, 1.0, -rth * share, -rth]) / total)[: double.coefficients.size]
-    second = -rth / total * b * np.array([0.0, -d, c]) / (c + d) ** 2
-    variance = float(first @ double.covariance @ first) * taus[0]
-    variance += float(second @ body.covariance @ second) * taus[1]
+    rth = k / total
+    slope = np.zeros(7)
+    slope[:3] = 1.0 / total, -rth / total, -rth / total * d / (c + d)
+    slope[3:5] = -rth / total * b * np.array([-d, c]) / (c + d) ** 2
+    halves = fit.residuals[: t.size], fit.residuals[t.size :]
+    tau = max(autocorrelation_time(half) for half in halves)
+    spread = fit.cost / max(fit.residuals.size - int(free.sum()), 1) * tau
+    u = math.sqrt(max(float(slope[free] @ fit.covariance @ slope[free]) * spread, 0.0))
     words = f"winding {1.0 / (a + b):.3g} s and body {1.0 / (c + d):.3g} s, two nodes"
-    dof = max(min(double.dof / taus[0], body.dof / taus[1]), 1.0)
-    covered = float(t_s[-1] - t_s[0]) * (a + b)
-    return Balance(rth, math.sqrt(variance), dof, winding - double.residuals, covered, words)
+    dof = max((fit.residuals.size - int(free.sum())) / tau, 1.0)
+    covered = float(t[-1] - t[0]) * (a + b)
+    return Balance(rth, u, dof, winding + halves[0] * sigmas[0], covered, words)
+
+
+def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
+    """Rise over ambient of winding and body [2, m, n] at times [n] under losses [n].
+
+    variants [m, 7]: k, a, b, c, d, first rises. dT_w = k P - a T_w - b (T_w - T_m),
+    dT_m = c (T_w - T_m) - d T_m; exact over each step for the mean loss of its ends.
+    """
+    k, a, b, c, d = (variants[:, j] for j in range(5))
+    matrix = np.empty((variants.shape[0], 2, 2))
+    matrix[:, 0, 0], matrix[:, 0, 1] = -(a + b), b
+    matrix[:, 1, 0], matrix[:, 1, 1] = c, -(c + d)
+    half_trace = 0.5 * (matrix[:, 0, 0] + matrix[:, 1, 1])
+    root = np.sqrt(0.25 * (matrix[:, 0, 0] - matrix[:, 1, 1]) ** 2 + b * c) + 1e-12
+    step = float(np.median(np.diff(t_s)))
+    fast, slow = np.exp((half_trace - root) * step), np.exp((half_trace + root) * step)
+    # Sylvester's formula for the exponential of a 2 x 2 matrix with two real rates.
+    shifted = matrix - (half_trace - root)[:, None, None] * np.eye(2)
+    exponential = (
+        fast[:, None, None] * np.eye(2) + ((slow - fast) / (2.0 * root))[:, None, None] * shifted
+    )
+    determinant = (a + b) * (c + d) - b * c + 1e-300
+    steady = np.stack([k * (c + d) / determinant, k * c / determinant], axis=1)
+    drive = steady - np.einsum("mij,mj->mi", exponential, steady)
+    means = 0.5 * (losses_w[1:] + losses_w[:-1])
+    course = np.empty((t_s.size, variants.shape[0], 2))
+    course[0] = state = variants[:, 5:7]
+    for row, watt in enumerate(means):
+        state = np.einsum("mij,mj->mi", exponential, state) + drive * watt
+        course[row + 1] = state
+    turned: Array = course.transpose(2, 1, 0)
+    return turned
 
 
 def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Constants) -> Estimate:
-    """Budget: rise over loss, u_T on the rise unless both thermometers share it; R and i² below."""
+    """Budget: the loss by the gains of R and i², the rise by the thermometer.
+
+    A thermometer's offset leaves the loss alone, for R25 is low by what R(T) of it is high, and
+    the rise as well where it measured the ambient too.
+    """
     meta = record.capture.meta
     rth = balance.rth_k_w
-    rise = float(record.temp_winding_degc.max()) - float(ambient[0])
-    parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof)]
+    thermometer = temperature_source(meta)
+    gains = {current_source(meta): 2.0 * (meta.u_rel_current or 0.0)}
     resistance = known.best("r_phase_ohm")
-    gains = {p.source: p.u / resistance.number for p in resistance.budget} if resistance else {}
-    gains[current_source(meta)] = gains.get(current_source(meta), 0.0) + 2.0 * (
-        meta.u_rel_current or 0.0
-    )
+    if resistance is not None:
+        for part in resistance.budget:
+            if part.source != thermometer:
+                gains[part.source] = gains.get(part.source, 0.0) + part.u / resistance.number
+    parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof)]
     parts += [Contribution(source, -rth * u, "B") for source, u in gains.items()]
+    rise = float(record.temp_winding_degc.max()) - float(ambient[0])
     if record.temp_ambient_degc is None and rise > 0.0:
-        offset = rth * (meta.u_temp_degc or 0.0) / rise
-        mine = gains.pop(temperature_source(meta), 0.0)
-        parts = [p for p in parts if p.source != temperature_source(meta)]
-        parts.append(Contribution(temperature_source(meta), offset - rth * mine, "B"))
+        parts.append(Contribution(thermometer, rth * (meta.u_temp_degc or 0.0) / rise, "B"))
     at = {
         "current_a": round(float(record.current_a.mean()), 4),
         "temp_ambient_degc": round(float(ambient[0]), 2),
