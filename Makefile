@@ -4,7 +4,7 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-data test test-slow lint lock clean
+.PHONY: help demo demo-data test test-slow lint lock screenshots clean
 
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
@@ -12,12 +12,24 @@ help:
 	@echo "make test-slow the long sweeps as well"
 	@echo "make lint      style, types, import direction"
 	@echo "make demo-data simulate data/demo anew"
+	@echo "make screenshots  docs/images from the demo's report (needs chromium)"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
 
 # One motor of the demo has a poor joint: its check fails, and `run` says so by exit code 1.
 demo: $(READY)
 	@$(PY) -m pipeline run input=data/demo output=reports/demo || [ $$? -eq 1 ]
+
+# A browser with an empty profile that asks nothing of the network.
+SHOT := chromium --headless --no-sandbox --disable-gpu --no-first-run --hide-scrollbars \
+  --disable-background-networking --disable-component-update --disable-sync
+
+screenshots: demo
+	@mkdir -p docs/images
+	$(SHOT) --user-data-dir=$$(mktemp -d) --window-size=1200,1250 \
+	  --screenshot=docs/images/report.png file://$(CURDIR)/reports/demo/report/G52-0601.html
+	$(SHOT) --user-data-dir=$$(mktemp -d) --window-size=1500,1250 \
+	  --screenshot=docs/images/fleet.png file://$(CURDIR)/reports/demo/report/index.html
 
 demo-data: $(READY)
 	rm -rf data/demo
