@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.contracts.requirements import LINE_VOLTAGES
+from pipeline.physics.frames import space_vector
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
@@ -68,8 +69,7 @@ def line_voltage_vector(capture: Capture) -> tuple[Array, NDArray[np.complex128]
             absent = next(name for name in LINE_VOLTAGES if name not in there)
             there[absent] = -sum(there.values(), np.zeros(table.height))
         ab, bc, ca = (there[name] for name in LINE_VOLTAGES)
-        turn = np.exp(2j * np.pi / 3.0)
-        return table["t_s"].to_numpy(), (2.0 / 3.0) * (ab + bc * turn + ca / turn)
+        return table["t_s"].to_numpy(), space_vector(ab, bc, ca)
     return None
 
 

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 Complex = NDArray[np.complex128]
 
 _THIRD = complex(-0.5, math.sqrt(0.75))
-_LINE_TO_PHASE = complex(0.5, -math.sqrt(1.0 / 12.0))
 
 
 def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
@@ -27,14 +26,4 @@ def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
         + np.asarray(b, dtype=np.float64) * _THIRD
         + np.asarray(c, dtype=np.float64) * _THIRD.conjugate()
     )
-    return vector
-
-
-def space_vector_of_lines(ab: ArrayLike, bc: ArrayLike) -> Complex:
-    """Stator-frame vector [n] of the phase voltages from two line voltages [n each].
-
-    x = (2/3)(ab + bc e^{j2π/3} − (ab + bc) e^{-j2π/3}) e^{-j30°}/√3; the star point is not needed.
-    """
-    first, second = np.asarray(ab, dtype=np.float64), np.asarray(bc, dtype=np.float64)
-    vector: Complex = space_vector(first, second, -(first + second)) * _LINE_TO_PHASE
     return vector

@@ -11,6 +11,7 @@ from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.rotation import TURN_RAD, turning
 from pipeline.contracts.waveform import noise_of, samples_per_time_constant
+from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
@@ -71,7 +72,7 @@ def _slow_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
     travel = float(np.abs(np.diff(angle)).sum())
     if pole_pairs is None or slots is None or travel == 0.0:
         return Passed()
-    order = math.lcm(slots, 2 * pole_pairs)
+    order = cogging_order(slots, pole_pairs)
     found = angle.size * TURN_RAD / (np.ptp(angle) * order) if np.ptp(angle) else math.inf
     least, good = options["cogging_refuse"], options["cogging_warn"]
     return _judge(capture, found, least, good, f"in a cogging period (order {order})")

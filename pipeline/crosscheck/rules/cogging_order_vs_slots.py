@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 from pipeline.crosscheck.judge import not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
@@ -25,15 +25,15 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     slots = campaign.nameplate("slots")
     if order is None or pairs is None or not isinstance(slots, int):
         return not_evaluated(NAME, "needs cogging found in a cogging test, pole pairs and slots")
-    found, poles = round(order.number), 2 * round(pairs.number)
-    fundamental = math.lcm(slots, poles)
-    words = f"order {found} a turn; {slots} slots and {poles} poles make multiples of {fundamental}"
+    found, p = round(order.number), round(pairs.number)
+    fundamental = cogging_order(slots, p)
+    words = f"order {found} a turn; {slots} slots and {2 * p} poles make multiples of {fundamental}"
     ratio = found / fundamental
     if found % fundamental == 0:
         return Check(NAME, "pass", words, ratio, 0.0, "1")
     if found % slots == 0:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal slots or teeth")
-    if found % (poles // 2) == 0:
+    if found % p == 0:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unequal magnets or poles")
     if found <= 2:
         return Check(NAME, "marginal", words, ratio, 0.0, "1", "unbalance or eccentricity")

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from pipeline.physics.frames import space_vector, space_vector_of_lines
-
-VALUE = st.floats(-1e3, 1e3)
+from pipeline.physics.frames import space_vector
 
 
 def _balanced(theta: np.ndarray, amplitude: float) -> list[np.ndarray]:
@@ -22,12 +18,6 @@ def test_a_balanced_system_is_one_length_and_turns_forward() -> None:
     vector = space_vector(*_balanced(theta, 5.0))
     assert np.abs(vector) == pytest.approx(5.0)
     assert np.unwrap(np.angle(vector)) == pytest.approx(theta)
-
-
-@given(a=VALUE, b=VALUE, c=VALUE)
-def test_line_voltages_give_the_same_vector(a: float, b: float, c: float) -> None:
-    from_lines = complex(space_vector_of_lines(a - b, b - c))
-    assert from_lines == pytest.approx(complex(space_vector(a, b, c)), abs=1e-9)
 
 
 def test_power_needs_the_factor_three_halves() -> None:
