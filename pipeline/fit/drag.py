@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,9 @@ from pipeline.numerics.selection import needed_columns
 Array = NDArray[np.float64]
 
 KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
-BUMPS = (0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.16)
+BUMPS = tuple(float(f"{0.008 * 1.2**k:.3g}") for k in range(19))
 MOST_NUISANCES = 14
 MATERIAL = 0.02
-DIP = 0.05
 ENOUGH_COASTING = 12
 
 
@@ -30,16 +29,28 @@ def _hat(index: int) -> Callable[[Array], Array]:
     return lambda x: np.sign(x) * np.interp(np.abs(x), KNOTS, heights)
 
 
-def _bump(width: float) -> Callable[[Array], Array]:
-    return lambda x: np.sign(x) * np.exp(-((x / width) ** 2))
+SHAPES: dict[str, Callable[[Array], Array]] = {
+    "gauss": lambda x: np.asarray(np.exp(-(x**2))),
+    "exponential": lambda x: np.asarray(np.exp(-np.abs(x))),
+    "rational": lambda x: np.asarray(1.0 / (1.0 + x**2)),
+}
 
 
+def _bump(shape: str, width: float) -> Callable[[Array], Array]:
+    """Stribeck's excess in one of the shapes in use (Armstrong-Hélouvry, Control of Machines with
+    Friction, 1991, 2.3), falling over a speed `width`.
+    """
+    return lambda x: np.sign(x) * SHAPES[shape](x / width)
+
+
+_BUMPS = {f"stribeck {shape} {width:g}": _bump(shape, width) for shape in SHAPES for width in BUMPS}
 DRAG_FORMS: dict[str, Callable[[Array], Array]] = {
     "windage": lambda x: x * np.abs(x),
-    **{f"stribeck {width:g}": _bump(width) for width in BUMPS},
+    **_BUMPS,
     **{f"knot {k}": _hat(k) for k in range(len(KNOTS))},
 }
-FORMS = ("windage", *(f"stribeck {width:g}" for width in BUMPS))
+STRIBECK = tuple(_BUMPS)
+FORMS = ("windage", *STRIBECK)
 CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
 
 
@@ -117,12 +128,16 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
     candidates = {name: -rows.columns[name] for name in [*usable, *FORMS]}
     base = np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
     chosen: list[str] = []
-    sigma = _balanced(rows, base, y)
     for _ in range(2):
         design = np.column_stack([base, *(candidates[n] for n in chosen)])
         sigma = _balanced(rows, design, y)
         tau = autocorrelation_time(linear_fit(design, y, sigma).residuals / sigma, 200)
-        chosen = needed_columns(base, candidates, y, sigma, level, MOST_NUISANCES, tau)
+        pool = {n: candidates[n] for n in [*usable, "windage"]}
+        chosen = needed_columns(base, pool, y, sigma, level, MOST_NUISANCES, tau)
+        start = np.column_stack([base, *(candidates[n] for n in chosen)])
+        bumps = {n: candidates[n] for n in STRIBECK}
+        chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
+        chosen = _without_dip(chosen, base, candidates, y, sigma)
     design = np.column_stack([base, *(candidates[n] for n in chosen)])
     names = ("torque", "coulomb", "viscous", *chosen)
     sigma = _balanced(rows, design, y)
@@ -140,6 +155,8 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
     found = linear_fit(design, y, sigma)
     covariance, dof = cluster_covariance(design, found.residuals, sigma, rows.cluster)
     u_form, reasons = _form(found.coefficients, free, rows)
+    if not free:
+        u_form = _shape_doubt(base, candidates, chosen, found.coefficients, y, sigma)
     return DragFit(
         names, found.coefficients, covariance, found.residuals, dof, free, u_form, reasons,
         design, sigma, y, rows.fastest_rad_s,
@@ -194,24 +211,48 @@ def _form_fails(
     return bool(np.std(curved - straight) > MATERIAL * np.sqrt(np.mean(curved**2)))
 
 
+def _without_dip(
+    chosen: list[str], base: Array, candidates: Mapping[str, Array], y: Array, sigma: Array
+) -> list[str]:
+    """The columns without Stribeck's where it came out below Coulomb friction: it is an excess."""
+    design = np.column_stack([base, *(candidates[n] for n in chosen)])
+    found = linear_fit(design, y, sigma).coefficients[base.shape[1] :]
+    values = dict(zip(chosen, found, strict=True))
+    return [n for n in chosen if n not in STRIBECK or values[n] > 0.0]
+
+
+def _shape_doubt(
+    base: Array,
+    candidates: Mapping[str, Array],
+    chosen: Sequence[str],
+    coefficients: Array,
+    y: Array,
+    sigma: Array,
+) -> Array:
+    """How far J, T_c and B move with the next best shape of Stribeck's excess: half of that."""
+    bumps = [n for n in chosen if n in STRIBECK]
+    if not bumps:
+        return np.zeros(3)
+    used = bumps[0].split()[1]
+    plain = np.column_stack([base, *(candidates[n] for n in chosen if n not in STRIBECK)])
+    others = [np.column_stack([plain, candidates[n]]) for n in STRIBECK if n.split()[1] != used]
+    fits = [linear_fit(design, y, sigma) for design in others]
+    second = min(fits, key=lambda f: f.chi2_dof).coefficients
+    apart = [
+        abs(second[k] / second[0] - coefficients[k] / coefficients[0]) if k else 0.0
+        for k in range(3)
+    ]
+    return np.array(apart) / 2.0
+
+
 def _implausible(
     rows: ShaftRows, design: Array, names: Sequence[str], y: Array, sigma: Array
 ) -> bool:
-    """Whether the fitted drag is no friction: negative Coulomb or viscous part, or a dip.
-
-    Stribeck's excess is above Coulomb friction, never below (by more than `DIP` of it).
-    """
+    """Whether the fitted drag is no friction: a negative Coulomb or viscous part."""
     found = linear_fit(design, y, sigma)
     u = np.sqrt(np.diag(cluster_covariance(design, found.residuals, sigma, rows.cluster)[0]))
-    values = dict(zip(names, found.coefficients, strict=True))
-    if any(found.coefficients[k] < -4.0 * u[k] for k in (1, 2)):
-        return True
-    x = np.linspace(0.0, 1.0, 101)
-    excess = np.zeros(x.size)
-    for name, value in values.items():
-        if name in FORMS and name != "windage":
-            excess += value * DRAG_FORMS[name](np.maximum(x, 1e-9))
-    return bool(np.min(excess) < -DIP * abs(values["coulomb"]))
+    parts = [names.index("coulomb"), names.index("viscous")]
+    return any(found.coefficients[k] < -4.0 * u[k] for k in parts)
 
 
 def _drag_part(design: Array, found: LinearFit, names: Sequence[str]) -> Array:

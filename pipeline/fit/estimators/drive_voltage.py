@@ -44,6 +44,7 @@ CLUSTER_S = 0.25
 COPPER_1_K = 1.0 / 259.5
 MAGNET_1_K = -0.0011
 U_UNKNOWN_K = 15.0
+HOLD = "assumed:voltage_hold"
 CANDIDATES = ("zero", "acceleration", "turned", "d flux", "cross flux")
 
 
@@ -52,7 +53,8 @@ class VoltageRows:
     """Window means of the q voltage equation; every array is [w].
 
     `speed_rad_s` and `current_a` come with their products with temperature above 25 degC;
-    `columns` holds the nuisances.
+    `columns` holds the nuisances; `hold_doubt` is what it may matter that an inverter holds its
+    voltage still over a centred period while the rotor turns (relative, of the back-EMF).
     """
 
     captures: tuple[Capture, ...]
@@ -65,6 +67,7 @@ class VoltageRows:
     warm_current_k_a: Array
     warm_speed_k_rad_s: Array
     columns: Mapping[str, Array]
+    hold_doubt: float
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -115,6 +118,7 @@ def _rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | 
         speed_rad_s=joined.pop("speed_rad_s"),
         warm_current_k_a=joined.pop("warm_current_k_a"),
         warm_speed_k_rad_s=joined.pop("warm_speed_k_rad_s"),
+        hold_doubt=float(np.sqrt(np.mean(joined.pop("hold") ** 2))),
         columns=joined,
     )
 
@@ -158,6 +162,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         "inductive": weak.integral(i_q, 1),
         "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
         "zero": np.ones(weak.count),
+        "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
         "cross flux": weak.integral(speed * i_q**2),
         "acceleration": weak.integral(theta, 2),
     }
@@ -186,6 +191,14 @@ def _instant(
         return (None if v_d is None else v_d / damping), v_q / damping
     turned = (v_d + 1j * v_q) * np.exp(-1j * half) / damping
     return np.real(turned), np.imag(turned)
+
+
+def _hold_doubt(capture: Capture, speed: Array, pole_pairs: int | None, period_s: float) -> float:
+    """(1/cos(w T / 2) - 1)/sqrt(3) at the rms speed: polygon or circle, rectangular (GUM 4.3.7)."""
+    if capture.meta.voltage_timing != "centred":
+        return 0.0
+    half = 0.5 * (pole_pairs or 1) * float(np.sqrt(np.mean(speed**2))) * period_s
+    return float((1.0 / np.cos(min(half, 1.0)) - 1.0) / np.sqrt(3.0))
 
 
 def _gains(rows: VoltageRows, shift: Mapping[str, float]) -> tuple[Array, Array, Array]:
@@ -251,6 +264,8 @@ def _estimates(
             unsure = value * coefficient[name] * U_UNKNOWN_K
             parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))
             note += f"; {place[name]} not logged, taken as 25 ± {U_UNKNOWN_K:g} K"
+        if i == 0:
+            parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
         at = {place[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
         estimates.append(
             Estimate(name, value, _unit(name), "measured", NAME, budget_of(parts), at, paths, note)

@@ -33,6 +33,7 @@ EXPERIMENT = (
 )
 SAME = 0.03
 MAGNET_COEFFICIENT_1_K = -0.0011
+HOLD = "assumed:voltage_hold"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +98,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
         gains = instrument_uncertainties(captures, ("voltage", "current"))
         parts = contributions(value, gains)[0]
+        parts.append(Contribution(HOLD, found.value_h * _hold_doubt(points, pairs), "B"))
         parts.append(Contribution(f"scatter:{NAME}:{name}", found.u_h, "A"))
         paths = tuple(sorted({p.capture.path for p in points}))
         at = {"id_a": found.id_a, "iq_a": found.iq_a}
@@ -269,6 +271,21 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     weights /= weights.sum()
     u = float(np.sqrt(np.sum(weights**2 * variances)))
     return Result(float(weights @ values), u, used[0][0].id_a, smallest)
+
+
+def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:
+    """Relative doubt of period means: a held vector's flux runs on a polygon, a turned one's not.
+
+    Seen from the middle of a side the two differ by 1/cos(w T / 2) - 1; rectangular, GUM 4.3.7.
+    """
+    late = [
+        0.5 * pole_pairs * abs(p.omega_mech_rad_s) * _period_s(p.capture)
+        for p in points
+        if p.capture.meta.voltage_timing == "centred"
+    ]
+    if not late:
+        return 0.0
+    return float(np.mean(1.0 / np.cos(np.minimum(late, 1.0)) - 1.0) / np.sqrt(3.0))
 
 
 def _timing_words(captures: Sequence[Capture]) -> str:

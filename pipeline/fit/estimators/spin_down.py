@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.fit.drag import DRAG_FORMS, STRIBECK
 from pipeline.fit.instruments import budget_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.coasting import coast_down
@@ -42,9 +43,9 @@ EXPERIMENT = (
 )
 MOST_SAMPLES = 4000
 SLOWEST_SHARE = 0.005
-BUMPS = (0.015, 0.03, 0.06, 0.12)
 SHARED = ("coulomb", "viscous")
-EXTRAS = ("windage", *(f"stribeck {width:g}" for width in BUMPS))
+EXTRAS = ("windage", *STRIBECK[::3])
+EXPLAINED = 1.05
 RIPPLES = ("cos", "sin", "cos 2", "sin 2")
 UNEXPLAINED = 3.0
 
@@ -86,7 +87,7 @@ class Motion:
         def deceleration(speed: Array) -> Array:
             total: Array = drag[0] + drag[1] * speed
             for value, name in zip(drag[2:], self.extras, strict=True):
-                total = total + value * _extra(name, speed / fast)
+                total = total + value * DRAG_FORMS[name](speed / fast)
             return total
 
         theta, speed = coast_down(coast.t_s, max(float(own[1]), 1e-6 * fast), deceleration)
@@ -113,6 +114,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     motion = Motion((), (), fastest)
     found = _solve(motion, coasts, None)
     for _ in range(2):
+        free = found.residuals.size - found.parameters.size
+        if found.residuals @ found.residuals < EXPLAINED**2 * free:
+            break
         wider = _wider(motion, coasts, found, options["level"])
         if wider == motion:
             break
@@ -161,14 +165,6 @@ def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bo
     travelled = (y - y[0]) * sense if of_angle else y * sense
     theta = y if of_angle else np.cumsum(np.gradient(t) * y)
     return Coast(path, start, t, travelled, theta, sense, float(speed[0]), of_angle, float(sigma))
-
-
-def _extra(name: str, x: Array) -> Array:
-    if name == "windage":
-        square: Array = x**2
-        return square
-    bump: Array = np.exp(-((x / float(name.split()[1])) ** 2))
-    return bump
 
 
 def _ripple(name: str, theta: Array) -> Array:
@@ -234,7 +230,7 @@ def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: 
     theta = np.concatenate([c.theta_rad for c in coasts])
     candidates |= {name: _ripple(name, theta) * weights for name in ripples}
     chosen = needed_columns(
-        found.jacobian, candidates, -found.residuals, sigma, level, 4, min(tau, 50.0)
+        found.jacobian, candidates, -found.residuals, sigma, level, 3, min(tau, 50.0)
     )
     return Motion(
         motion.extras + tuple(n for n in extras if n in chosen),
