@@ -71,7 +71,7 @@ class Operating:
     Currents are true machine currents in the true rotor frame (amplitude-invariant), angles and
     speed are true shaft quantities. `inverter`: the machine is fed and logged by a drive, so that
     inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
-    `travel_rad` is the angle turned since the last reversal, infinite before the first.
+    `ts_s` is the sample period. `travel_rad` is the angle turned since the last reversal, infinite before the first.
     `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks.
     """
 
@@ -87,6 +87,7 @@ class Operating:
     travel_rad: Array
     inverter: bool
     freq_hz: Array
+    ts_s: float
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
 

@@ -19,6 +19,7 @@ from pipeline.criticism.model import (
     Pieces,
     effect_flux,
     evaluate,
+    mean_current,
     values_of,
 )
 from pipeline.criticism.residuals import RIPPLES, measured, operate, predicted, residual
@@ -48,13 +49,15 @@ class Column:
 class Rows:
     """Weak samples of one segment: residual [R] and columns [R, P], both over the noise.
 
-    `group` [R] numbers (channel, order) pairs listed in `groups`; `window` [R] the window.
+    `group` [R] numbers (channel, order) pairs listed in `groups`; `window` [R] the window; `unit`
+    [R] is the size of one noise unit as a window's mean, in the signal's own unit.
     """
 
     residual: Array
     columns: Array
     group: NDArray[np.int64]
     window: NDArray[np.int64]
+    unit: Array
     groups: tuple[tuple[str, int], ...]
 
 
@@ -134,7 +137,14 @@ def linearise(
     both = np.column_stack([projected(segment, here)[valid] * whiten, kept])
     for offset in _offsets(segment, valid, whiten):
         both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
-    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], groups)
+    unit = 1.0 / (whiten * _gain(segment))
+    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, groups)
+
+
+def _gain(segment: Segment) -> float:
+    """Weak sample that a constant of one makes in the plain window."""
+    weak = segment.weak
+    return 1.0 if weak is None or weak.starts.size == 0 else float(weak.functions[0, 0].sum())
 
 
 def reading_error(segment: Segment, model: Model, values: Values) -> Array:
@@ -211,6 +221,7 @@ class _Sampler:
         self.segment, self.model, self.values, self.here = segment, model, values, here
         self.x = operate(segment, segment.recorded, model, values)
         pieces = evaluate(model, self.x, values)
+        self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         # a hook's own column does without the small terms between samples
         self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES, 0.0)}
@@ -299,7 +310,7 @@ class _Sampler:
         shape = x.omega_rad_s.shape
         nothing = np.zeros(shape)
         flux, slope = effect_flux(effect, x, q)
-        drop = nothing + 0j if effect.drop is None else effect.drop(x, q)
+        drop = nothing + 0j if effect.drop is None else effect.drop(self.mean, q)
         drag = nothing if effect.torque is None else effect.torque(x, q)
         return Pieces(flux, slope, drop, drag)
 

@@ -50,7 +50,7 @@ BASE: tuple[Constant, ...] = (
     Constant("psi_wb", "Wb", "magnet flux at 25 °C", hook="flux"),
     Constant("j_kgm2", "kg·m²", "inertia that the shaft torque does not see", hook="motion"),
     Constant("b_nm_s_rad", "N·m·s/rad", "viscous friction", hook="torque"),
-    Constant("ripple_slope", "1", "R T_s di/dt between sample and mean current", 0.3, hook="hold"),
+    Constant("ripple_slope", "1", "T_s, mean current before the sample", 0.3, hook="hold"),
     Constant("ripple_mean", "1", "R (ω_e T_s)² ψ/L, ripple of the current", 0.08, hook="hold"),
     Constant(
         "ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", 0.08, hook="hold"
@@ -135,6 +135,28 @@ def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
     return torque
 
 
+def mean_current(x: Operating, values: Values) -> Operating:
+    """Where the drops of a sample period act: at its mean current, not at the sampled one.
+
+    A voltage that is held in the stationary frame while the rotor turns makes the flux follow
+    chords instead of arcs; the current ripples by ψ(ω_e T_s)²/L, and its mean lies a part of the
+    period off. Both parts are nuisances of the fit.
+    """
+    if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
+        return x
+    turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
+    slope = np.zeros(turn.shape, dtype=complex)
+    slope[1:-1] = 0.5 * (x.i_a[2:] - x.i_a[:-2])
+    ripple = values["ripple_mean"] * turn**2 * (values["psi_wb"] / values["ld_h"] + x.i_a)
+    mean = x.i_a - values["ripple_slope"] * slope - ripple
+    return replace(
+        x,
+        id_a=mean.real,
+        iq_a=mean.imag,
+        eps_rad=x.eps_rad - values["ripple_slope"] * turn,
+    )
+
+
 def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
     """Runs every hook but the sensors'; leaves flux and torque in `x` for those who ask."""
     flux, slope = base_flux(x, values), np.zeros(x.omega_rad_s.shape)
@@ -144,12 +166,13 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
             flux, slope = flux + more, slope + turn
     x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
-    drop: Complex = values["r_ohm"] * x.i_a
+    mean = mean_current(x, values)
+    drop: Complex = values["r_ohm"] * mean.i_a
     drag: Array = values["b_nm_s_rad"] * x.omega_rad_s
     for effect in model.effects:
         q = values_of(effect, model.machine, values)
         if effect.drop is not None:
-            drop = drop + effect.drop(x, q)
+            drop = drop + effect.drop(mean, q)
         if effect.torque is not None:
             drag = drag + effect.torque(x, q)
     return Pieces(flux, slope, drop, drag)

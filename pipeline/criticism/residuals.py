@@ -20,7 +20,7 @@ from pipeline.criticism.traces import smoothed
 _SPEED_S = 0.002
 _TURN_RAD = 0.7
 _ANGLE_ROUNDS = 3
-RIPPLES = ("ripple_slope", "ripple_mean", "ripple_edge", "ripple_shift")
+RIPPLES = ("ripple_edge", "ripple_shift", "ripple_torque")
 
 
 def residual(
@@ -108,6 +108,7 @@ def _operating(
         magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size),
         travel_rad=_travel(signals, theta.size),
         inverter=segment.kind == "dq",
+        ts_s=segment.ts_s,
         freq_hz=freq,
     )
 
@@ -315,28 +316,11 @@ def _rotor_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Value
     averaged = segment.timing != "instant" and segment.kind == "dq"
     shrink = np.sinc(turn / (2 * math.pi)) if averaged else 1.0
     voltage: Complex = drop + slope + 1j * omega * psi
-    if segment.kind == "dq" and any(values[name] for name in RIPPLES):
+    if segment.kind == "dq" and any(values[name] for name in RIPPLES[:2]):
         shrink = shrink - values["ripple_edge"] * turn**2
-        return shrink * voltage - _ripple(x, pieces, turn, period, values)
+        lag = values["ripple_shift"] * 1j * psi * np.gradient(turn) / period
+        return shrink * voltage - lag
     return shrink * voltage
-
-
-def _ripple(x: Operating, pieces: Pieces, turn: Array, period: float, values: Values) -> Complex:
-    """What the sampled current misses of the current's ripple between samples [n].
-
-    A voltage that is held in the stationary frame while the rotor turns makes the flux follow
-    chords instead of arcs. The leading terms are the shift of the mean against the sampled
-    current, its mean ripple ψ(ω_e T_s)²/L, and (in the caller) the mean of a turning voltage.
-    """
-    di = _central(x.i_a, period)
-    psi = pieces.psi_wb
-    ripple = psi.real / values["ld_h"] + 1j * psi.imag / values["lq_h"]
-    lost: Complex = (
-        values["ripple_slope"] * values["r_ohm"] * period * di
-        + values["ripple_mean"] * values["r_ohm"] * turn**2 * ripple
-        + values["ripple_shift"] * 1j * psi * np.gradient(turn) / period
-    )
-    return lost
 
 
 def _late_torque(x: Operating, pieces: Pieces, period: float, values: Values) -> Array:

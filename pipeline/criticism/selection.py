@@ -22,7 +22,6 @@ from pipeline.criticism.system import (
     Fitted,
     System,
     gauss_newton,
-    misfit_of,
     own_columns,
     system,
 )
@@ -101,9 +100,8 @@ def widened(segments: Sequence[Segment], fitted: Fitted, offered: Sequence[Candi
 def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> tuple[Score, ...]:
     """Every candidate's score, the best fall first; of one effect the best shape only."""
     own = np.arange(len(own_columns(fitted.model)))
-    own_step, _, _ = around.solve(own)
-    before = around.groups_after(own, own_step)
-    price = math.log(float(around.count))
+    before = around.spreads(around.best(own)[1])
+    price = math.log(float(around.size))
     search_price = 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
     best: dict[str, Score] = {}
     first = own.size
@@ -124,7 +122,7 @@ def _score(
     own: NDArray[np.int64],
     places: NDArray[np.int64],
     candidate: Candidate,
-    before: Sequence[Array],
+    before: Array,
 ) -> Score | None:
     """Score of one candidate with parameters on the wrong side of a bound left at zero."""
     machine = fitted.model.machine
@@ -134,7 +132,7 @@ def _score(
     }
     live = places
     while live.size:
-        step, _, _ = around.solve(np.concatenate([own, live]))
+        step, left = around.best(np.concatenate([own, live]))
         mine = dict(zip((around.columns[n].name for n in live), step[own.size :], strict=True))
         wrong = [
             n
@@ -151,8 +149,8 @@ def _score(
         for name, value in mine.items()
         if known[name][0].negligible > 0
     ]
-    after = around.groups_after(np.concatenate([own, live]), step)
-    fall = misfit_of(around.rows, before) - misfit_of(around.rows, after)
+    after = around.spreads(left)
+    fall = around.misfit_of(before) - around.misfit_of(after)
     share = _share(around, before, after)
     return Score(candidate, fall, 0.0, mine, share, max(sizes, default=math.inf))
 
@@ -161,21 +159,21 @@ def _outside(value: float, parameter: Parameter) -> bool:
     return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
 
 
-def _share(around: System, before: Sequence[Array], after: Sequence[Array]) -> float:
+def _share(around: System, before: Array, after: Array) -> float:
     """Largest share, over recorded signals, of the removable misfit that went away."""
-    had: dict[str, float] = {}
-    gone: dict[str, float] = {}
-    for rows, old, new in zip(around.rows, before, after, strict=True):
-        n = np.bincount(rows.group, minlength=len(rows.groups))
-        excess, left = np.log(np.maximum(old, 1.0)), np.log(np.maximum(new, 1.0))
-        for place, (channel, _) in enumerate(rows.groups):
-            had[channel] = had.get(channel, 0.0) + n[place] * excess[place]
-            gone[channel] = gone.get(channel, 0.0) + n[place] * (excess[place] - left[place])
-    return max((gone[c] / had[c] for c in had if had[c] > _WORTH), default=0.0)
+    excess = around.counts * np.log(np.maximum(before, 1.0))
+    left = around.counts * np.log(np.maximum(after, 1.0))
+    channel = np.array([name for _, name, _ in around.labels])
+    shares = []
+    for name in dict.fromkeys(channel.tolist()):
+        had = float(excess[channel == name].sum())
+        if had > _WORTH:
+            shares.append(1.0 - float(left[channel == name].sum()) / had)
+    return max(shares, default=0.0)
 
 
 def search(
-    segments: Sequence[Segment], fitted: Fitted, around: System, library: Mapping[str, Effect]
+    segments: Sequence[Segment], fitted: Fitted, library: Mapping[str, Effect]
 ) -> tuple[Rung, ...]:
     """The ladder: adds the best effect, refits, checks backwards, until nothing passes."""
     rungs: list[Rung] = []
@@ -239,7 +237,7 @@ def _backward(
 ) -> tuple[Fitted, System]:
     """Takes out effects that later ones have made superfluous."""
     for effect in fitted.model.effects[base:-1]:
-        price = len(effect.parameters_of(fitted.model.machine)) * math.log(around.count)
+        price = len(effect.parameters_of(fitted.model.machine)) * math.log(around.size)
         if material(fitted, effect) and loss_without(around, fitted, (effect.name,)) > 4 * price:
             continue
         kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{effect.name}.")}
@@ -251,16 +249,19 @@ def _backward(
 
 
 def loss_without(
-    around: System, fitted: Fitted, names: Iterable[str], instead: NDArray[np.int64] | None = None
+    around: System,
+    fitted: Fitted,
+    names: Iterable[str],
+    instead: NDArray[np.int64] | None = None,
 ) -> float:
-    """Rise of χ² when effects go to zero amplitude and the rest, with `instead`, refits.
+    """Rise of misfit when effects go to zero amplitude and the rest, with `instead`, refits.
 
-    To second order around the fit.
+    The model is taken as linear between here and there.
     """
     gone = tuple(f"{name}." for name in names)
     own = np.arange(len(own_columns(fitted.model)))
     out = np.array([n for n in own if around.columns[n].name.startswith(gone)], dtype=int)
-    stay = np.array([n for n in own if n not in set(out.tolist())], dtype=int)
+    stay = np.setdiff1d(own, out)
     if instead is not None:
         stay = np.concatenate([stay, instead])
     machine = fitted.model.machine
@@ -269,19 +270,8 @@ def loss_without(
         for e in fitted.model.effects
         for p in e.parameters_of(machine)
     }
-    move = np.array(
-        [
-            -fitted.values[around.columns[n].name] if amplitude[around.columns[n].name] else 0.0
-            for n in out
-        ]
-    )
-    gram, slope = around.gram.sum(axis=0), around.slope.sum(axis=0) + around.pull
-    jump = 2 * slope[out] @ move + move @ gram[np.ix_(out, out)] @ move
-    normal = gram[np.ix_(stay, stay)] + np.diag(around.penalty[stay])
-    right = slope[stay] + gram[np.ix_(stay, out)] @ move
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    power, axes = np.linalg.eigh(normal / np.outer(scale, scale))
-    good = power > 1e-11 * max(float(power[-1]), 1.0)
-    along = (axes[:, good].T @ (right / scale)) ** 2 / power[good]
-    _, already, _ = around.solve(own)
-    return float(jump - along.sum() + already)
+    names_out = [around.columns[n].name for n in out]
+    move = np.array([-fitted.values[n] if amplitude[n] else 0.0 for n in names_out])
+    moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
+    here = around.spreads(around.best(own)[1])
+    return around.misfit_of(moved.spreads(moved.best(stay)[1])) - around.misfit_of(here)

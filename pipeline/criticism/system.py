@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Effect, Machine, Values
 from pipeline.criticism.linearise import (
     Column,
-    Rows,
     base_columns,
     effect_columns,
     linearise,
@@ -30,6 +29,8 @@ _SEED = 20260302
 _THREADS = 2
 _CONVERGED = 1.0
 _HALVINGS = 3
+_ROUNDS = 30
+_SETTLED = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,83 +44,103 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """Gram matrices [S, P, P] and right sides [S, P] of each segment around a fit.
+    """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
 
-    Rows of a group that misses its noise floor χ²/n = q > 1 count 1/q: the likelihood of a group
-    whose scatter is at least the floor but otherwise unknown. An equation with an effect missing
-    so keeps no hold on constants that sound equations know. `penalty` [P] is the inverse prior
-    variance of nuisances, `pull` [P] the penalty's slope; `misfit` is −2 log likelihood,
-    Σ n log max(1, q) + max(0, n(min(1, q) − 1)) without constants, plus the priors' cost.
+    `group` [R] numbers the groups of (segment, channel, order), `labels` names them; `unit` [R] is
+    the size of one noise unit as a window's mean, in the signal's own unit. Rows of a
+    group that misses its noise floor, χ²/n = q > 1, count 1/q: the likelihood of a group whose
+    scatter is at least the floor but otherwise unknown. An equation with an effect missing so
+    keeps no hold on constants that sound equations know. `penalty` [P] is the inverse prior
+    variance of nuisances, `pull` [P] the penalty's slope.
     """
 
     columns: tuple[Column, ...]
-    rows: tuple[Rows, ...]
-    gram: Array
-    slope: Array
-    misfit: float
+    residual: Array
+    matrix: Array
+    group: NDArray[np.int64]
+    window: NDArray[np.int64]
+    unit: Array
+    labels: tuple[tuple[int, str, int], ...]
     penalty: Array
     pull: Array
 
     @property
-    def count(self) -> int:
-        """Weak samples of all segments."""
-        return sum(rows.residual.size for rows in self.rows)
+    def size(self) -> int:
+        """Weak samples."""
+        return int(self.residual.size)
+
+    @property
+    def counts(self) -> Array:
+        """Weak samples [G] of each group."""
+        return np.bincount(self.group, minlength=len(self.labels)).astype(float)
 
     @property
     def chi2(self) -> float:
         """Sum of squares of all weak residuals over their noise floor."""
-        return float(sum(rows.residual @ rows.residual for rows in self.rows))
+        return float(self.residual @ self.residual)
+
+    @property
+    def misfit(self) -> float:
+        """−2 log likelihood, less constants, and the cost of the priors."""
+        live = self.penalty > 0
+        cost = float((self.pull[live] ** 2 / self.penalty[live]).sum())
+        return self.misfit_of(self.spreads(self.residual)) + cost
+
+    def spreads(self, residual: Array) -> Array:
+        """χ²/n [G] of each group, 1 where empty."""
+        counts = self.counts
+        total = np.bincount(self.group, residual**2, minlength=counts.size)
+        return np.where(counts > 0, total / np.maximum(counts, 1.0), 1.0)
+
+    def misfit_of(self, spreads: Array) -> float:
+        """Σ n [log max(1, q) + min(1, q) − 1]: −2 log likelihood of groups with χ²/n = q."""
+        each = np.log(np.maximum(spreads, 1.0)) + np.minimum(spreads, 1.0) - 1.0
+        return float((self.counts * each).sum())
 
     def place(self, names: Iterable[str]) -> NDArray[np.int64]:
         """Indices of columns by name."""
         wanted = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
 
-    def solve(
-        self, places: NDArray[np.int64], use: NDArray[np.bool_] | None = None
-    ) -> tuple[Array, float, Array]:
-        """Step [k], fall of χ² and covariance [k, k] when the columns at `places` are fitted.
+    def best(
+        self, places: NDArray[np.int64], rows: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, Array]:
+        """Step [k] along columns at `places` of least misfit, and its residual [R].
 
-        `use` [S] leaves segments out. Directions without information are not moved.
+        Weighted least squares, the weights renewed until the misfit stays. `rows` [R] leaves
+        samples out of the fit.
         """
-        gram = self.gram if use is None else self.gram[use]
-        slope = self.slope if use is None else self.slope[use]
-        cross = np.ix_(places, places)
-        normal = gram.sum(axis=0)[cross] + np.diag(self.penalty[places])
-        right = slope.sum(axis=0)[places] + self.pull[places]
-        size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        scaled = normal / np.outer(size, size)
-        power, axes = np.linalg.eigh(scaled)
-        good = power > _TIE * max(float(power[-1]), 1.0)
-        inverse = (axes[:, good] / power[good]) @ axes[:, good].T
-        covariance = inverse / np.outer(size, size)
-        step = -covariance @ right
-        return step, float(right @ covariance @ right), covariance
+        matrix, right = self.matrix[:, places], self.residual
+        chosen = np.ones(right.size) if rows is None else rows.astype(float)
+        left, step = self.residual, np.zeros(places.size)
+        before = np.inf
+        for _ in range(_ROUNDS):
+            weight = chosen / np.maximum(self.spreads(left), 1.0)[self.group]
+            normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
+            slope = matrix.T @ (weight * right) + self.pull[places]
+            step = -_pseudo_inverse(normal) @ slope
+            left = right + matrix @ step
+            now = self.misfit_of(self.spreads(left))
+            if abs(before - now) < _SETTLED:
+                break
+            before = now
+        return step, left
 
-    def after(self, places: NDArray[np.int64], step: Array) -> list[Array]:
-        """Weak residuals of every segment after a step along columns."""
-        return [rows.residual + rows.columns[:, places] @ step for rows in self.rows]
-
-    def groups_after(self, places: NDArray[np.int64], step: Array) -> list[Array]:
-        """χ²/n of every group of every segment after a step along columns."""
-        left = self.after(places, step)
-        return [spread(rows, r)[0] for rows, r in zip(self.rows, left, strict=True)]
-
-
-def spread(rows: Rows, residual: Array) -> tuple[Array, Array]:
-    """χ²/n [groups] (1 where empty) and n [groups] of weak residuals by group."""
-    count = np.bincount(rows.group, minlength=len(rows.groups)).astype(float)
-    total = np.bincount(rows.group, residual**2, minlength=len(rows.groups))
-    return np.where(count > 0, total / np.maximum(count, 1.0), 1.0), count
+    def covariance(self, places: NDArray[np.int64]) -> Array:
+        """Covariance [k, k] of the parameters at `places` when they are fitted together."""
+        weight = 1.0 / np.maximum(self.spreads(self.residual), 1.0)[self.group]
+        matrix = self.matrix[:, places]
+        normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
+        return _pseudo_inverse(normal)
 
 
-def misfit_of(rows: Sequence[Rows], spreads: Sequence[Array]) -> float:
-    """Σ n log max(1, q) + n (min(1, q) − 1): −2 log likelihood over groups, less constants."""
-    total = 0.0
-    for one, q in zip(rows, spreads, strict=True):
-        n = np.bincount(one.group, minlength=len(one.groups))
-        total += float((n * (np.log(np.maximum(q, 1.0)) + np.minimum(q, 1.0) - 1.0)).sum())
-    return total
+def _pseudo_inverse(normal: Array) -> Array:
+    """Inverse of a normal matrix with directions that carry no information left at zero."""
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    power, axes = np.linalg.eigh(normal / np.outer(size, size))
+    good = power > _TIE * max(float(power[-1]), 1.0)
+    inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
+    return inverse / np.outer(size, size)
 
 
 def start_values(model: Model, machine: Machine) -> dict[str, float]:
@@ -159,34 +180,34 @@ def system(
     rows = _each(
         lambda s, sigma: linearise(s, model, values, columns, sigma), segments, fitted.sigma
     )
-    penalty, pull, cost = _priors(columns, values)
-    spreads = [spread(r, r.residual)[0] for r in rows]
-    weights = [1.0 / np.maximum(q, 1.0)[r.group] for r, q in zip(rows, spreads, strict=True)]
+    penalty, pull = _priors(columns, values)
+    first, labels, groups = 0, [], []
+    for number, one in enumerate(rows):
+        labels += [(number, channel, order) for channel, order in one.groups]
+        groups.append(one.group + first)
+        first += len(one.groups)
     return System(
         columns=tuple(columns),
-        rows=rows,
-        gram=np.stack(
-            [(r.columns * w[:, None]).T @ r.columns for r, w in zip(rows, weights, strict=True)]
-        ),
-        slope=np.stack(
-            [r.columns.T @ (r.residual * w) for r, w in zip(rows, weights, strict=True)]
-        ),
-        misfit=misfit_of(rows, spreads) + cost,
+        residual=np.concatenate([r.residual for r in rows]),
+        matrix=np.concatenate([r.columns for r in rows]),
+        group=np.concatenate(groups),
+        window=np.concatenate([r.window for r in rows]),
+        unit=np.concatenate([r.unit for r in rows]),
+        labels=tuple(labels),
         penalty=penalty,
         pull=pull,
     )
 
 
-def _priors(columns: Sequence[Column], values: Values) -> tuple[Array, Array, float]:
-    penalty, pull, cost = np.zeros(len(columns)), np.zeros(len(columns)), 0.0
+def _priors(columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
+    penalty, pull = np.zeros(len(columns)), np.zeros(len(columns))
     priors = {c.name: c for c in BASE if np.isfinite(c.prior)}
     for place, column in enumerate(columns):
         constant = priors.get(column.name)
         if constant is not None:
             penalty[place] = constant.prior**-2
             pull[place] = (values[column.name] - constant.center) * constant.prior**-2
-            cost += pull[place] ** 2 / penalty[place]
-    return penalty, pull, cost
+    return penalty, pull
 
 
 def own_columns(model: Model) -> list[Column]:
@@ -216,7 +237,7 @@ def gauss_newton(
     """
     around = system(segments, fitted)
     for _ in range(iterations):
-        step, _, _ = around.solve(np.arange(len(around.columns)))
+        step, _ = around.best(np.arange(len(around.columns)))
         for _ in range(_HALVINGS):
             moved = _moved(fitted, around.columns, step)
             if renew:

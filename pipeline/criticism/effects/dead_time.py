@@ -10,17 +10,19 @@ from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Val
 def _drop(x: Operating, q: Values) -> Complex:
     if not x.inverter:
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
-    stationary = x.i_a * np.exp(1j * x.eps_rad)
+    before = x.i_a - np.gradient(x.i_a) / x.ts_s * q["lag_s"]
+    turn = x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
+    stationary = before * np.exp(1j * (x.eps_rad - turn))
     drop = np.zeros(x.omega_rad_s.shape, dtype=complex)
     for k in range(3):
         axis = np.exp(2j * np.pi * k / 3)
         drop += np.tanh((stationary * np.conj(axis)).real / q["width_a"]) * axis
-    return drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * x.eps_rad)
+    return drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * (x.eps_rad - turn))
 
 
 EFFECT = Effect(
     name="dead_time",
-    words="each phase loses V tanh(i/width), in the limit V sign(i)",
+    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample",
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
@@ -30,6 +32,7 @@ EFFECT = Effect(
         Parameter(
             "width_a", "A", 0.02, 0.0, "current_a", low=0.0003, high=0.3, scan=(0.001, 0.01, 0.05)
         ),
+        Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
     ),
     signals=("vd_v", "vq_v"),
     rivals={"copper_temperature": "several currents: dead time does not grow with current"},

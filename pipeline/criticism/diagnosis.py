@@ -1,0 +1,226 @@
+"""Diagnose: ranks every known effect, adds what is missing, and says what is left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import gammaincc
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.judge import HeldOut, leave_out, remainder, signal_errors
+from pipeline.criticism.registry import effects
+from pipeline.criticism.rivals import detectable, experiment_for, rivals_of
+from pipeline.criticism.segments import Segment, segments
+from pipeline.criticism.selection import Candidate, Rung, Score, candidates, loss_without, search
+from pipeline.criticism.size import machine_of
+from pipeline.criticism.specification import model_of
+from pipeline.criticism.system import first_fit, own_columns
+from pipeline.criticism.unknown import unknown_structure
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.diagnosis import (
+    Diagnosis,
+    LadderRung,
+    RankedEffect,
+    Remainder,
+    UnknownStructure,
+    Verdict,
+)
+
+_SEEN = 3.0
+_EXPLAINED = 0.5
+
+
+def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
+    """Which physical effects a model of one motor lacks, from its captures alone.
+
+    Reads recorded signals, tests and nameplate numbers; `start` gives pole pairs and sizes.
+    """
+    machine = machine_of(campaign, start)
+    library = effects(model.effects_path)
+    asked = model_of(model, machine)
+    found = segments(campaign, machine)
+    if not _enough(found):
+        return _insufficient(campaign, model, library)
+    fitted, _ = first_fit(found, asked)
+    rungs = search(found, fitted, library)
+    last = rungs[-1]
+    offered = candidates(library, last.fitted)
+    held = [leave_out(r.around, len(own_columns(r.fitted.model))) for r in rungs]
+    residual = last.around.residual
+    left = remainder(last.around, found, machine, residual)
+    sketch = _unknown(found, rungs, left)
+    missing = last.added if _explained(rungs, left) or sketch is None else last.added
+    ranking = _ranking(rungs, held, offered, library)
+    unseen = _unseen(campaign, library, last, offered)
+    verdict = _verdict(missing, left, rungs, unseen)
+    return Diagnosis(
+        campaign.motor_id,
+        model.name,
+        verdict,
+        missing,
+        ranking,
+        tuple(_rung(r, h) for r, h in zip(rungs, held, strict=True)),
+        sketch if verdict == "unknown" else None,
+        left,
+        tuple(f"no test here excites {name}: {library[name].experiment}" for name in unseen),
+    )
+
+
+def _enough(found: Sequence[Segment]) -> bool:
+    """Whether there is a test under current and one that turns: the base model needs both."""
+    kinds = {segment.kind for segment in found}
+    return bool(kinds & {"dq", "terminal", "flux_map"}) and bool(kinds & {"dq", "shaft", "open"})
+
+
+def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effect]) -> Diagnosis:
+    wanted = "a torque map or drive log with dq voltages, currents and angle"
+    ranking = tuple(
+        RankedEffect(e.name, 0.0, 0.0, 1.0, (), e.signature, e.experiment, {})
+        for e in library.values()
+    )
+    return Diagnosis(
+        campaign.motor_id,
+        model.name,
+        "insufficient",
+        (),
+        ranking,
+        (),
+        None,
+        (),
+        (f"the captures cannot fit the base model: record {wanted}",),
+    )
+
+
+def _unknown(
+    found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder]
+) -> UnknownStructure | None:
+    if not left:
+        return None
+    sketch, _ = unknown_structure(found, rungs[-1].fitted, [r.signal for r in left])
+    return sketch
+
+
+def _excess(rung: Rung, channels: set[str]) -> float:
+    around = rung.around
+    own = np.arange(len(own_columns(rung.fitted.model)))
+    spreads = around.spreads(around.best(own)[1])
+    inside = np.array([channel in channels for _, channel, _ in around.labels])
+    return float((around.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())
+
+
+def _explained(rungs: Sequence[Rung], left: Sequence[Remainder]) -> bool:
+    """Whether the effects found took most of the misfit of the signals that still miss."""
+    if not left:
+        return True
+    channels = {r.signal for r in left}
+    before = _excess(rungs[0], channels)
+    return before > 0 and _excess(rungs[-1], channels) < _EXPLAINED * before
+
+
+def _verdict(
+    missing: Sequence[str],
+    left: Sequence[Remainder],
+    rungs: Sequence[Rung],
+    unseen: Sequence[str],
+) -> Verdict:
+    if left and not _explained(rungs, left):
+        return "unknown"
+    if missing:
+        return "missing"
+    return "insufficient" if unseen else "adequate"
+
+
+def _unseen(
+    campaign: Campaign, library: dict[str, Effect], last: Rung, offered: Sequence[Candidate]
+) -> tuple[str, ...]:
+    """Effects that no capture here would show at typical size, for want of their test."""
+    present = {capture.meta.test for capture in campaign.captures}
+    inside = {effect.name for effect in last.fitted.model.effects}
+    return tuple(
+        name
+        for name, effect in library.items()
+        if name not in inside
+        and effect.tests
+        and not present.issuperset(effect.tests[:1])
+        and detectable(effect, last.fitted, last.around, offered) < _SEEN
+    )
+
+
+def _rung(rung: Rung, held: HeldOut) -> LadderRung:
+    residual = np.where(np.isfinite(held.residual), held.residual, rung.around.residual)
+    return LadderRung(rung.added, held.total, signal_errors(rung.around, residual))
+
+
+def _ranking(
+    rungs: Sequence[Rung],
+    held: Sequence[HeldOut],
+    offered: Sequence[Candidate],
+    library: dict[str, Effect],
+) -> tuple[RankedEffect, ...]:
+    """Found effects in the order found, then the others by their score on the last rung."""
+    last = rungs[-1]
+    found = []
+    for place, name in enumerate(last.added):
+        effect = library[name]
+        confused = rivals_of(name, last.fitted, last.around, offered)
+        loss = loss_without(last.around, last.fitted, (name,))
+        dof = len(effect.parameters_of(last.fitted.model.machine))
+        found.append(
+            RankedEffect(
+                name,
+                loss - dof * math.log(last.around.size),
+                _drop(held, place),
+                _p_value(loss, dof),
+                confused,
+                f"{effect.words}; {effect.signature}",
+                experiment_for(effect, confused, library),
+                _parameters(last, effect),
+            )
+        )
+    others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
+    return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
+
+
+def _drop(held: Sequence[HeldOut], place: int) -> float:
+    """Share of the removable held-out error, from first to last rung, that one step took."""
+    totals = [math.log(max(h.total, 1e-300)) for h in held if math.isfinite(h.total)]
+    if place + 1 >= len(totals) or totals[0] <= totals[-1]:
+        return 0.0
+    return (totals[place] - totals[place + 1]) / (totals[0] - totals[-1])
+
+
+def _other(score: Score) -> RankedEffect:
+    effect = score.candidate.effect
+    dof = max(len(score.step), 1)
+    return RankedEffect(
+        effect.name,
+        score.fall - score.price,
+        0.0,
+        _p_value(score.fall, dof),
+        (),
+        f"{effect.words}; {effect.signature}",
+        effect.experiment,
+        {},
+    )
+
+
+def _p_value(fall: float, dof: int) -> float:
+    return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
+
+
+def _parameters(rung: Rung, effect: Effect) -> dict[str, tuple[float, float, str]]:
+    own = np.arange(len(own_columns(rung.fitted.model)))
+    spread = np.sqrt(np.maximum(np.diag(rung.around.covariance(own)), 0.0))
+    u = {rung.around.columns[n].name: float(spread[n]) for n in own}
+    return {
+        p.name: (
+            float(rung.fitted.values[f"{effect.name}.{p.name}"]),
+            u[f"{effect.name}.{p.name}"],
+            p.unit,
+        )
+        for p in effect.parameters_of(rung.fitted.model.machine)
+    }

@@ -1,0 +1,62 @@
+"""What else it could be: each found effect swapped for another, and what would part the two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.selection import TIE, Candidate, loss_without
+from pipeline.criticism.system import Fitted, System, own_columns
+
+
+def rivals_of(
+    name: str, fitted: Fitted, wide: System, offered: Sequence[Candidate]
+) -> tuple[str, ...]:
+    """Effects that explain the captures as well in an effect's place (misfit within 12)."""
+    first = len(own_columns(fitted.model))
+    found: dict[str, float] = {}
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        rise = loss_without(wide, fitted, (name,), places)
+        other = candidate.effect.name
+        found[other] = min(rise, found.get(other, np.inf))
+    return tuple(sorted(other for other, rise in found.items() if rise < TIE))
+
+
+def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:
+    """The test or calibration that parts an effect from what it is confused with."""
+    told = []
+    for other in confused:
+        remedy = effect.rivals.get(other) or library[other].rivals.get(effect.name)
+        told.append(f"against {other}: {remedy or library[other].experiment}")
+    return "; ".join(told) if told else effect.experiment
+
+
+def detectable(effect: Effect, fitted: Fitted, wide: System, offered: Sequence[Candidate]) -> float:
+    """Signal-to-noise ratio that the captures give an effect of typical size.
+
+    The typical amplitudes over their standard deviations when fitted with all else; the best
+    shape and amplitude count.
+    """
+    first = len(own_columns(fitted.model))
+    own = np.arange(first)
+    machine = fitted.model.machine
+    sizes = {
+        f"{effect.name}.{p.name}": p.typical * machine.scale(p)
+        for p in effect.parameters_of(machine)
+    }
+    best = 0.0
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        if candidate.effect.name != effect.name:
+            continue
+        covariance = wide.covariance(np.concatenate([own, places]))
+        spread = np.sqrt(np.maximum(np.diag(covariance)[own.size :], 0.0))
+        for place, one in zip(places, spread, strict=True):
+            if one > 0 and np.any(wide.matrix[:, place]):
+                best = max(best, sizes[wide.columns[place].name] / float(one))
+    return best

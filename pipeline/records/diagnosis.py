@@ -1,0 +1,133 @@
+"""What is missing from a model, how sure that is, and what else it could be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
+
+
+@dataclass(frozen=True, slots=True)
+class RankedEffect:
+    """One effect's evidence. `score`: fall of −2 log likelihood less the price of its parameters.
+
+    `held_out_drop`: share of the removable held-out error that goes with it. `parameters`: value
+    and standard uncertainty by name, where it was fitted.
+    """
+
+    effect: str
+    score: float
+    held_out_drop: float
+    p_value: float
+    confused_with: tuple[str, ...]
+    explanation: str
+    experiment: str
+    parameters: Mapping[str, tuple[float, float, str]]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`."""
+        return {
+            "effect": self.effect,
+            "score": self.score,
+            "held_out_drop": self.held_out_drop,
+            "p_value": self.p_value,
+            "confused_with": list(self.confused_with),
+            "explanation": self.explanation,
+            "experiment": self.experiment,
+            "parameters": {
+                name: {"value": value, "u": u, "unit": unit}
+                for name, (value, u, unit) in self.parameters.items()
+            },
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class LadderRung:
+    """A model's held-out error, 1 at the noise floor, and rms error of each signal [its unit]."""
+
+    effects: tuple[str, ...]
+    held_out: float
+    signals: Mapping[str, float]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`."""
+        return {
+            "effects": list(self.effects),
+            "held_out": self.held_out,
+            "signals": dict(self.signals),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Remainder:
+    """One place where error over the noise floor is left: χ²/n and its size [unit of signal]."""
+
+    capture: str
+    signal: str
+    order: int
+    chi2_per_n: float
+    size: float
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {
+            "capture": self.capture,
+            "signal": self.signal,
+            "order": self.order,
+            "chi2_per_n": self.chi2_per_n,
+            "size": self.size,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class UnknownStructure:
+    """Error that no known effect explains: where it acts, on what it depends, its shape."""
+
+    signal: str
+    variables: tuple[str, ...]
+    shape: str
+    sketch: tuple[tuple[str, float, str], ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`."""
+        return {
+            "signal": self.signal,
+            "variables": list(self.variables),
+            "shape": self.shape,
+            "sketch": [
+                {"term": term, "coefficient": coefficient, "unit": unit}
+                for term, coefficient, unit in self.sketch
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The verdict on one motor's model, with the ladder that leads to it."""
+
+    motor_id: str
+    model: str
+    verdict: Verdict
+    missing: tuple[str, ...]
+    ranking: tuple[RankedEffect, ...]
+    ladder: tuple[LadderRung, ...]
+    unknown: UnknownStructure | None
+    remainder: tuple[Remainder, ...]
+    notes: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`, schema model-diagnosis/1."""
+        return {
+            "schema": "model-diagnosis/1",
+            "motor_id": self.motor_id,
+            "model": self.model,
+            "verdict": self.verdict,
+            "missing": list(self.missing),
+            "ranking": [ranked.document() for ranked in self.ranking],
+            "ladder": [rung.document() for rung in self.ladder],
+            "unknown": None if self.unknown is None else self.unknown.document(),
+            "remainder": [left.document() for left in self.remainder],
+            "notes": list(self.notes),
+        }
