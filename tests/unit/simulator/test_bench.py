@@ -238,6 +238,15 @@ def test_truth_of_a_linear_motor_is_its_design():
     assert t["hidden"] == ["cogging"]
 
 
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [("gimbal-5208", 84), ("servo-ipm", 72), ("servo-15kw", 60), ("joint-11p", 264)],
+)
+def test_leading_cogging_order_is_the_least_common_multiple_of_slots_and_poles(name, order):
+    """12/14, 18/8, 60/10, 24/22 slots and poles."""
+    assert truth(design(name))["constants"]["cogging_order"] == order
+
+
 def test_truth_counts_effects_in():
     motor = design("gimbal-5208").having(
         cogging={"size": 0.01, "second": 0.4},

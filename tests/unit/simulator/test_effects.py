@@ -193,6 +193,12 @@ def test_current_scale_gain_and_offset():
     assert columns("resistance", "current_scale", 0.04)["ia_a"] == pytest.approx(
         1.04 * columns("resistance")["ia_a"], abs=1e-9
     )
+    for pair, factor in (("ab", 1.06), ("bc", 1.0)):
+        one = columns("resistance", "current_gain", {"size": 0.06, "phase": 0.0}, pair=pair)
+        line = f"i{pair[0]}_a"
+        assert one[line] == pytest.approx(factor * columns("resistance", pair=pair)[line], abs=1e-9)
+    moved = columns("resistance", "current_offset", {"size": 0.5, "phase": 0.0})["ia_a"]
+    assert moved == pytest.approx(columns("resistance")["ia_a"] + 0.5, abs=1e-9)
     slow = {"speed": 0.05, "dwell_s": 1.0}
     gain = settled(columns("torque_map", "current_gain", 0.06, **slow))
     torque = gain["torque_shaft_nm"]
