@@ -122,29 +122,30 @@ _DRAG_NAMES = ("coulomb", "viscous", *FORMS, *CURVE)
 
 
 def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level: float) -> DragFit:
-    """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve."""
+    """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve.
+
+    The rows' noise, and how many of them count as one, are judged on what the richest model
+    leaves: what a poor one leaves is large and correlated because it is poor.
+    """
     y = rows.acceleration_rad_s2
     usable = [n for n in nuisances if float(np.ptp(rows.columns[n])) > 0.0]
     candidates = {name: -rows.columns[name] for name in [*usable, *FORMS]}
     base = np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
-    chosen: list[str] = []
-    for _ in range(2):
-        design = np.column_stack([base, *(candidates[n] for n in chosen)])
-        sigma = _balanced(rows, design, y)
-        tau = autocorrelation_time(linear_fit(design, y, sigma).residuals / sigma, 200)
-        pool = {n: candidates[n] for n in [*usable, "windage"]}
-        chosen = needed_columns(base, pool, y, sigma, level, MOST_NUISANCES, tau)
-        start = np.column_stack([base, *(candidates[n] for n in chosen)])
-        bumps = {n: candidates[n] for n in STRIBECK}
-        chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
-        chosen = _without_dip(chosen, base, candidates, y, sigma)
+    curve_columns = [-rows.columns[n] for n in CURVE]
+    rich = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in usable)])
+    sigma = _balanced(rows, rich, y)
+    tau = autocorrelation_time(linear_fit(rich, y, sigma).residuals / sigma, 200)
+    pool = {n: candidates[n] for n in [*usable, "windage"]}
+    chosen = needed_columns(base, pool, y, sigma, level, MOST_NUISANCES, tau)
+    start = np.column_stack([base, *(candidates[n] for n in chosen)])
+    bumps = {n: candidates[n] for n in STRIBECK}
+    chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
+    chosen = _without_dip(chosen, base, candidates, y, sigma)
     design = np.column_stack([base, *(candidates[n] for n in chosen)])
     names = ("torque", "coulomb", "viscous", *chosen)
     sigma = _balanced(rows, design, y)
     plain = [n for n in chosen if n not in FORMS]
-    curve = np.column_stack(
-        [driving_nm, *(-rows.columns[n] for n in CURVE), *(candidates[n] for n in plain)]
-    )
+    curve = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in plain)])
     curve_names = ("torque", *CURVE, *plain)
     free = _form_fails(rows, design, names, curve, curve_names, y, level) or _implausible(
         rows, design, names, y, sigma
@@ -164,15 +165,20 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
 
 
 def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
-    """Standard deviation [w] of each row: one for drives, one for coast-downs, from the fit."""
+    """Standard deviation [w] of each row: one for drives, one for coast-downs, from the fit.
+
+    Each kind starts from what a fit of its own leaves, so that the better one leads.
+    """
     sigma = np.ones(y.size)
-    for _ in range(4):
+    floor = max(1e-6 * float(np.std(y)), 1e-300)
+    kinds = [mine for mine in (rows.kind == DRIVE, rows.kind == COAST) if np.any(mine)]
+    for mine in kinds:
+        residuals = linear_fit(design[mine], y[mine]).residuals
+        sigma[mine] = max(float(np.sqrt(np.mean(residuals**2))), floor)
+    for _ in range(3):
         residuals = linear_fit(design, y, sigma).residuals
-        for kind in (DRIVE, COAST):
-            mine = rows.kind == kind
-            if np.any(mine):
-                spread = float(np.sqrt(np.mean(residuals[mine] ** 2)))
-                sigma[mine] = max(spread, 1e-6 * float(np.std(y)), 1e-300)
+        for mine in kinds:
+            sigma[mine] = max(float(np.sqrt(np.mean(residuals[mine] ** 2))), floor)
     return sigma
 
 

@@ -1,0 +1,315 @@
+"""Torque, cogging, friction and inertia estimators on simulated benches whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.fit.estimators.cogging import ESTIMATOR as COGGING
+from pipeline.fit.estimators.drive_voltage import ESTIMATOR as DRIVE_VOLTAGE
+from pipeline.fit.estimators.holding_current import ESTIMATOR as HOLDING_CURRENT
+from pipeline.fit.estimators.inductance_rated import ESTIMATOR as INDUCTANCE_RATED
+from pipeline.fit.estimators.inertia import ESTIMATOR as INERTIA
+from pipeline.fit.estimators.spin_down import ESTIMATOR as SPIN_DOWN
+from pipeline.fit.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.fit.protocol import Estimator, Fit
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import type_b
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.catalogue import with_effects
+from pipeline.simulator.design import EXACT, Bench
+from tests.simulated import campaign_of, design
+
+MECHANICAL = ("torque_map", "cogging", "spin_down", "drive", "holding_current")
+EXACT_BENCH = Bench(instruments=EXACT)
+
+
+@cache
+def recorded(
+    effects: str = "", motor: str = "gimbal-5208", tests: tuple[str, ...] = MECHANICAL
+) -> Campaign:
+    """Mechanical tests of one motor, its own cogging replaced by `effects`; exact instruments."""
+    machine = replace(design(motor), effects={})
+    machine = with_effects(machine, effects) if effects else machine
+    plan = tuple(step for step in CAMPAIGN if step[1] in tests)
+    return campaign_of(campaign(machine, EXACT_BENCH, 11, plan))
+
+
+def fitted(estimator: Estimator, captures: Campaign, known: Constants | None = None) -> Fit:
+    return estimator.fit(captures, known or Constants(), estimator.options)
+
+
+def chain(captures: Campaign, *estimators: Estimator) -> Constants:
+    """Estimators one after the other, each seeing what those before it found."""
+    known = Constants()
+    for estimator in estimators:
+        known = known.adding(fitted(estimator, captures, known).estimates)
+    return known
+
+
+def number(known: Constants, method: str, name: str) -> float:
+    found = known.by(method, name)
+    assert found is not None, known.all_of(name)
+    return found.number
+
+
+def test_torque_constant_and_reluctance() -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded(), TORQUE_MAP)
+    kt, reluctance = known.best("kt_peak_nm_a"), known.best("kt_reluctance_nm_a2")
+    assert kt is not None
+    assert reluctance is not None
+    assert kt.number == pytest.approx(1.5 * motor.pole_pairs * motor.psi_pm_wb, rel=3e-4)
+    saliency = 1.5 * motor.pole_pairs * (motor.ld_h - motor.lq_h)
+    assert abs(reluctance.number - saliency) < 4.0 * reluctance.u_a
+    shares = {part.source: part.u / kt.number for part in kt.budget}
+    assert shares["torque@sim-1"] == pytest.approx(0.002, rel=1e-6)
+    assert shares["current@sim-1"] == pytest.approx(-0.002, rel=1e-3)
+
+
+def test_torque_constant_at_25_degrees() -> None:
+    """At 60 degC the magnet has lost 3.85 %; the constant of 25 degC is what is published."""
+    motor = replace(design("gimbal-5208"), effects={})
+    warm = {"temp_magnet_degc": 60.0}
+    plan = (("hot", "torque_map", warm), ("back", "torque_map", {**warm, "speed": -0.3}))
+    captures = campaign_of(campaign(motor, EXACT_BENCH, 1, plan))
+    coefficient = Estimate(
+        "temp_coeff_magnet_1_k", -0.0011, "1/K", "measured", "given", type_b("x", 1e-5)
+    )
+    known = Constants((coefficient,))
+    kt = fitted(TORQUE_MAP, captures, known).estimates[0]
+    truth = 1.5 * motor.pole_pairs * motor.psi_pm_wb
+    assert kt.number == pytest.approx(truth, rel=5e-4)
+    assert next(p.u for p in kt.budget if p.source == "x") != 0.0
+    assumed = fitted(TORQUE_MAP, captures).estimates[0]
+    share = next(p.u for p in assumed.budget if p.source == "assumed:temp_coeff_magnet")
+    assert abs(share) / truth == pytest.approx(35.0 * 5e-4 / (1 - 0.0385), rel=0.05)
+
+
+def test_saturation_does_not_bend_the_torque_constant() -> None:
+    """Saturating q flux takes torque from large currents only; K is the slope at small ones."""
+    motor = design("servo-ipm")
+    known = chain(recorded("saturation,cross_saturation", "servo-ipm"), TORQUE_MAP)
+    kt = known.best("kt_peak_nm_a")
+    assert kt is not None
+    low, high = kt.interval()
+    assert low <= 1.5 * motor.pole_pairs * motor.psi_pm_wb <= high
+    assert kt.u / kt.number < 0.006
+
+
+@pytest.mark.parametrize("effect", ["torque_offset", "torque_lag", "load_dependent_friction"])
+def test_sensor_and_friction_do_not_reach_the_torque_constant(effect: str) -> None:
+    motor = design("gimbal-5208")
+    kt = number(chain(recorded(effect), TORQUE_MAP), "torque_map", "kt_peak_nm_a")
+    assert kt == pytest.approx(1.5 * motor.pole_pairs * motor.psi_pm_wb, rel=1.5e-3)
+
+
+def test_torque_map_without_steps_names_the_experiment() -> None:
+    captures = recorded()
+    first = captures.of("torque_map")[0]
+    short = replace(first, tables=(first.tables[0].head(30),))
+    found = fitted(TORQUE_MAP, Campaign("m", (short,))).estimates
+    assert {e.status for e in found} == {"not_identifiable"}
+    assert all("record a torque_map" in e.note for e in found)
+
+
+def test_rated_inductances() -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded(), INDUCTANCE_RATED)
+    assert number(known, "inductance_rated", "ld_rated_h") == pytest.approx(motor.ld_h, rel=3e-3)
+    lq = known.best("lq_rated_h")
+    assert lq is not None
+    assert lq.number == pytest.approx(motor.lq_h, rel=3e-3)
+    assert lq.at["iq_a"] == pytest.approx(motor.current_rated_a, rel=0.02)
+
+
+def test_rated_inductance_of_a_saturated_axis_is_apparent_flux_over_current() -> None:
+    """Against the flux map of the same motor at the same current, an independent recording."""
+    tests = ("torque_map", "flux_map")
+    captures = recorded("saturation", "gimbal-5208", tests)
+    lq = chain(captures, INDUCTANCE_RATED).best("lq_rated_h")
+    assert lq is not None
+    table = captures.of("flux_map")[0].arrays("id_a", "iq_a", "psi_q_wb")
+    rated = float(table["iq_a"].max())
+    here = (np.abs(table["id_a"]) < 0.05 * rated) & (table["iq_a"] > 0.97 * rated)
+    apparent = float(np.mean(table["psi_q_wb"][here] / table["iq_a"][here]))
+    assert lq.number == pytest.approx(apparent, rel=0.01)
+    assert apparent < 0.97 * design("gimbal-5208").lq_h
+
+
+@pytest.mark.parametrize(("timing", "allowed"), [("held", 3e-3), ("centred", 6e-3)])
+def test_rated_inductance_respects_voltage_timing(timing: str, allowed: float) -> None:
+    """A held voltage is turned by half a period against the sample, a centred one damped.
+
+    At 0.09 rad of half period a polygon and a circle differ by 0.4 %: that doubt is in the budget.
+    """
+    motor = replace(design("gimbal-5208"), effects={})
+    plan = (
+        ("fast", "torque_map", {"speed": 0.8, "voltage_timing": timing}),
+        ("back", "torque_map", {"speed": -0.8, "voltage_timing": timing}),
+    )
+    captures = campaign_of(campaign(motor, EXACT_BENCH, 5, plan))
+    known = chain(captures, INDUCTANCE_RATED)
+    for name, truth in (("lq_rated_h", motor.lq_h), ("ld_rated_h", motor.ld_h)):
+        found = known.best(name)
+        assert found is not None
+        low, high = found.interval()
+        assert low <= truth <= high
+        assert found.number == pytest.approx(truth, rel=allowed)
+
+
+def test_cogging_orders_and_creep_friction() -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded("cogging"), SPIN_DOWN, COGGING)
+    size = 0.02 * motor.torque_rated_nm
+    assert number(known, "cogging", "cogging_order") == 84
+    amplitude = known.best("cogging_amplitude_nm")
+    assert amplitude is not None
+    assert 0.1 * size < amplitude.number < 10.0 * size
+    assert "LCM of slots and poles" in amplitude.note
+    drag = number(known, "cogging", "torque_coulomb_nm")
+    assert drag == pytest.approx(motor.torque_coulomb_nm, rel=5e-3)
+
+
+def test_no_cogging_is_a_result_with_a_limit() -> None:
+    order, amplitude, *_ = fitted(COGGING, recorded()).estimates
+    assert order.status == amplitude.status == "not_identifiable"
+    assert "would have been" in order.note
+
+
+def test_unbalance_is_no_cogging() -> None:
+    order = fitted(COGGING, recorded("unbalance")).estimates[0]
+    assert order.status == "not_identifiable"
+    assert "unbalance or coupling" in order.note
+
+
+def test_one_direction_leaves_friction_and_zero_together() -> None:
+    captures = recorded("cogging")
+    one = Campaign("m", captures.of("cogging")[:1])
+    by_name = {e.name: e for e in fitted(COGGING, one).estimates}
+    assert by_name["torque_coulomb_nm"].status == "not_identifiable"
+
+
+def test_holding_current_sees_the_same_order() -> None:
+    motor = design("gimbal-5208")
+    captures = recorded("cogging")
+    known = chain(captures, TORQUE_MAP, COGGING, HOLDING_CURRENT)
+    assert number(known, "holding_current", "cogging_order") == 84
+    turning = number(known, "cogging", "cogging_amplitude_nm")
+    holding = number(known, "holding_current", "cogging_amplitude_nm")
+    assert holding == pytest.approx(turning, rel=0.02)
+    left = number(known, "holding_current", "holding_residual_a")
+    assert left < 0.2 * holding / (1.5 * motor.pole_pairs * motor.psi_pm_wb)
+
+
+@pytest.mark.parametrize("name", ["gimbal-5208", "drone-2306", "servo-15kw"])
+def test_coast_down_ratios(name: str) -> None:
+    motor = design(name)
+    known = chain(recorded("", name, ("spin_down",)), SPIN_DOWN)
+    coulomb = number(known, "spin_down", "coast_coulomb_rad_s2")
+    viscous = number(known, "spin_down", "coast_viscous_1_s")
+    assert coulomb == pytest.approx(motor.torque_coulomb_nm / motor.j_rotor_kgm2, rel=2e-4)
+    assert viscous == pytest.approx(motor.b_visc_nm_s_rad / motor.j_rotor_kgm2, rel=2e-3)
+
+
+@pytest.mark.parametrize("effect", ["windage", "stribeck", "angle_eccentricity"])
+def test_coast_down_ratios_with_more_than_coulomb_and_viscous(effect: str) -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded(effect), SPIN_DOWN)
+    coulomb = number(known, "spin_down", "coast_coulomb_rad_s2")
+    assert coulomb == pytest.approx(motor.torque_coulomb_nm / motor.j_rotor_kgm2, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "effect", ["", "cogging", "windage", "stribeck", "unbalance", "bemf_harmonics", "torque_lag"]
+)
+def test_inertia_and_friction(effect: str) -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded(effect), SPIN_DOWN, TORQUE_MAP, COGGING, INERTIA)
+    assert number(known, "inertia", "j_rotor_kgm2") == pytest.approx(motor.j_rotor_kgm2, rel=0.004)
+    friction = number(known, "inertia", "torque_coulomb_nm")
+    assert friction == pytest.approx(motor.torque_coulomb_nm, rel=0.02)
+    viscous = number(known, "inertia", "b_visc_nm_s_rad")
+    assert viscous == pytest.approx(motor.b_visc_nm_s_rad, rel=0.06)
+
+
+def test_inertia_carries_the_torque_gain_and_not_the_current_gain() -> None:
+    """J = Kt i / alpha and Kt = T / i: the current gain cancels, the torque gain stays."""
+    known = chain(recorded(), SPIN_DOWN, TORQUE_MAP, COGGING, INERTIA)
+    inertia = known.by("inertia", "j_rotor_kgm2")
+    assert inertia is not None
+    shares = {part.source: part.u / inertia.number for part in inertia.budget}
+    assert shares["torque@sim-1"] == pytest.approx(0.002, rel=0.01)
+    assert abs(shares.get("current@sim-1", 0.0)) < 2e-5
+
+
+def test_inertia_without_a_torque_constant_says_so() -> None:
+    found = fitted(INERTIA, recorded()).estimates
+    assert {e.status for e in found} == {"not_identifiable"}
+    assert all("torque constant" in e.note for e in found)
+
+
+def test_drag_of_another_form_is_not_called_viscous() -> None:
+    """A brake whose drag peaks and falls: J holds, B is refused, Coulomb is allowed for."""
+    from pipeline.simulator.outside import with_unknown
+
+    motor = with_unknown(replace(design("gimbal-5208"), effects={}), "eddy_brake", 3.0)
+    plan = tuple(step for step in CAMPAIGN if step[1] in MECHANICAL)
+    captures = campaign_of(campaign(motor, EXACT_BENCH, 2, plan))
+    known = chain(captures, SPIN_DOWN, TORQUE_MAP, COGGING, INERTIA)
+    assert number(known, "inertia", "j_rotor_kgm2") == pytest.approx(motor.j_rotor_kgm2, rel=0.006)
+    assert known.by("inertia", "b_visc_nm_s_rad") is None
+    friction = known.by("inertia", "torque_coulomb_nm")
+    assert friction is not None
+    low, high = friction.interval()
+    assert low <= motor.torque_coulomb_nm <= high
+
+
+def test_back_emf_constant_from_a_drive() -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded(), DRIVE_VOLTAGE)
+    ke = known.best("ke_phase_peak_v_s_rad")
+    assert ke is not None
+    low, high = ke.interval()
+    assert low <= motor.pole_pairs * motor.psi_pm_wb <= high
+    assert ke.u < 0.003 * ke.number
+    assert number(known, "drive_voltage", "r_phase_ohm") == pytest.approx(
+        motor.r_phase_ohm, rel=0.02
+    )
+
+
+def test_angle_counts_where_the_bench_lags() -> None:
+    """The bench's own speed, late by 20 ms, must not change anything where the angle is there."""
+    captures = recorded()
+    late = []
+    for capture in captures.of("drive"):
+        table = capture.tables[0]
+        rate = 1.0 / float(table["t_s"][1] - table["t_s"][0])
+        shifted = table["omega_mech_rad_s"].shift(round(0.02 * rate), fill_value=0.0)
+        late.append(
+            replace(capture, tables=(table.with_columns(shifted.alias("omega_mech_rad_s")),))
+        )
+    slow = fitted(DRIVE_VOLTAGE, Campaign("m", tuple(late))).estimates
+    assert slow == fitted(DRIVE_VOLTAGE, captures).estimates
+
+
+def test_masked_rows_are_not_used() -> None:
+    """Rows with no number anywhere are left out and everything else stays."""
+    captures = recorded()
+    holed = []
+    for capture in captures.of("torque_map"):
+        table = capture.tables[0]
+        torque = table["torque_shaft_nm"].to_numpy().copy()
+        torque[1000:1003] = np.nan
+        holed.append(
+            replace(capture, tables=(table.with_columns(pl.Series("torque_shaft_nm", torque)),))
+        )
+    kt = fitted(TORQUE_MAP, Campaign("m", tuple(holed))).estimates[0]
+    whole = fitted(TORQUE_MAP, captures).estimates[0]
+    assert kt.number == pytest.approx(whole.number, rel=1e-3)
