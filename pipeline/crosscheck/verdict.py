@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from pipeline.records.datasheet import CaptureReference, Check, DatasheetStatus
+from pipeline.records.datasheet import AWAITS_APPROVAL, CaptureReference, Check, DatasheetStatus
 from pipeline.records.estimate import Estimate
 
 
@@ -34,7 +34,7 @@ def verdict(
         elif estimate.at_bound:
             why.append(f"at its bound: {name}")
     if release != "auto":
-        why.append("not approved: approve it in the registry, or run with release=auto")
+        why.append(AWAITS_APPROVAL)
     return ("provisional", tuple(why)) if why else ("released", ())
 
 

@@ -24,7 +24,9 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
     The block means of 1.5 (vd id + vq iq) are regressed on shaft power, i² (copper), |i|
     (inverter drop), |omega| and omega² (friction, iron): the coefficient of shaft power is 1 in any
-    machine, whatever it loses, and lands on a convention's number where one is wrong.
+    machine, whatever it loses, and lands on a convention's number where one is wrong. i_q omega
+    is the instrument for shaft power, so that a shaft that rings does not pull it to zero
+    (Durbin, Rev. Inst. Int. Stat. 22, 1954).
     """
     r_phase = constants.best("r_phase_ohm")
     captures = [c for c in campaign.of("torque_map") if c.has(*COLUMNS)]
@@ -50,7 +52,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 
 def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
-    """Block means [n, 7]: net power, shaft power, i², |i|, |omega|, omega², 1; all in SI.
+    """Block means [n, 8]: net power, i_q omega, shaft power, i², |i|, |omega|, omega², 1; SI.
 
     Copper loss at the winding's temperature is taken off where R and the temperature are known,
     so that its slow growth is not read as anything else.
@@ -64,7 +66,15 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
         power = power - 1.5 * r_ohm * i_squared
     omega = data["omega_mech_rad_s"]
     shaft = data["torque_shaft_nm"] * omega
-    columns = (power, shaft, i_squared, np.sqrt(i_squared), np.abs(omega), omega**2)
+    columns = (
+        power,
+        data["iq_a"] * omega,
+        shaft,
+        i_squared,
+        np.sqrt(i_squared),
+        np.abs(omega),
+        omega**2,
+    )
     rows = np.column_stack([*columns, np.ones(omega.size)])
     rows = rows[np.isfinite(rows).all(axis=1)]
     size = max(1, rows.shape[0] // BINS)
@@ -74,16 +84,25 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
 
 
 def _slope(blocks: NDArray[np.float64]) -> tuple[float, float]:
-    """Coefficient of shaft power and its standard uncertainty, robust to unequal scatter."""
-    y, x = blocks[:, 0], blocks[:, 1:]
-    scale = np.maximum(np.abs(x).max(axis=0), 1e-300)
-    scaled = x / scale
-    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10)
-    beta = bread @ (scaled.T @ y)
-    meat = scaled * (y - scaled @ beta)[:, None]
-    lagged = sum((meat[k:].T @ meat[: len(meat) - k] for k in range(1, 6)), np.zeros_like(bread))
-    spread = bread @ (meat.T @ meat + lagged + lagged.T) @ bread
-    return float(beta[0] / scale[0]), float(np.sqrt(max(spread[0, 0], 0.0)) / scale[0])
+    """Coefficient of shaft power by the instrument in column 1, and its standard uncertainty.
+
+    Sandwich with five lags (Newey and West, Econometrica 55, 1987): blocks neither scatter alike
+    nor independently.
+    """
+    scale = np.maximum(np.abs(blocks).max(axis=0), 1e-300)
+    scaled = blocks / scale
+    y, x = scaled[:, 0], scaled[:, 2:]
+    instruments = np.column_stack([scaled[:, 1], scaled[:, 3:]])
+    bread = np.linalg.pinv(instruments.T @ x, rcond=1e-10)
+    beta = bread @ (instruments.T @ y)
+    meat = instruments * (y - x @ beta)[:, None]
+    spread = meat.T @ meat
+    for lag in range(1, 6):
+        shifted = (1.0 - lag / 6.0) * (meat[lag:].T @ meat[:-lag])
+        spread = spread + shifted + shifted.T
+    unit = scale[0] / scale[2]
+    u = np.sqrt(max(float((bread @ spread @ bread.T)[0, 0]), 0.0))
+    return float(beta[0]) * unit, float(u) * unit
 
 
 RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("torque_map",))

@@ -1,0 +1,235 @@
+"""Each check: passes a sound motor, fails the fault it exists for, and names the suspect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.crosscheck.registry import rules
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import Check
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import type_a, type_b
+
+P, PSI, LD, LQ, R = 7, 0.0071, 1.9e-4, 2.35e-4, 0.42
+EMPTY = Campaign("m", ())
+SOUND: dict[str, tuple[float, str]] = {
+    "kt_peak_nm_a": (1.5 * P * PSI, "torque_map"),
+    "kt_reluctance_nm_a2": (1.5 * P * (LD - LQ), "torque_map"),
+    "kt_from_ke_nm_a": (1.5 * P * PSI, "open_circuit"),
+    "pole_pairs": (P, "open_circuit"),
+    "ld_h": (LD, "current_step"),
+    "lq_h": (LQ, "current_step"),
+    "r_phase_ohm": (R, "resistance"),
+    "resistance_imbalance": (0.004, "resistance"),
+    "temp_coeff_copper_1_k": (1.0 / 259.5, "heat_run"),
+    "cogging_order": (84, "cogging"),
+}
+
+
+def constants(changed: Mapping[str, float | None] | None = None, u_rel: float = 0.002) -> Constants:
+    """The sound motor's constants, some changed; None takes one away."""
+    found = []
+    for name, (value, method) in SOUND.items():
+        now = (changed or {}).get(name, value)
+        if now is not None:
+            budget = type_a(f"scatter:{name}", u_rel * abs(now))
+            found.append(Estimate(name, now, "1", "measured", method, budget))
+    return Constants(tuple(found))
+
+
+def judge(name: str, known: Constants, campaign: Campaign = EMPTY) -> Check:
+    rule = next(rule for rule in rules() if rule.name == name)
+    return rule.check(known, campaign, rule.options)
+
+
+def campaign_of(test: str, columns: Mapping[str, np.ndarray], **meta: object) -> Campaign:
+    said = CaptureMeta("m", test, **meta)  # type: ignore[arg-type]
+    capture = Capture(f"{test}.csv", "0", "verified", said, (pl.DataFrame(dict(columns)),))
+    return Campaign("m", (capture,))
+
+
+def nameplate(**meta: object) -> Campaign:
+    return campaign_of("resistance", {"t_s": np.arange(3.0)}, **meta)
+
+
+def test_the_names_are_those_of_the_contract() -> None:
+    assert [rule.name for rule in rules()] == sorted(
+        [
+            "kt_vs_ke",
+            "saliency_ratio",
+            "resistance_temperature",
+            "resistance_balance",
+            "pole_pairs_nameplate",
+            "lcr_vs_step_inductance",
+            "torque_equation",
+            "cogging_order_vs_slots",
+            "power_balance",
+            "tau_elec_vs_l_over_r",
+        ]
+    )
+
+
+@pytest.mark.parametrize("name", [rule.name for rule in rules()])
+def test_nothing_known_is_never_a_pass(name: str) -> None:
+    check = judge(name, Constants())
+    assert check.status == "not_evaluated"
+    assert check.value is None
+    assert "needs" in check.meaning
+
+
+@pytest.mark.parametrize(
+    ("factor", "number"),
+    [(2 / math.sqrt(3), "1.1547"), (math.sqrt(2), "1.4142"), (1.5, "1.5"), (1 / 7, "pole pairs")],
+)
+def test_kt_against_ke_names_the_convention(factor: float, number: str) -> None:
+    assert judge("kt_vs_ke", constants()).status == "pass"
+    check = judge("kt_vs_ke", constants({"kt_peak_nm_a": 1.5 * P * PSI * factor}))
+    assert check.status == "fail"
+    assert check.value == pytest.approx(factor)
+    assert number in (check.suspect or "")
+
+
+def test_kt_from_back_emf_is_no_measurement_of_kt() -> None:
+    """With both from the open-circuit spin the comparison would be of a number with itself."""
+    same = Estimate("kt_peak_nm_a", 0.07, "1", "derived", "open_circuit", type_b("v@r", 1e-4))
+    rest = [e for e in constants().estimates if e.name != "kt_peak_nm_a"]
+    assert judge("kt_vs_ke", Constants((*rest, same))).status == "not_evaluated"
+
+
+def test_exchanged_axes_are_told_from_a_flux_intensifying_machine() -> None:
+    exchanged = {"ld_h": LQ, "lq_h": LD}
+    assert judge("saliency_ratio", constants()).status == "pass"
+    against = judge("saliency_ratio", constants(exchanged))
+    assert against.status == "fail"
+    assert "exchanged" in (against.suspect or "")
+    agreeing = {**exchanged, "kt_reluctance_nm_a2": 1.5 * P * (LQ - LD)}
+    assert judge("saliency_ratio", constants(agreeing)).status == "pass"
+    unknown = {**exchanged, "kt_reluctance_nm_a2": None}
+    assert judge("saliency_ratio", constants(unknown)).status == "marginal"
+    assert judge("saliency_ratio", constants({"lq_h": 12 * LD})).status == "fail"
+
+
+def test_resistance_follows_copper() -> None:
+    assert judge("resistance_temperature", constants()).status == "pass"
+    off = judge("resistance_temperature", constants({"temp_coeff_copper_1_k": 0.0032}))
+    assert off.status == "fail"
+
+
+def test_balance_of_the_phases() -> None:
+    assert judge("resistance_balance", constants()).status == "pass"
+    check = judge("resistance_balance", constants({"resistance_imbalance": 0.05}))
+    assert (check.status, check.limit) == ("fail", pytest.approx(0.02 + 2 * 0.002 * 0.05))
+
+
+@pytest.mark.parametrize(
+    ("stated", "status", "words"), [(7, "pass", ""), (14, "fail", "poles"), (8, "fail", "gear")]
+)
+def test_nameplate(stated: int, status: str, words: str) -> None:
+    check = judge("pole_pairs_nameplate", constants(), nameplate(pole_pairs=stated))
+    assert check.status == status
+    assert words in (check.suspect or "")
+
+
+@pytest.mark.parametrize(
+    ("order", "status"),
+    [(84, "pass"), (168, "pass"), (12, "marginal"), (14, "marginal"), (1, "marginal"), (5, "fail")],
+)
+def test_cogging_order(order: int, status: str) -> None:
+    check = judge(
+        "cogging_order_vs_slots", constants({"cogging_order": order}), nameplate(slots=12)
+    )
+    assert check.status == status
+
+
+def test_meter_against_steps_takes_the_worse_axis() -> None:
+    meter = [
+        Estimate("ld_h", LD, "H", "measured", "lcr", type_a("a", 1e-7)),
+        Estimate("lq_h", 2 * LQ, "H", "measured", "lcr", type_a("b", 1e-7)),
+    ]
+    check = judge("lcr_vs_step_inductance", constants().adding(meter))
+    assert check.status == "fail"
+    assert check.value == pytest.approx(2.0)
+    assert (check.suspect or "").startswith("2:")
+
+
+def torque_map(gain: float = 1.0, ringing_nm: float = 0.0) -> Campaign:
+    """A dynamometer test from the dq equations: 3 speeds, 30 current pairs, losses and noise."""
+    rng = np.random.default_rng(3)
+    rows = 200
+    omega = np.repeat([50.0, -50.0, 150.0], 30 * rows)
+    levels = rng.uniform([-5.0, -9.0], [0.0, 9.0], (90, 2))
+    id_a, iq_a = np.repeat(levels, rows, axis=0).T
+    torque = 1.5 * P * (PSI * iq_a + (LD - LQ) * id_a * iq_a)
+    ring = ringing_nm * np.sin(0.9 * np.arange(omega.size) + np.repeat(rng.uniform(0, 6, 90), rows))
+    drop = 0.2 * np.array([id_a, iq_a]) / np.hypot(id_a, iq_a)
+    vd = R * id_a - P * omega * LQ * iq_a + drop[0]
+    vq = R * iq_a + P * omega * (LD * id_a + PSI) + drop[1]
+    shaft = torque - 0.005 * np.sign(omega) - 2e-5 * omega
+    columns = {
+        "t_s": 1e-4 * np.arange(omega.size),
+        "id_a": id_a,
+        "iq_a": iq_a,
+        "vd_v": gain * vd + rng.normal(0, 0.05, omega.size),
+        "vq_v": gain * vq + rng.normal(0, 0.05, omega.size),
+        "omega_mech_rad_s": omega,
+        "torque_shaft_nm": shaft + ring + rng.normal(0, 0.005, omega.size),
+    }
+    return campaign_of("torque_map", columns)
+
+
+def test_power_balance_sees_no_loss_as_a_fault() -> None:
+    """Friction, copper and an inverter's drop are there; the slope on shaft power is 1."""
+    check = judge("power_balance", constants(), torque_map())
+    assert check.status == "pass"
+    assert check.value == pytest.approx(1.0, abs=0.005)
+
+
+def test_a_ringing_shaft_does_not_unbalance_the_power() -> None:
+    check = judge("power_balance", constants(), torque_map(ringing_nm=1.0))
+    assert check.status in ("pass", "not_evaluated")
+
+
+def test_line_voltage_taken_for_phase_unbalances_the_power() -> None:
+    check = judge("power_balance", constants(), torque_map(gain=math.sqrt(3.0)))
+    assert check.status == "fail"
+    assert "1.7321" in (check.suspect or "")
+
+
+def test_torque_equation_needs_both_terms() -> None:
+    whole = torque_map()
+    assert judge("torque_equation", constants(), whole).status == "pass"
+    wrong_sign = constants({"kt_reluctance_nm_a2": -10 * P * (LD - LQ)})
+    assert judge("torque_equation", wrong_sign, whole).status == "fail"
+
+
+def current_step(tau_s: float) -> Campaign:
+    """A step up and down on pair ab with d on it, from the closed form, with noise."""
+    rng = np.random.default_rng(5)
+    t_s = 1e-5 * np.arange(1200)
+    on = (t_s >= 1e-3) & (t_s < 7e-3)
+    top = 2.0 * (1.0 - math.exp(-6e-3 / tau_s))
+    rising = 2.0 * (1.0 - np.exp(-(t_s - 1e-3) / tau_s))
+    falling = top * np.exp(-np.maximum(t_s - 7e-3, 0.0) / tau_s)
+    i = np.where(on, rising, np.where(t_s < 1e-3, 0.0, falling))
+    columns = {
+        "t_s": t_s,
+        "vab_v": np.where(on, 4.0 * R, 0.0) + rng.normal(0, 0.003, t_s.size),
+        "ia_a": i + rng.normal(0, 0.004, t_s.size),
+    }
+    return campaign_of("current_step", columns, pair="ab", theta_elec_deg=-30.0)
+
+
+def test_the_current_s_own_time_constant() -> None:
+    """2 Ld over 2 R on the d axis; a lead resistance of 8 % shortens it by as much."""
+    sound = judge("tau_elec_vs_l_over_r", constants(), current_step(LD / R))
+    assert sound.status == "pass"
+    assert sound.value == pytest.approx(1.0, abs=0.005)
+    leads = judge("tau_elec_vs_l_over_r", constants(), current_step(LD / (1.08 * R)))
+    assert leads.status == "fail"
+    assert leads.value == pytest.approx(1.0 / 1.08, abs=0.005)
