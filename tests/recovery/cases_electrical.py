@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -30,6 +31,7 @@ from tests.recovery.simulated import BENCH, MOTOR, Plan, recorded
 
 SIGMA_I = BENCH.current_noise_rel * MOTOR.current_rated_a
 SIGMA_V = BENCH.voltage_noise_rel * MOTOR.vdc_v
+EXACT_CURRENT = replace(BENCH, u_rel_current=0.0)
 WARM_DEGC = 62.0
 RESISTANCE: Plan = (
     ("resistance_ab", "resistance", {"pair": "ab"}),
@@ -127,9 +129,9 @@ def _step_trial(seed: int) -> Trial:
 
 
 def _axis_bound(l_phase_h: float) -> float:
-    """One axis: the levels share L; R, current offset, both edges and the voltage are each's own.
+    """One axis: the levels share L; R, current offset, both edges and the voltages are each's own.
 
-    The samples of the voltage on a level are worth their mean, an observation of it.
+    The samples of the voltage before, on and after the step are worth their three means.
     """
     how = CurrentStep()
     tau = MOTOR.tau_elec_s
@@ -145,15 +147,18 @@ def _axis_bound(l_phase_h: float) -> float:
     def mean(p: np.ndarray) -> np.ndarray:
         parts = []
         for k in range(3):
-            r, offset, start, stop, volts = p[1 + 5 * k : 6 + 5 * k]
-            step = rise(t - start, p[0] / r) - rise(t - stop, p[0] / r)
-            parts += [volts / r * step + offset, np.array([volts])]
+            r, offset, start, stop, rest, volts, after = p[1 + 7 * k : 8 + 7 * k]
+            up, down = rise(t - start, p[0] / r), rise(t - stop, p[0] / r)
+            current = (rest + (volts - rest) * up + (after - volts) * down) / r
+            parts += [current + offset, np.array([rest, volts, after])]
         return np.concatenate(parts)
 
     at = [2.0 * l_phase_h]
     for amp in amps:
-        at += [r_ll, 0.0, before / rate - 0.3 / rate, (before + on) / rate - 0.3 / rate, amp * r_ll]
-    one = np.append(np.full(t.size, SIGMA_I), SIGMA_V / math.sqrt(on))
+        edges = (before - 0.3) / rate, (before + on - 0.3) / rate
+        at += [r_ll, 0.0, *edges, 0.0, amp * r_ll, 0.0]
+    levels = SIGMA_V / np.sqrt([before, on, off])
+    one = np.append(np.full(t.size, SIGMA_I), levels)
     covariance = cramer_rao(mean, np.array(at), np.tile(one, 3), step=1e-7)
     return math.sqrt(covariance[0, 0]) / 2.0
 
@@ -277,7 +282,7 @@ def _heat_bound() -> Mapping[str, float]:
 
 
 def _thermal_trial(seed: int) -> Trial:
-    campaign, real = recorded((*LONG_HEAT, *RESISTANCE), seed)
+    campaign, real = recorded((*LONG_HEAT, *RESISTANCE), seed, bench=EXACT_CURRENT)
     known = Constants(
         resistance.ESTIMATOR.fit(campaign, Constants(), resistance.ESTIMATOR.options).estimates
     )
@@ -334,7 +339,7 @@ def _thermal_bound() -> Mapping[str, float]:
 CASES = (
     Case("resistance", resistance.ESTIMATOR, _resistance_trial, _resistance_bound),
     Case("soak", soak.ESTIMATOR, _soak_trial, _soak_bound),
-    Case("current_step", current_step.ESTIMATOR, _step_trial, _step_bound),
+    Case("current_step", current_step.ESTIMATOR, _step_trial, _step_bound, few=8),
     Case("lcr", lcr.ESTIMATOR, _lcr_trial, _lcr_bound),
     Case("open_circuit", open_circuit.ESTIMATOR, _spin_trial, _spin_bound),
     Case("hand_turn", hand_turn.ESTIMATOR, _hand_trial, _hand_bound),

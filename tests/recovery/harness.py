@@ -43,7 +43,8 @@ class Trial:
 class Case:
     """One estimator on one bench; `bound()` gives the Cramér-Rao deviation of each constant.
 
-    Constants without an entry in `bound()` are judged on bias and coverage alone.
+    Constants without an entry in `bound()` are judged on bias and coverage alone. `few` is the
+    number of seeds of the default run, smaller where a seed takes long.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Case:
     simulate: Callable[[int], Trial]
     bound: Callable[[], Mapping[str, float]]
     options: Mapping[str, float] = field(default_factory=dict)
+    few: int = 60
 
 
 @dataclass(frozen=True)
