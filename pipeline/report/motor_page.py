@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pipeline.physics.glossary import Term
 from pipeline.physics.notation import MINUS, Reading, plain, quantity, reading, significant
 from pipeline.records.datasheet import Check, Datasheet
 from pipeline.records.estimate import Estimate
@@ -65,10 +66,17 @@ class Figure:
 
 
 def render_motor(
-    datasheet: Datasheet, evidence: tuple[Evidence, ...], findings: tuple[Finding, ...]
+    datasheet: Datasheet,
+    evidence: tuple[Evidence, ...],
+    findings: tuple[Finding, ...],
+    own: Mapping[str, Term] | None = None,
 ) -> str:
-    """The self-contained HTML page of one motor; equal input gives equal text."""
-    rows = {name: _row(name, datasheet) for name in sorted(datasheet.constants)}
+    """The self-contained HTML page of one motor; equal input gives equal text.
+
+    `own` are the terms of constants that the glossary does not know, by name.
+    """
+    words = {name: constant_words(name, own) for name in sorted(datasheet.constants)}
+    rows = {name: _row(name, words[name], datasheet) for name in words}
     figures = _figures(datasheet.constants, evidence)
     counts: Counter[str] = Counter(check.status for check in datasheet.checks)
     return render(
@@ -94,14 +102,14 @@ def check_number(value: float | None, unit: str) -> str:
     return plain(value, 5) if unit == "1" else quantity(value, unit)
 
 
-def _row(name: str, datasheet: Datasheet) -> Row:
+def _row(name: str, words: str, datasheet: Datasheet) -> Row:
     estimate = datasheet.constants[name]
     others = tuple(_alternative(e, estimate) for e in datasheet.alternatives if e.name == name)
     shown = reading(estimate.number, estimate.u, estimate.unit) if estimate.known else None
     return Row(
         name=name,
         symbol=symbol(name),
-        words=constant_words(name),
+        words=words,
         estimate=estimate,
         reading=shown,
         relative=_relative(estimate),

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
-from pipeline.physics.glossary import CONSTANTS
+from pipeline.physics.glossary import CONSTANTS, Term
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "Electrical": (
@@ -92,13 +92,13 @@ _SYMBOLS: dict[str, tuple[str, str]] = {
 
 
 def symbol(name: str) -> tuple[str, str]:
-    """Letter and subscript of a constant; the name itself where it has no usual symbol."""
-    return _SYMBOLS.get(name, (name.replace("_", " "), ""))
+    """Letter and subscript of a constant; both empty where it has no usual symbol."""
+    return _SYMBOLS.get(name, ("", ""))
 
 
-def constant_words(name: str) -> str:
-    """What a constant is, in the glossary's words; a plug-in's own constant is its name."""
-    term = CONSTANTS.get(name)
+def constant_words(name: str, own: Mapping[str, Term] | None = None) -> str:
+    """What a constant is, in the glossary's words or in those of the plug-in that owns it."""
+    term = CONSTANTS.get(name) or (own or {}).get(name)
     if term is None:
         return name.replace("_", " ")
     words = term.words.replace("degC", "°C")

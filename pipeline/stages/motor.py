@@ -12,7 +12,7 @@ from pipeline.contracts.motor import agree
 from pipeline.contracts.validate import validate
 from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.verdict import verdict
-from pipeline.fit.registry import fit_all
+from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.code_version import code_version
 from pipeline.io.ingest import Entry, read_capture
 from pipeline.io.publish import canonical_json, write_whole
@@ -96,7 +96,8 @@ def assemble(
 ) -> Datasheet:
     """The datasheet of one motor; its version is a digest of inputs, configuration and code."""
     references = tuple(
-        CaptureReference(c.path, c.sha256, c.meta.test, c.integrity) for c in campaign.captures
+        CaptureReference(c.path, c.sha256, c.meta.test, c.integrity, c.meta.station)
+        for c in campaign.captures
     )
     chosen = constants.chosen()
     status, why = verdict(chosen, checks, references, job.required, job.release)
@@ -144,7 +145,8 @@ def _write(
 
         files.append(f"report/{stem}.html")
         with watch.stage("report"):
-            page = render_motor(datasheet, evidence, findings)
+            terms = {term.name: term for estimator in estimators() for term in estimator.terms}
+            page = render_motor(datasheet, evidence, findings, terms)
             write_whole(output / files[-1], page.encode())
     if job.recordings:
         from pipeline.io.recording import write_recording
