@@ -116,6 +116,7 @@ def _check() -> Schema:
 def datasheet_schema() -> Schema:
     """`datasheets/MOTOR.json`."""
     capture = {"path": NAME, "sha256": SHA256, "test": {"enum": [*TESTS]}}
+    capture["integrity"] = _one_of(Integrity)
     constants: Schema = {
         "type": "object",
         "properties": {name: _constant(term) for name, term in sorted(CONSTANTS.items())},
@@ -130,7 +131,7 @@ def datasheet_schema() -> Schema:
             "status": _one_of(DatasheetStatus),
             "provenance": _object(
                 {
-                    "captures": _list(_object({**capture, "integrity": _one_of(Integrity)})),
+                    "captures": _list(_object(capture, {"station": _or_null(TEXT)})),
                     "config_sha256": SHA256,
                     "code_version": NAME,
                 }

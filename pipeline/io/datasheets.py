@@ -56,7 +56,7 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
         status=document["status"],
         why=tuple(document.get("why", ())),
         captures=tuple(
-            CaptureReference(c["path"], c["sha256"], c["test"], c["integrity"])
+            CaptureReference(c["path"], c["sha256"], c["test"], c["integrity"], c.get("station"))
             for c in provenance["captures"]
         ),
         config_sha256=provenance["config_sha256"],

@@ -28,10 +28,7 @@ def write_whole(path: Path, content: bytes) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
+        write_synced(temporary, content)
         temporary.replace(path)
         sync_folder(path.parent)
     except OSError as error:
@@ -42,9 +39,22 @@ def write_whole(path: Path, content: bytes) -> None:
         ) from error
 
 
+def write_synced(path: Path, content: bytes) -> None:
+    """Writes a file and waits until the disk has it; its name in the folder may still be lost."""
+    with path.open("wb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
 def sync_folder(folder: Path) -> None:
     """Makes renames in a folder survive a power cut."""
-    handle = os.open(folder, os.O_RDONLY)
+    sync_file(folder)
+
+
+def sync_file(path: Path) -> None:
+    """Makes the content of a file that another library wrote survive a power cut."""
+    handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
     finally:

@@ -11,6 +11,9 @@ from pipeline.records.estimate import Estimate
 CheckStatus = Literal["pass", "marginal", "fail", "not_evaluated"]
 DatasheetStatus = Literal["released", "provisional", "refused"]
 
+# The one reason in `why` that a person's approval settles.
+AWAITS_APPROVAL = "not approved: approve it in the registry, or run with release=auto"
+
 
 @dataclass(frozen=True, slots=True)
 class Check:
@@ -45,6 +48,7 @@ class CaptureReference:
     sha256: str
     test: str
     integrity: str
+    station: str | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -53,6 +57,7 @@ class CaptureReference:
             "sha256": self.sha256,
             "test": self.test,
             "integrity": self.integrity,
+            "station": self.station,
         }
 
 

@@ -1,0 +1,340 @@
+"""The registry: every datasheet version ever published, and what people decided of it.
+
+A Delta table of events (`registry_table`) that only grows, and a JSON file a version beside it
+(`registry_exports`). Nothing here reads a clock; whoever publishes or decides says when it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, Literal
+
+from pipeline.io.datasheets import datasheet_of
+from pipeline.io.publish import canonical_json
+from pipeline.io.registry_exports import Exports, Key, place_of
+from pipeline.io.registry_table import EventTable, Row
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.errors import PipelineError, UsageError
+from pipeline.records.ledger import (
+    START,
+    Event,
+    Selection,
+    Version,
+    faults,
+    histories,
+    in_force,
+    select,
+)
+
+DIGEST = re.compile("[0-9a-f]{64}")
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What became of the datasheets handed in: all are in the registry but the `conflicts`.
+
+    A conflict is a version that is registered with other content, although equal inputs,
+    configuration and code must give equal bytes; the registered content stays.
+    """
+
+    added: tuple[Event, ...]
+    known: tuple[Event, ...]
+    conflicts: tuple[Event, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What `verify` found: `faults` are mismatches and gaps, `notes` traces of dead writers."""
+
+    versions: int
+    decisions: int
+    faults: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """A datasheet document on its way in."""
+
+    said: Mapping[str, Any]
+    content: bytes
+    sha256: str
+
+    @property
+    def key(self) -> Key:
+        return self.said["motor_id"], self.said["version"]
+
+
+class Registry:
+    """A registry in a folder or at an object-store URL; `options` are deltalake's for a URL."""
+
+    def __init__(self, place: str, options: Mapping[str, str] | None = None) -> None:
+        self.place = place
+        self._table = EventTable(place, options)
+        self._exports = Exports(place, options)
+
+    def publish(self, documents: Iterable[Mapping[str, Any]], now: datetime) -> Receipt:
+        """Registers datasheet documents (`contract/outputs.md`) in one commit, each version once.
+
+        When it returns, the disk has the rows and the files. Safe to repeat after any failure and
+        beside other writers. Raises MachineError where the registry cannot be written.
+        """
+        sheets = {sheet.key: sheet for sheet in map(_sheet, documents)}
+        if not sheets:
+            return Receipt((), (), ())
+        prepared: set[Key] = set()
+
+        def decide(events: Sequence[Event]) -> list[Row]:
+            known = {event.key for event in events}
+            new = [sheet for sheet in sheets.values() if sheet.key not in known]
+            for sheet in new:
+                if sheet.key not in prepared:
+                    self._exports.prepare(sheet.key, sheet.content)
+                    prepared.add(sheet.key)
+            return _rows(events, new, now)
+
+        try:
+            before, added = self._table.append(decide)
+        except BaseException:
+            for key in prepared:
+                self._exports.discard(key)
+            raise
+        return self._settled(sheets, before, added)
+
+    def _settled(
+        self, sheets: Mapping[Key, _Sheet], before: Sequence[Event], added: Sequence[Event]
+    ) -> Receipt:
+        registered = {e.key: e for e in reversed(before) if e.kind == "publish"}
+        known, conflicts = [], []
+        for event in added:
+            self._exports.settle(event.key, sheets[event.key].content)
+        for key in sheets.keys() - {event.key for event in added}:
+            event = registered[key]
+            if event.content_sha256 == sheets[key].sha256:
+                self._exports.settle(key, sheets[key].content)
+                known.append(event)
+            else:
+                self._exports.discard(key)
+                conflicts.append(event)
+        order = sorted(known, key=lambda e: e.sequence), sorted(conflicts, key=lambda e: e.sequence)
+        return Receipt(tuple(added), tuple(order[0]), tuple(order[1]))
+
+    def decide(
+        self,
+        kind: Literal["approve", "revoke"],
+        wanted: Selection,
+        by: str,
+        why: str,
+        now: datetime,
+    ) -> tuple[Version, bool]:
+        """Appends a decision; (the version with it, whether it is new).
+
+        Repeating the last decision adds nothing. Raises UsageError where `wanted` is not exactly
+        one version, where the version is refused, and for an approval where something other than
+        the approval is missing.
+        """
+        found: list[Version] = []
+
+        def append(events: Sequence[Event]) -> list[Row]:
+            version = one_of(select(events, wanted), wanted, self.place)
+            _allowed(kind, version)
+            found[:] = [version]
+            last = version.decisions[-1] if version.decisions else None
+            if last is not None and (last.kind, last.by, last.why) == (kind, by, why):
+                return []
+            number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
+            revision = version.revision
+            event = Event(number + 1, _utc(now), kind, *version.key, revision, by=by, why=why)
+            return [(event.linked(chain), None)]
+
+        if self._table.events() is None:
+            raise self._missing()
+        _, added = self._table.append(append)
+        decided = found[0]
+        return Version(decided.published, (*decided.decisions, *added)), bool(added)
+
+    def events(self) -> list[Event]:
+        """Every event in the order of commits; raises UsageError where there is no registry."""
+        events = self._table.events()
+        if events is None:
+            raise self._missing()
+        return events
+
+    def history(self, motor_id: str, until: datetime | None = None) -> tuple[Version, ...]:
+        """A motor's versions, oldest first, as they stood at a moment; empty if unknown."""
+        return histories(self.events(), until).get(motor_id, ())
+
+    def latest(self, motor_id: str, *, released: bool = False) -> Version | None:
+        """A motor's newest version, or its newest released one; None if there is none."""
+        history = self.history(motor_id)
+        if released:
+            return in_force(history)
+        return history[-1] if history else None
+
+    def select(self, wanted: Selection) -> tuple[Version, ...]:
+        """Every version that is meant, by motor and revision; `newest` keeps one a motor."""
+        return select(self.events(), wanted)
+
+    def documents(self, versions: Sequence[Version]) -> list[dict[str, Any]]:
+        """The datasheet documents of versions, in their order, as they were published."""
+        texts = dict(self._table.contents([v.published.sequence for v in versions]))
+        return [json.loads(texts[v.published.sequence]) for v in versions]
+
+    def datasheets(self, versions: Sequence[Version]) -> list[Datasheet]:
+        """The datasheets of versions, in their order."""
+        return [datasheet_of(document) for document in self.documents(versions)]
+
+    def verify(self) -> Verification:
+        """Holds rows against their chain, contents against digests, files against rows.
+
+        Raises UsageError where there is no registry. A file of an interrupted writer whose row
+        was committed is given its name, and noted.
+        """
+        gaps = [f"commit {n} is missing from the log" for n in self._table.missing_commits()]
+        try:
+            events = self.events()
+            published = [event for event in events if event.kind == "publish"]
+            found = [*gaps, *faults(events), *self._content_faults(published)]
+        except UsageError:
+            raise
+        except PipelineError as error:
+            return Verification(0, 0, (*gaps, error.message), ())
+        lost, notes = self._file_faults(published)
+        unique = len({event.key for event in published})
+        decisions = len(events) - len(published)
+        return Verification(unique, decisions, (*found, *lost), tuple(notes))
+
+    def _content_faults(self, published: Sequence[Event]) -> Iterable[str]:
+        rows = {event.sequence: event for event in published}
+        left = set(rows)
+        for number, text in self._table.contents(list(rows)):
+            left.discard(number)
+            event = rows[number]
+            if _digest(text.encode()) != event.content_sha256:
+                yield f"row {number} ({event.motor_id!r}): its datasheet is not what was published"
+            elif _said(json.loads(text)) != _said_by(event):
+                yield f"row {number} ({event.motor_id!r}): says other than its datasheet"
+        yield from (f"row {number}: its datasheet is missing" for number in sorted(left))
+
+    def _file_faults(self, published: Sequence[Event]) -> tuple[list[str], list[str]]:
+        found, notes = [], []
+        for event in {e.key: e for e in reversed(published)}.values():
+            place, sha256 = place_of(event.key), event.content_sha256 or ""
+            content = self._exports.read(event.key)
+            if content is None and self._exports.finish(event.key, sha256):
+                notes.append(f"{place}: finished what an interrupted writer had left pending")
+            elif content is None:
+                found.append(f"{place}: the file is missing; publishing the version writes it")
+            elif _digest(content) != sha256:
+                found.append(f"{place}: the file is not what was published")
+        rows = {place_of(event.key) for event in published}
+        lost = (name for name in self._exports.names() if name not in rows)
+        found += [f"{name}: the file has no row; the table lost it" for name in lost]
+        return sorted(found), sorted(notes)
+
+    def _missing(self) -> UsageError:
+        return UsageError(f"no registry at {self.place}", "name the one of a run by registry=")
+
+
+def one_of(versions: Sequence[Version], wanted: Selection, place: str) -> Version:
+    """The only version that is meant; raises UsageError for none or several."""
+    if len(versions) == 1:
+        return versions[0]
+    said = f"motor {wanted.motor_id!r}"
+    if wanted.revision is not None:
+        said += f" revision {wanted.revision}"
+    if wanted.version is not None:
+        said += f" version {wanted.version}"
+    if not versions:
+        raise UsageError(f"no {said} in {place}", "`registry list` shows what there is")
+    numbers = ", ".join(str(version.revision) for version in versions)
+    raise UsageError(f"{said} is revisions {numbers}", "name one by revision=")
+
+
+def _allowed(kind: str, version: Version) -> None:
+    name = f"motor {version.motor_id!r} revision {version.revision}"
+    if version.status == "refused":
+        reasons = "; ".join(version.open_points)
+        raise UsageError(f"{name} is refused: {reasons}", "no decision changes that; record anew")
+    if kind == "approve" and version.open_points:
+        reasons = "; ".join(version.open_points)
+        raise UsageError(f"{name} is not ready for approval: {reasons}", "complete it first")
+
+
+def _sheet(document: Mapping[str, Any]) -> _Sheet:
+    """The document with its bytes; raises UsageError where it is no datasheet."""
+    try:
+        motor_id, version = document["motor_id"], document["version"]
+        _said(document)
+    except (LookupError, TypeError) as error:
+        raise UsageError(
+            f"no datasheet: {error!r} is missing", "publish what `run` wrote"
+        ) from error
+    if not isinstance(motor_id, str) or not DIGEST.fullmatch(str(version)):
+        raise UsageError(f"motor {motor_id!r}: version {version!r} is no sha256", "run again")
+    try:
+        content = canonical_json(document)
+    except UnicodeEncodeError as error:
+        raise UsageError(f"motor {motor_id!r}: its text is not Unicode", "rename it") from error
+    return _Sheet(document, content, _digest(content))
+
+
+def _rows(events: Sequence[Event], new: Sequence[_Sheet], now: datetime) -> list[Row]:
+    """The rows of new versions after the events so far: numbered, counted and chained."""
+    number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
+    revisions: dict[str, int] = {}
+    for event in events:
+        if event.kind == "publish":
+            revisions[event.motor_id] = revisions.get(event.motor_id, 0) + 1
+    rows: list[Row] = []
+    for sheet in new:
+        number += 1
+        motor_id, version = sheet.key
+        revisions[motor_id] = revisions.get(motor_id, 0) + 1
+        event = Event(
+            number,
+            _utc(now),
+            "publish",
+            motor_id,
+            version,
+            revisions[motor_id],
+            content_sha256=sheet.sha256,
+            **_said(sheet.said),
+        ).linked(chain)
+        chain = event.chain
+        rows.append((event, sheet.content.decode()))
+    return rows
+
+
+def _said(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What a row repeats of its datasheet, so that a search needs not read it."""
+    captures = document["provenance"]["captures"]
+    stations = {capture.get("station") for capture in captures} - {None}
+    return {
+        "motor_type": document["motor_type"],
+        "lot": document["lot"],
+        "stations": tuple(sorted(stations)),
+        "status": document["status"],
+        "reasons": tuple(document.get("why", ())),
+    }
+
+
+def _said_by(event: Event) -> dict[str, Any]:
+    names = ("motor_type", "lot", "stations", "status", "reasons")
+    return {name: getattr(event, name) for name in names}
+
+
+def _utc(moment: datetime) -> datetime:
+    """The moment in UTC, which is what the table keeps; raises ValueError for one without zone."""
+    if moment.tzinfo is None:
+        raise ValueError("a moment without time zone")
+    return moment.astimezone(UTC)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,130 @@
+"""One immutable JSON file a datasheet version, beside the registry's table.
+
+`_versions/MOTOR/VERSION.json`: a folder that Delta's own clean-up passes over, because its name
+begins with an underscore. A file is written whole under a pending name before the commit and takes
+its name after it. So a file without a row means that the table lost one, and a row without a file
+is either an interrupted writer's, whose pending file is there, or a lost file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from pipeline.io.publish import sync_folder, write_synced
+from pipeline.records.errors import MachineError
+from pipeline.records.naming import file_stem
+
+FOLDER = "_versions"
+PENDING = ".pending"
+Key = tuple[str, str]
+
+
+class Exports:
+    """The files of a registry in a folder or at an object-store URL."""
+
+    def __init__(self, place: str, options: Mapping[str, str] | None = None) -> None:
+        self.place = place
+        self.options = dict(options or {})
+        self.folder = None if "://" in place else Path(place)
+
+    def prepare(self, key: Key, content: bytes) -> None:
+        """Puts the content on the disk under a pending name; an object store needs no such step."""
+        if self.folder is None:
+            return
+        pending = self._pending(key)
+        try:
+            new = not pending.parent.is_dir()
+            pending.parent.mkdir(parents=True, exist_ok=True)
+            write_synced(pending, content)
+            if new:
+                sync_folder(pending.parent.parent)
+        except OSError as error:
+            with suppress(OSError):
+                pending.unlink()
+            raise _failure(self.place, error) from error
+
+    def settle(self, key: Key, content: bytes) -> None:
+        """Gives the version its file, unless it is there: it is written once and never again."""
+        try:
+            if self.folder is None:
+                if self.read(key) is None:
+                    self._put(key, content)
+                return
+            final, pending = self.folder / place_of(key), self._pending(key)
+            if final.exists():
+                pending.unlink(missing_ok=True)
+                return
+            if not pending.exists():
+                self.prepare(key, content)
+            pending.replace(final)
+            sync_folder(final.parent)
+        except OSError as error:
+            raise _failure(self.place, error) from error
+
+    def discard(self, key: Key) -> None:
+        """Takes this writer's pending file away."""
+        if self.folder is not None:
+            with suppress(OSError):
+                self._pending(key).unlink()
+
+    def finish(self, key: Key, sha256: str) -> bool:
+        """Whether the pending file of an interrupted writer had this digest and is the file now."""
+        if self.folder is None:
+            return False
+        final = self.folder / place_of(key)
+        for pending in sorted(final.parent.glob(f".{key[1]}.*{PENDING}")):
+            if hashlib.sha256(pending.read_bytes()).hexdigest() == sha256:
+                pending.replace(final)
+                sync_folder(final.parent)
+                return True
+        return False
+
+    def read(self, key: Key) -> bytes | None:
+        """The bytes of a version's file; None where there is none. Raises OSError for a disk."""
+        try:
+            if self.folder is not None:
+                return (self.folder / place_of(key)).read_bytes()
+            stream = self._store().open_input_file(place_of(key))
+            content: bytes = stream.read()
+        except FileNotFoundError:
+            return None
+        return content
+
+    def names(self) -> list[str]:
+        """Every file's place below the registry, sorted; of a disk only."""
+        root = None if self.folder is None else self.folder / FOLDER
+        if root is None or not root.is_dir():
+            return []
+        files = (path.relative_to(root.parent).as_posix() for path in root.rglob("*.json"))
+        return sorted(files)
+
+    def _put(self, key: Key, content: bytes) -> None:
+        stream = self._store().open_output_stream(place_of(key))
+        stream.write(content)
+        stream.close()
+
+    def _store(self) -> Any:
+        from deltalake._internal import DeltaFileSystemHandler
+
+        return DeltaFileSystemHandler(self.place, self.options or None)
+
+    def _pending(self, key: Key) -> Path:
+        """A name of this thread's own."""
+        assert self.folder is not None
+        final = self.folder / place_of(key)
+        return final.with_name(f".{key[1]}.{threading.get_native_id()}{PENDING}")
+
+
+def place_of(key: Key) -> str:
+    """Where a version's file is, below the registry: an escaped motor, then the version."""
+    motor_id, version = key
+    return f"{FOLDER}/{file_stem(motor_id)}/{version}.json"
+
+
+def _failure(place: str, error: OSError) -> MachineError:
+    return MachineError(f"registry {place}: {error.strerror or error}", "free the disk")

@@ -1,0 +1,257 @@
+"""The Delta table of the registry: events in, events out, one commit after another.
+
+A blind append never conflicts in Delta, so two writers would both add the version they found
+missing. Every commit here carries one application transaction, and Delta refuses a commit whose
+transaction was advanced since the table was read: read, decide, write becomes one step, on a disk
+as in an object store. The loser reads again and decides again.
+
+Reference: Delta transaction protocol, "Transaction Identifiers"; Kung & Robinson, ACM TODS 6 (1981)
+213 (optimistic concurrency).
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
+
+from pipeline.io.publish import sync_file, sync_folder
+from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.ledger import Event
+
+if TYPE_CHECKING:
+    import polars as pl
+    from deltalake import DeltaTable
+
+# Delta keeps microseconds and signed 64-bit numbers; nothing else is offered to it.
+COLUMNS: Mapping[str, tuple[str, bool]] = {
+    "sequence": ("long", False),
+    "recorded_at": ("timestamp", False),
+    "kind": ("string", False),
+    "motor_id": ("string", False),
+    "version": ("string", False),
+    "revision": ("long", False),
+    "motor_type": ("string", True),
+    "lot": ("string", True),
+    "stations": ("strings", False),
+    "status": ("string", True),
+    "reasons": ("strings", False),
+    "content_sha256": ("string", True),
+    "by": ("string", True),
+    "why": ("string", True),
+    "chain": ("string", False),
+    "content": ("string", True),
+}
+CONFIGURATION = {
+    "delta.appendOnly": "true",
+    # Time travel to every commit: expired logs would be cleaned away at a checkpoint.
+    "delta.enableExpiredLogCleanup": "false",
+    "delta.logRetentionDuration": "interval 36500 days",
+}
+APPLICATION = "registry"
+# deltalake 1.6 panics at these in a folder's path, and takes %41 for A.
+UNFIT = re.compile(r"""[\x00-\x1f\x7f"*<>\[\]\\^`{|}]|%[0-9A-Fa-f]{2}""")
+PATIENCE_S = 120.0
+LONGEST_PAUSE_S = 0.25
+
+Row = tuple[Event, str | None]
+Decide = Callable[[Sequence[Event]], Sequence[Row]]
+
+
+class EventTable:
+    """The registry's table at a folder or an object-store URL; opened anew for every call."""
+
+    def __init__(self, place: str, options: Mapping[str, str] | None = None) -> None:
+        self.place = place
+        self.options = dict(options or {})
+        if self.folder is not None and UNFIT.search(self.folder.resolve().as_posix()):
+            raise UsageError(
+                f"registry {place!r}: Delta cannot work below a folder with such a name",
+                "name another by registry=FOLDER, or none by registry=null",
+            )
+
+    def events(self) -> list[Event] | None:
+        """Every event in the order of commits; None where there is no table."""
+        with self._failures():
+            table = self._opened()
+            return None if table is None else _events(table)
+
+    def contents(self, sequences: Sequence[int], batch: int = 256) -> Iterator[tuple[int, str]]:
+        """(sequence, datasheet text) of the rows asked for, in that order, a batch at a time."""
+        with self._failures():
+            table = self._opened()
+            if table is None:
+                return
+            for start in range(0, len(sequences), batch):
+                wanted = sequences[start : start + batch]
+                numbers = ", ".join(str(int(number)) for number in wanted)
+                rows = _rows(table, ("sequence", "content"), f"sequence IN ({numbers})")
+                found: dict[int, str] = dict(rows.iter_rows())
+                yield from ((number, found[number]) for number in wanted if number in found)
+
+    def append(self, decide: Decide) -> tuple[list[Event], list[Event]]:
+        """Adds the rows that `decide` makes of the events so far; (events before, events added).
+
+        `decide` is called again with the newer events whenever another writer was faster. Raises
+        MachineError where the table cannot be written; then nothing was added.
+        """
+        give_up = time.monotonic() + PATIENCE_S
+        pauses = random.Random()  # noqa: S311 (only spreads the writers out; in no result)
+        pause_s = 0.002
+        with self._failures():
+            table = self._opened() or self._created()
+            while True:
+                before = _events(table)
+                rows = decide(before)
+                if not rows:
+                    return before, []
+                version = table.version()
+                if self._committed(table, rows):
+                    self._sync(table.version())
+                    return before, [event for event, _ in rows]
+                table = self._opened() or self._created()
+                if table.version() == version or time.monotonic() > give_up:
+                    raise MachineError(
+                        f"registry {self.place}: the commit failed", "is it writable, and not full?"
+                    )
+                time.sleep(pauses.uniform(0.5, 1.0) * pause_s)
+                pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder on this machine's disk; None for an object store."""
+        return None if "://" in self.place else Path(self.place)
+
+    def missing_commits(self) -> list[int]:
+        """Numbers of the commits that are missing from the log before the last one (disk only)."""
+        log = None if self.folder is None else self.folder / "_delta_log"
+        if log is None or not log.is_dir():
+            return []
+        there = {int(path.stem) for path in log.glob("*.json") if path.stem.isdigit()}
+        return sorted(set(range(max(there, default=0))) - there)
+
+    def _opened(self) -> DeltaTable | None:
+        from deltalake import DeltaTable
+        from deltalake.exceptions import TableNotFoundError
+
+        if self.folder is not None and not self.folder.is_dir():
+            return None
+        try:
+            return DeltaTable(self.place, storage_options=self.options or None)
+        except TableNotFoundError:
+            return None
+
+    def _created(self) -> DeltaTable:
+        """The new, empty table, or the one that another writer made meanwhile."""
+        from deltalake import DeltaTable, Field, Schema
+        from deltalake.exceptions import DeltaError
+        from deltalake.schema import ArrayType, PrimitiveType
+
+        strings = ArrayType(PrimitiveType("string"), contains_null=False)
+        fields = [
+            Field(name, strings if kind == "strings" else PrimitiveType(kind), nullable=nullable)
+            for name, (kind, nullable) in COLUMNS.items()
+        ]
+        try:
+            if self.folder is not None:
+                self.folder.mkdir(parents=True, exist_ok=True)
+            return DeltaTable.create(
+                self.place,
+                Schema(fields),
+                mode="error",
+                name="motor datasheets",
+                description="every datasheet version ever published, and what was decided of it",
+                configuration=CONFIGURATION,
+                storage_options=self.options or None,
+            )
+        except DeltaError:
+            table = self._opened()
+            if table is None:
+                raise
+            return table
+
+    def _committed(self, table: DeltaTable, rows: Sequence[Row]) -> bool:
+        """Whether the rows were added to exactly the events that `table` was opened with."""
+        from deltalake import CommitProperties, Transaction, write_deltalake
+        from deltalake.exceptions import DeltaError
+
+        last = rows[-1][0].sequence
+        properties = CommitProperties(app_transactions=[Transaction(APPLICATION, last)])
+        try:
+            write_deltalake(table, _frame(rows), mode="append", commit_properties=properties)
+        except DeltaError:
+            return False
+        return True
+
+    def _sync(self, version: int) -> None:
+        """Waits until the disk has a commit and the files it added."""
+        if self.folder is None:
+            return
+        log = self.folder / "_delta_log"
+        commit = log / f"{version:020d}.json"
+        for line in commit.read_text(encoding="utf-8").splitlines():
+            if added := json.loads(line).get("add"):
+                sync_file(self.folder / unquote(added["path"]))
+        sync_file(commit)
+        sync_folder(log)
+        sync_folder(self.folder)
+
+    @contextmanager
+    def _failures(self) -> Iterator[None]:
+        """Failures of the table and the disk as one line that names the registry."""
+        from deltalake.exceptions import DeltaError
+
+        try:
+            yield
+        except (DeltaError, OSError) as error:
+            lines = str(error).strip().splitlines() or [type(error).__name__]
+            raise MachineError(
+                f"registry {self.place}: {lines[0]}", "`registry verify` looks into it"
+            ) from error
+
+
+def _rows(table: DeltaTable, columns: Sequence[str], where: str = "true") -> pl.DataFrame:
+    import polars as pl
+    from deltalake import QueryBuilder
+
+    names = ", ".join(f'"{name}"' for name in columns)
+    query = f'SELECT {names} FROM events WHERE {where} ORDER BY "sequence"'  # noqa: S608 (numbers)
+    return pl.DataFrame(QueryBuilder().register("events", table).execute(query).read_all())
+
+
+def _events(table: DeltaTable) -> list[Event]:
+    frame = _rows(table, [name for name in COLUMNS if name != "content"])
+    return [_event(row) for row in frame.iter_rows(named=True)]
+
+
+def _event(row: Mapping[str, Any]) -> Event:
+    lists = {name: tuple(row[name]) for name in ("stations", "reasons")}
+    return Event(**{**row, **lists})
+
+
+def _frame(rows: Sequence[Row]) -> pl.DataFrame:
+    """Rows as Delta takes them, the kind of each column stated and never inferred."""
+    import polars as pl
+
+    kinds: dict[str, Any] = {
+        "long": pl.Int64(),
+        "timestamp": pl.Datetime("us", "UTC"),
+        "string": pl.String(),
+        "strings": pl.List(pl.String()),
+    }
+    schema = {name: kinds[kind] for name, (kind, _) in COLUMNS.items()}
+    data = [
+        [content if name == "content" else _plain(getattr(event, name)) for name in COLUMNS]
+        for event, content in rows
+    ]
+    return pl.DataFrame(data, schema=schema, orient="row")
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
