@@ -84,6 +84,31 @@ class SimulateSettings(Settings):
     fleet: str | None = key(None, "fleet of conf/fleet/: many motors at once, seed its own")
 
 
+@dataclass(kw_only=True)
+class ModelSettings:
+    """`model.name` and `model.effects`: which model is held against the recordings."""
+
+    name: str = key("standard", "ideal or standard")
+    effects: list[str] = key([], "effects to add; a leading - takes one away")
+
+
+@dataclass(kw_only=True)
+class CompareSettings(Settings):
+    """`compare`: where a model is off, signal by signal."""
+
+    input: str = key("data/demo", "folder of captures, searched with its subfolders", result=False)
+    output: str = key("reports/demo", "folder for everything that is written", result=False)
+    source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
+    motor: str | None = key(None, "motor_id; every motor without it")
+    model: ModelSettings = field(default_factory=ModelSettings)
+    effects_path: str | None = key(None, "folder of your own effects, one file each")
+
+
+@dataclass(kw_only=True)
+class DiagnoseSettings(CompareSettings):
+    """`diagnose`: which effect is missing, how sure that is, what else it could be."""
+
+
 def result_document(settings: Settings) -> dict[str, Any]:
     """The settings that can change a result, as plain data for a digest."""
     kept = {f.name for f in fields(settings) if f.metadata.get("result", True)}

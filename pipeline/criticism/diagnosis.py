@@ -53,7 +53,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     residual = last.around.residual
     left = remainder(last.around, found, machine, residual)
     sketch = _unknown(found, rungs, left)
-    missing = last.added if _explained(rungs, left) or sketch is None else last.added
+    missing = last.added
     ranking = _ranking(rungs, held, offered, library)
     unseen = _unseen(campaign, library, last, offered)
     verdict = _verdict(missing, left, rungs, unseen)

@@ -71,7 +71,8 @@ class Operating:
     Currents are true machine currents in the true rotor frame (amplitude-invariant), angles and
     speed are true shaft quantities. `inverter`: the machine is fed and logged by a drive, so that
     inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
-    `ts_s` is the sample period. `travel_rad` is the angle turned since the last reversal, infinite before the first.
+    `ts_s` is the sample period, `travel_rad` the angle turned since the last reversal (infinite
+    before the first).
     `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks.
     """
 

@@ -60,7 +60,8 @@ def leave_out(around: System, own: int) -> HeldOut:
 
 def _unit(normal: Array) -> Array:
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    return normal / np.outer(scale, scale)
+    unit: Array = normal / np.outer(scale, scale)
+    return unit
 
 
 def _lost(less: Array, normal: Array) -> bool:

@@ -119,12 +119,13 @@ def effect_flux(effect: Effect, x: Operating, q: Values) -> tuple[Complex, Array
         return np.zeros(shape, dtype=complex), np.zeros(shape)
     ones = np.ones(shape)
 
-    def slope(**moved: Complex) -> Array:
-        energy = hook(replace(x, **moved), q)
-        return np.imag(energy) / _STEP * ones
+    def slope(moved: Operating) -> Array:
+        change: Array = np.imag(hook(moved, q)) / _STEP * ones
+        return change
 
-    flux = slope(id_a=x.id_a + 1j * _STEP) + 1j * slope(iq_a=x.iq_a + 1j * _STEP)
-    return flux, slope(eps_rad=x.eps_rad + 1j * _STEP)
+    by_d = slope(replace(x, id_a=x.id_a + 1j * _STEP))
+    by_q = slope(replace(x, iq_a=x.iq_a + 1j * _STEP))
+    return by_d + 1j * by_q, slope(replace(x, eps_rad=x.eps_rad + 1j * _STEP))
 
 
 def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
@@ -164,9 +165,9 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
         if effect.coenergy is not None:
             more, turn = effect_flux(effect, x, values_of(effect, model.machine, values))
             flux, slope = flux + more, slope + turn
+    mean = mean_current(x, values)
     x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
-    mean = mean_current(x, values)
     drop: Complex = values["r_ohm"] * mean.i_a
     drag: Array = values["b_nm_s_rad"] * x.omega_rad_s
     for effect in model.effects:

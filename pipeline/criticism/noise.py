@@ -8,27 +8,31 @@ import numpy as np
 
 from pipeline.criticism.effect import Array
 
-_BLOCK = 128
+_BLOCK = 48
+_QUANTILE, _QUANTILE_Z = 0.3, -0.5244
 
 
 def sensor_noise(signal: Array) -> float:
     """Standard deviation of a signal's white sensor noise [its unit].
 
-    Third differences of white noise have variance 20 σ²; their rms is taken in blocks and the
-    median over the blocks keeps steps and bursts out. It is never below the rounding noise
-    q/√12 of the smallest step q that occurs often.
+    Third differences of white noise have variance 20 σ²; their mean square is taken in blocks
+    and a low quantile over the blocks keeps steps and bursts out. It is never below the rounding
+    noise q/√12 of the signal's step q.
 
-    References: [1] von Neumann et al., Ann. Math. Stat. 12 (1941), mean square of successive
-    differences; [2] Widrow & Kollar, Quantization Noise (2008), ch. 3.
+    References: [1] von Neumann et al., Ann. Math. Stat. 12 (1941), successive differences; [2]
+    Wilson & Hilferty, Proc. Natl. Acad. Sci. 17 (1931); [3] Widrow & Kollar, Quantization Noise
+    (2008), ch. 3.
     """
     third = np.diff(signal, 3)
     if third.size == 0:
         return 0.0
     width = min(_BLOCK, third.size)
     blocks = third[: third.size // width * width].reshape(-1, width)
-    # a median of block mean squares sits below their mean by chi-square's skewness
-    middle = (1.0 - 2.0 / (9.0 * width / 2.5)) ** 3
-    level = math.sqrt(float(np.median((blocks**2).mean(axis=1))) / (20.0 * middle))
+    # Wilson and Hilferty's quantile of chi-square with the samples that third differences leave
+    spread = 2.0 / (9.0 * width / 2.2)
+    share = (1.0 - spread + _QUANTILE_Z * math.sqrt(spread)) ** 3
+    power = float(np.quantile((blocks**2).mean(axis=1), _QUANTILE))
+    level = math.sqrt(power / (20.0 * share))
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 

@@ -66,8 +66,7 @@ def ports(machine: Machine) -> tuple[Port, ...]:
     made = []
     for name, (top, read) in ranges.items():
         made.append(_torque_curve(name, top, read))
-        for axis in "dq":
-            made.append(_drop_curve(name, top, read, axis))
+        made += [_drop_curve(name, top, read, axis) for axis in "dq"]
     for signal, variable in (
         ("torque", "theta_mech_rad"),
         ("drop", "theta_mech_rad"),
@@ -114,7 +113,8 @@ def _drop_curve(name: str, top: float, read: Callable[[Operating], Array], axis:
 
     def drop(x: Operating, q: Values) -> Complex:
         curve = _hats(read(x), knots, np.array(list(q.values())))
-        return turn * curve * (1.0 if x.inverter else 0.0)
+        voltage: Complex = (turn * curve * (1.0 if x.inverter else 0.0)).astype(np.complex128)
+        return voltage
 
     effect = _effect(
         f"port:v{axis}:{name}",

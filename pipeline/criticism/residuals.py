@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -48,8 +49,8 @@ def operate(
         return x
     error = np.zeros(theta.size)
     for _ in range(_ANGLE_ROUNDS):
-        true = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
-        error = _angle_error(true, model, values)
+        nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
+        error = _angle_error(nearer, model, values)
     true = theta - error / model.machine.pole_pairs
     omega = _speed(true, segment.ts_s, theta.size // segment.size)
     return _operating(
@@ -224,7 +225,13 @@ def _true_load(
         return torque
     zero = np.zeros(torque.size)
     r = Recorded(
-        zero + 0j, torque, zero, zero, segment.ts_s, segment.kind == "dq", segment.instrument
+        zero.astype(np.complex128),
+        torque,
+        zero,
+        zero,
+        segment.ts_s,
+        segment.kind == "dq",
+        segment.instrument,
     )
     for effect in hooks:
         if effect.load is not None:
@@ -252,20 +259,27 @@ def predicted(
         turn = np.exp(1j * (math.pi / 6 - segment.fixed["pair_rad"]))
         rows.append(math.sqrt(3) * (stationary * turn).real)
     if len(segment.channels) > len(rows):
-        shaft = air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
-        if segment.kind == "dq" and values["ripple_torque"]:
-            shaft = shaft + _late_torque(x, pieces, segment.ts_s, values)
-        finer = x.theta_rad.size // segment.size
-        if finer > 1:
-            shaft = _averaged(shaft, finer)
-        theta = x.theta_rad[::finer]
-        shaft = shaft - values["j_kgm2"] * _second_difference(theta, segment.ts_s)
-        if segment.channels[-1] == "torque_shaft_nm":
-            for effect in model.effects:
-                if effect.shaft is not None:
-                    shaft = effect.shaft(shaft, values_of(effect, model.machine, values))
-        rows.append(shaft)
+        rows.append(_shaft_torque(segment, x, pieces, model, values))
     return np.stack(rows)
+
+
+def _shaft_torque(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Torque at the shaft [n]: air gap less drags less inertia, as the sensor tells it."""
+    shaft = air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
+    if segment.kind == "dq" and values["ripple_torque"]:
+        shaft = shaft + _late_torque(x, pieces, segment.ts_s, values)
+    finer = x.theta_rad.size // segment.size
+    if finer > 1:
+        shaft = _averaged(shaft, finer)
+    theta = x.theta_rad[::finer]
+    shaft = shaft - values["j_kgm2"] * _second_difference(theta, segment.ts_s)
+    if segment.channels[-1] == "torque_shaft_nm":
+        for effect in model.effects:
+            if effect.shaft is not None:
+                shaft = effect.shaft(shaft, values_of(effect, model.machine, values))
+    return shaft
 
 
 def _second_difference(theta: Array, period: float) -> Array:
@@ -284,19 +298,19 @@ def _averaged(fine: Array, finer: int) -> Array:
     return np.convolve(fine, triangle, mode="same")[::finer]
 
 
-def _central(signal: Array | Complex, period: float) -> Array | Complex:
+def _central(signal: Any, period: float) -> Any:
     slope = np.zeros_like(signal)
     slope[1:-1] = (signal[2:] - signal[:-2]) / (2 * period)
     return slope
 
 
-def _forward(signal: Array | Complex, period: float) -> Array | Complex:
+def _forward(signal: Any, period: float) -> Any:
     slope = np.zeros_like(signal)
     slope[:-1] = np.diff(signal) / period
     return slope
 
 
-def _ahead(signal: Array | Complex) -> Array | Complex:
+def _ahead(signal: Any) -> Any:
     mean = signal.copy()
     mean[:-1] = 0.5 * (signal[:-1] + signal[1:])
     return mean

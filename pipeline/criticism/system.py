@@ -140,7 +140,8 @@ def _pseudo_inverse(normal: Array) -> Array:
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     good = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
-    return inverse / np.outer(size, size)
+    scaled: Array = inverse / np.outer(size, size)
+    return scaled
 
 
 def start_values(model: Model, machine: Machine) -> dict[str, float]:

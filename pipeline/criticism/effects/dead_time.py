@@ -17,7 +17,8 @@ def _drop(x: Operating, q: Values) -> Complex:
     for k in range(3):
         axis = np.exp(2j * np.pi * k / 3)
         drop += np.tanh((stationary * np.conj(axis)).real / q["width_a"]) * axis
-    return drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * (x.eps_rad - turn))
+    rotor: Complex = drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * (x.eps_rad - turn))
+    return rotor
 
 
 EFFECT = Effect(
