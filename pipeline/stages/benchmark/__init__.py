@@ -1,0 +1,1 @@
+"""The blind benchmark: sealed simulated campaigns, a diagnosis that sees recordings only, marks."""
