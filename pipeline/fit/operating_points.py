@@ -29,7 +29,8 @@ class Point:
 
     `omega_mech_rad_s` is the slope of the angle where it is there; `u_torque_nm`, `u_vd_v` and
     `u_vq_v` are standard errors of means, correlation included. `cos_turn`, `sin_turn` are means
-    over the shaft angle (0 where it is missing). `group` numbers the constant-speed stretches.
+    over the shaft angle (0 where it is missing), `period_s` the sampling period. `group` numbers
+    the constant-speed stretches.
     """
 
     group: int
@@ -46,6 +47,7 @@ class Point:
     temp_magnet_degc: float
     cos_turn: float
     sin_turn: float
+    period_s: float
     capture: Capture
 
     def shifted(self, shift: Mapping[str, float]) -> Point:
@@ -219,6 +221,7 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         temp_magnet_degc=means["temp_magnet_degc"],
         cos_turn=cos_turn,
         sin_turn=sin_turn,
+        period_s=float(np.median(np.diff(t))),
         capture=capture,
     )
 

@@ -98,7 +98,9 @@ def _inductance_trial(seed: int) -> Trial:
     campaign, real = recorded(HELD_MAP, seed)
     gain = real.voltage_commanded / real.current
     true = {"ld_rated_h": MOTOR.ld_h, "lq_rated_h": MOTOR.lq_h}
-    return Trial(campaign, true, {name: value * gain for name, value in true.items()})
+    resistance = Estimate("r_phase_ohm", MOTOR.r_phase_ohm, "ohm", "measured", "given")
+    seen = {name: value * gain for name, value in true.items()}
+    return Trial(campaign, true, seen, Constants((resistance,)))
 
 
 def _coast_ratio() -> Constants:
@@ -124,7 +126,7 @@ def _cogging_trial(seed: int) -> Trial:
 
 @cache
 def _cogging_bound() -> Mapping[str, float]:
-    """Four whole turns in white noise: sqrt(2/n) of an amplitude, sqrt(1/n) of half a difference."""
+    """Four whole turns in white noise: sqrt(2/n) an amplitude, sqrt(1/n) half a difference."""
     campaign, _ = recorded(TURNS, 0, COGGING_MOTOR)
     n = sum(c.tables[0].height for c in campaign.captures) * 2.0 / 2.1
     return {

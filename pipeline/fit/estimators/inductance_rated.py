@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -83,6 +83,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     alpha = known.best("temp_coeff_magnet_1_k")
     magnet = MAGNET_COEFFICIENT_1_K if alpha is None else alpha.number
     words = f"{table.note()}; {_timing_words(captures)}"
+    points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
     fluxes = flux_pairs(points, pairs)
     estimates = []
     for name, find in (("ld_rated_h", _direct), ("lq_rated_h", _quadrature)):
@@ -108,6 +109,35 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
             Estimate(name, found.value_h, "H", "measured", NAME, budget_of(parts), at, paths, note)
         )
     return Fit(tuple(estimates), _evidence(fluxes))
+
+
+def _without_ripple(
+    points: Sequence[Point], pole_pairs: int, magnet: float, resistance: Estimate | None
+) -> list[Point]:
+    """Points with held voltages less the drop R of the ripple current between samples.
+
+    While the inverter holds its vector v still, flux bends by -j w R i only and not by -w² psi as
+    on its circle. With x = w T / 2 the period's mean flux is short by x²/3 v/(j w), the mean
+    current by that over L of each axis. Inductances of a first pass are good enough. Without R
+    nothing is done.
+    """
+    first = flux_pairs(points, pole_pairs)
+    direct, quadrature = _direct(first, magnet), _quadrature(first, magnet)
+    if resistance is None or direct is None or quadrature is None:
+        return list(points)
+    corrected = []
+    for point in points:
+        if point.capture.meta.voltage_timing != "held":
+            corrected.append(point)
+            continue
+        omega = pole_pairs * point.omega_mech_rad_s
+        half = 0.5 * omega * point.period_s
+        bend = _instant(point, pole_pairs) / (1j * omega)
+        short = complex(bend.real / direct.value_h, bend.imag / quadrature.value_h)
+        drop = -resistance.number * short * half**2 / 3.0 * np.exp(1j * half)
+        voltage = complex(point.vd_v, point.vq_v) - drop
+        corrected.append(replace(point, vd_v=voltage.real, vq_v=voltage.imag))
+    return corrected
 
 
 def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
@@ -176,13 +206,9 @@ def _instant(point: Point, pole_pairs: int) -> complex:
     timing = point.capture.meta.voltage_timing
     if timing == "instant":
         return voltage
-    half = 0.5 * pole_pairs * point.omega_mech_rad_s * _period_s(point.capture)
+    half = 0.5 * pole_pairs * point.omega_mech_rad_s * point.period_s
     turned = np.exp(1j * half) if timing == "held" else 1.0
     return complex(voltage / (np.sinc(half / np.pi) * turned))
-
-
-def _period_s(capture: Capture) -> float:
-    return float(np.median(np.diff(capture.arrays("t_s", masked=False)["t_s"][:2000])))
 
 
 def _lateness(
@@ -279,7 +305,7 @@ def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:
     Seen from the middle of a side the two differ by 1/cos(w T / 2) - 1; rectangular, GUM 4.3.7.
     """
     late = [
-        0.5 * pole_pairs * abs(p.omega_mech_rad_s) * _period_s(p.capture)
+        0.5 * pole_pairs * abs(p.omega_mech_rad_s) * p.period_s
         for p in points
         if p.capture.meta.voltage_timing == "centred"
     ]
@@ -320,6 +346,6 @@ ESTIMATOR = Estimator(
     tests=("torque_map",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "temp_coeff_magnet_1_k"),
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", "r_phase_ohm"),
     rank=0,
 )
