@@ -34,7 +34,7 @@ def leave_out(around: System, own: int) -> HeldOut:
 
     Noise weights stay those of the full fit, so that a capture cannot vote on its own weight.
     """
-    places = np.arange(own)
+    places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
     weight = 1.0 / np.maximum(around.spreads(around.residual), 1.0)[around.group]
     matrix = around.matrix[:, places]
     segment = np.array([number for number, _, _ in around.labels])[around.group]

@@ -20,6 +20,7 @@ from pipeline.criticism.traces import smoothed
 
 _SPEED_S = 0.002
 _TURN_RAD = 0.7
+_FINEST = 48
 _ANGLE_ROUNDS = 3
 RIPPLES = ("ripple_edge", "ripple_shift", "ripple_torque")
 
@@ -84,7 +85,7 @@ def finer_of(segment: Segment, machine: Machine) -> int:
         return 1
     highest = max(*slow_orders(machine), 1)
     turn = float(np.abs(np.diff(segment.recorded["theta_mech_rad"])).max())
-    return max(int(np.ceil(highest * turn / _TURN_RAD)), 1)
+    return min(max(int(np.ceil(highest * turn / _TURN_RAD)), 1), _FINEST)
 
 
 def _operating(

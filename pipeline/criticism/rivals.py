@@ -17,9 +17,12 @@ def rivals_of(
     """Effects that explain the captures as well in an effect's place (misfit within 12)."""
     first = len(own_columns(fitted.model))
     found: dict[str, float] = {}
+    effect = next(e for e in fitted.model.effects if e.name == name)
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
+        if not _meet(effect, candidate.effect):
+            continue
         rise = loss_without(wide, fitted, (name,), places)
         other = candidate.effect.name
         found[other] = min(rise, found.get(other, np.inf))
@@ -60,3 +63,8 @@ def detectable(effect: Effect, fitted: Fitted, wide: System, offered: Sequence[C
             if one > 0 and np.any(wide.matrix[:, place]):
                 best = max(best, sizes[wide.columns[place].name] / float(one))
     return best
+
+
+def _meet(one: Effect, other: Effect) -> bool:
+    """Whether two effects can reach one signal: drops and drags cannot stand for each other."""
+    return {one.hook, other.hook} != {"drop", "torque"}

@@ -273,5 +273,5 @@ def loss_without(
     names_out = [around.columns[n].name for n in out]
     move = np.array([-fitted.values[n] if amplitude[n] else 0.0 for n in names_out])
     moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
-    here = around.spreads(around.best(own)[1])
-    return around.misfit_of(moved.spreads(moved.best(stay)[1])) - around.misfit_of(here)
+    here = around.misfit_of(around.spreads(around.residual))
+    return moved.misfit_of(moved.spreads(moved.best(stay)[1])) - here

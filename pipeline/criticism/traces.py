@@ -11,7 +11,7 @@ from pipeline.criticism.effect import Array
 from pipeline.numerics.projection import window_starts
 from pipeline.records.capture import Capture
 
-_MOST_WINDOWS = 72
+_MOST_WINDOWS = 48
 _PAD = 24
 _SENSE_S = 0.001
 

@@ -1,0 +1,118 @@
+"""Small machines and operating points for the tests of criticism."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Machine, Operating
+from pipeline.criticism.segments import Segment
+from pipeline.numerics.projection import projection
+
+BASE = {
+    "r_ohm": 0.31,
+    "ld_h": 2.1e-4,
+    "lq_h": 2.9e-4,
+    "psi_wb": 9.4e-3,
+    "j_kgm2": 4.4e-5,
+    "b_nm_s_rad": 2.2e-5,
+    "ripple_slope": 0.0,
+    "ripple_mean": 0.0,
+    "ripple_edge": 0.0,
+    "ripple_shift": 0.0,
+    "ripple_torque": 0.0,
+    "bench_angle_rad": 0.0,
+}
+
+
+def machine(pole_pairs: int = 7, slots: int | None = 12) -> Machine:
+    scales = {
+        "current_a": 16.0,
+        "voltage_v": 20.0,
+        "speed_rad_s": 250.0,
+        "freq_hz": 280.0,
+        "torque_nm": 1.6,
+        "period_s": 5e-5,
+        "period_s2": 2.5e-9,
+        "flux_wb": 9.4e-3,
+    }
+    return Machine(pole_pairs, slots, scales, (12, 14, 84))
+
+
+def operating(n: int = 60, seed: int = 1) -> Operating:
+    """Random currents, angles and speeds of both signs [n]."""
+    rng = np.random.default_rng(seed)
+    theta = rng.uniform(-10, 10, n)
+    return Operating(
+        machine=machine(),
+        base=BASE,
+        id_a=rng.uniform(-8, 8, n),
+        iq_a=rng.uniform(-16, 16, n),
+        eps_rad=7 * theta,
+        theta_rad=theta,
+        omega_rad_s=rng.uniform(-250, 250, n),
+        winding_k=rng.uniform(0, 60, n),
+        magnet_k=rng.uniform(0, 30, n),
+        travel_rad=rng.uniform(0, 0.01, n),
+        inverter=True,
+        freq_hz=rng.uniform(0, 280, n),
+        ts_s=5e-5,
+    )
+
+
+def log(n: int = 8000, seed: int = 5, noise: float = 0.0) -> Segment:
+    """A drive log that obeys the base equations in closed form: slow sines of current, steady
+    acceleration through zero speed, voltages instantaneous.
+    """
+    p, ts = 7, 5e-5
+    t = np.arange(n) * ts
+    theta = -60.0 * t + 0.5 * 400.0 * t**2
+    omega = -60.0 + 400.0 * t
+    current = 3 * np.sin(40 * t) - 2.0 + 1j * (6 * np.cos(25 * t) + 1.0)
+    slope = 120 * np.cos(40 * t) - 1j * 150 * np.sin(25 * t)
+    psi = BASE["ld_h"] * current.real + BASE["psi_wb"] + 1j * BASE["lq_h"] * current.imag
+    voltage = (
+        BASE["r_ohm"] * current
+        + BASE["ld_h"] * slope.real
+        + 1j * BASE["lq_h"] * slope.imag
+        + 1j * p * omega * psi
+    )
+    em = 1.5 * p * (psi.real * current.imag - psi.imag * current.real)
+    shaft = em - BASE["b_nm_s_rad"] * omega - BASE["j_kgm2"] * 400.0
+    sigma = {
+        "id_a": 0.01,
+        "iq_a": 0.01,
+        "vd_v": 0.01,
+        "vq_v": 0.01,
+        "theta_mech_rad": 2e-6,
+        "torque_shaft_nm": 1e-3,
+        "temp_winding_degc": 0.0,
+        "temp_magnet_degc": 0.0,
+    }
+    signals = {
+        "id_a": current.real,
+        "iq_a": current.imag,
+        "vd_v": voltage.real,
+        "vq_v": voltage.imag,
+        "theta_mech_rad": theta,
+        "torque_shaft_nm": shaft,
+        "temp_winding_degc": 25.0 + 200.0 * t,
+        "temp_magnet_degc": 25.0 + 90.0 * t,
+    }
+    rng = np.random.default_rng(seed)
+    noisy = {k: v + noise * rng.normal(0, sigma[k], n) for k, v in signals.items()}
+    noisy["travel_rad"] = np.abs(theta - theta[np.argmin(np.abs(omega))])
+    starts = np.arange(40, n - 440, 200)
+    weak = projection(theta, starts, 400, (1, 7, 14, 42))
+    return Segment(
+        "log",
+        "drive",
+        "dq",
+        "drive",
+        "instant",
+        ts,
+        noisy,
+        sigma,
+        ("vd_v", "vq_v", "torque_shaft_nm"),
+        weak,
+        {"ambient_k": 0.0},
+    )

@@ -1,0 +1,189 @@
+"""The effects: found, complete, zero at zero, and each equal to its closed form."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.effects import cogging
+from pipeline.criticism.linearise import zero
+from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of
+from pipeline.criticism.registry import chosen, effects
+from pipeline.physics.glossary import COLUMNS, TESTS
+from pipeline.records.errors import UsageError
+from tests.unit.criticism.machines import BASE, machine, operating
+
+LIBRARY = effects()
+
+
+def ready(x):
+    """Flux and torque filled in, as the drop and torque hooks find them."""
+    evaluate(Model(machine(), ()), x, BASE)
+    return x
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_an_effect_says_what_the_contract_asks_of_it(name):
+    effect = LIBRARY[name]
+    assert effect.words and effect.signature and effect.experiment and effect.reference
+    assert set(effect.tests) <= set(TESTS)
+    assert set(effect.signals) <= set(COLUMNS)
+    known = {*LIBRARY, "backlash"}
+    assert set(effect.rivals) <= known
+    assert effect.parameters_of(machine())
+    for p in effect.parameters_of(machine()):
+        assert p.unit and p.typical > 0 and p.low < p.high
+        assert p.negligible < p.typical
+        assert p.scale == "1" or p.scale in machine().scales
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_zero_parameters_are_zero_effect(name):
+    """Every hook at zero amplitude leaves flux, drops and drags of the base as they are."""
+    effect, x = LIBRARY[name], operating()
+    base = evaluate(Model(machine(), ()), x, BASE)
+    model = Model(machine(), (effect,))
+    with_it = evaluate(model, operating(), {**BASE, **zero(effect, model)})
+    assert with_it.psi_wb == pytest.approx(base.psi_wb, abs=1e-18)
+    assert with_it.slope_wb == pytest.approx(0.0, abs=1e-18)
+    assert with_it.drop_v == pytest.approx(base.drop_v, abs=1e-15)
+    assert with_it.drag_nm == pytest.approx(base.drag_nm, abs=1e-15)
+
+
+@pytest.mark.parametrize("name", [n for n, e in LIBRARY.items() if e.coenergy])
+def test_flux_is_reciprocal_and_torque_is_the_angles_share(name):
+    """Complex steps against central differences of the co-energy itself."""
+    effect, x = LIBRARY[name], operating()
+    q = {p.name: p.typical * machine().scale(p) for p in effect.parameters_of(machine())}
+    flux, slope = effect_flux(effect, x, q)
+    from dataclasses import replace
+
+    def energy(**moved):
+        return np.real(effect.coenergy(replace(x, **moved), q)) * np.ones(60)
+
+    h = 1e-4
+    by_d = (energy(id_a=x.id_a + h) - energy(id_a=x.id_a - h)) / (2 * h)
+    by_q = (energy(iq_a=x.iq_a + h) - energy(iq_a=x.iq_a - h)) / (2 * h)
+    by_e = (energy(eps_rad=x.eps_rad + h) - energy(eps_rad=x.eps_rad - h)) / (2 * h)
+    size = np.abs(flux).max()
+    assert flux.real == pytest.approx(by_d, abs=1e-6 * size)
+    assert flux.imag == pytest.approx(by_q, abs=1e-6 * size)
+    assert slope == pytest.approx(by_e, abs=1e-6 * max(np.abs(slope).max(), size))
+    up, _ = effect_flux(effect, replace(x, iq_a=x.iq_a + h), q)
+    down, _ = effect_flux(effect, replace(x, iq_a=x.iq_a - h), q)
+    right, _ = effect_flux(effect, replace(x, id_a=x.id_a + h), q)
+    left, _ = effect_flux(effect, replace(x, id_a=x.id_a - h), q)
+    assert (up - down).real == pytest.approx((right - left).imag, abs=1e-9 * size)
+
+
+def test_dead_time_is_a_sign_for_each_phase_in_the_abc_frame():
+    x = operating()
+    x.ts_s = 1.0
+    drop = LIBRARY["dead_time"].drop(x, {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0})
+    stationary = (x.id_a + 1j * x.iq_a) * np.exp(1j * x.eps_rad)
+    phases = [np.real(stationary * np.exp(-2j * np.pi * k / 3)) for k in range(3)]
+    lost = [0.2 * np.sign(i) for i in phases]
+    alpha = 2 / 3 * (lost[0] - 0.5 * lost[1] - 0.5 * lost[2])
+    beta = (lost[1] - lost[2]) / math.sqrt(3)
+    assert drop == pytest.approx((alpha + 1j * beta) * np.exp(-1j * x.eps_rad), abs=1e-12)
+
+
+def test_phase_imbalance_is_three_resistances_in_the_abc_frame():
+    x, gamma = operating(), 0.02 - 0.03j
+    drop = LIBRARY["phase_imbalance"].drop(x, {"cosine": gamma.real, "sine": gamma.imag})
+    more = [2 * np.real(gamma * np.exp(-4j * np.pi * k / 3)) * BASE["r_ohm"] for k in range(3)]
+    stationary = (x.id_a + 1j * x.iq_a) * np.exp(1j * x.eps_rad)
+    lost = [r * np.real(stationary * np.exp(-2j * np.pi * k / 3)) for k, r in enumerate(more)]
+    total = 2 / 3 * sum(v * np.exp(2j * np.pi * k / 3) for k, v in enumerate(lost))
+    assert drop == pytest.approx(total * np.exp(-1j * x.eps_rad), abs=1e-12)
+
+
+def test_saturation_bends_the_flux_by_its_polynomial():
+    x, size = operating(), 16.0
+    q = {"q_cubic": 0.1, "q_quintic": 0.02, "d_square": 0.05, "d_cubic": 0.07}
+    flux, _ = effect_flux(LIBRARY["saturation"], x, q)
+    s, d = x.iq_a / size, x.id_a / size
+    assert flux.imag == pytest.approx(-BASE["lq_h"] * x.iq_a * (0.1 * s**2 - 0.02 * s**4))
+    assert flux.real == pytest.approx(-BASE["ld_h"] * size * (0.05 * d**2 + 0.07 * d**3))
+
+
+def test_torque_comes_from_the_co_energy_of_the_linear_machine():
+    x = ready(operating())
+    ld, lq, psi = BASE["ld_h"], BASE["lq_h"], BASE["psi_wb"]
+    expected = 1.5 * 7 * (psi * x.iq_a + (ld - lq) * x.id_a * x.iq_a)
+    assert x.torque_nm == pytest.approx(expected)
+    assert base_flux(x, BASE).real == pytest.approx(ld * x.id_a + psi)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "closed"),
+    [
+        ("coulomb_friction", {"torque_nm": 0.01}, lambda x: 0.01 * np.sign(x.omega_rad_s)),
+        (
+            "windage",
+            {"drag_nm": 0.02},
+            lambda x: 0.02 * x.omega_rad_s * abs(x.omega_rad_s) / 250.0**2,
+        ),
+        (
+            "stribeck",
+            {"excess_nm": 0.01, "speed_rad_s": 7.0},
+            lambda x: 0.01 * np.exp(-((x.omega_rad_s / 7.0) ** 2)) * np.sign(x.omega_rad_s),
+        ),
+        (
+            "unbalance",
+            {"sin_nm": 0.01, "cos_nm": -0.02},
+            lambda x: 0.01 * np.sin(x.theta_rad) - 0.02 * np.cos(x.theta_rad),
+        ),
+        (
+            "cogging",
+            {"sin_84_nm": 0.01, "cos_84_nm": 0.02},
+            lambda x: 0.01 * np.sin(84 * x.theta_rad) + 0.02 * np.cos(84 * x.theta_rad),
+        ),
+        (
+            "iron_eddy",
+            {"drag_nm": 0.02},
+            lambda x: 0.02 * x.omega_rad_s / 250.0 * abs(x.flux_wb / BASE["psi_wb"]) ** 2,
+        ),
+        (
+            "load_dependent_friction",
+            {"share": 0.02},
+            lambda x: 0.02 * abs(x.torque_nm) * np.sign(x.omega_rad_s),
+        ),
+        (
+            "presliding",
+            {"torque_nm": 0.01, "travel_rad": 0.002},
+            lambda x: -0.02 * np.exp(-x.travel_rad / 0.002) * np.sign(x.omega_rad_s),
+        ),
+    ],
+)
+def test_a_drag_is_its_formula(name, values, closed):
+    x = ready(operating())
+    assert LIBRARY[name].torque(x, values) == pytest.approx(closed(x), abs=1e-14)
+
+
+def test_cogging_orders_are_multiples_of_poles_or_slots():
+    """Order 13 stands out of this slow turn as well, but no magnet on a slot can make it."""
+    from dataclasses import replace
+
+    assert cogging.orders(replace(machine(), torque_orders=(12, 13, 14, 84))) == (12, 14, 84)
+
+
+def test_a_users_file_counts_and_may_not_take_a_name(tmp_path: Path):
+    text = Path(cogging.__file__).with_name("windage.py").read_text(encoding="utf-8")
+    (tmp_path / "brake.py").write_text(text.replace('name="windage"', 'name="brake"'))
+    assert "brake" in effects(str(tmp_path))
+    assert chosen(("brake",), str(tmp_path))["brake"].hook == "torque"
+    (tmp_path / "again.py").write_text(text)
+    effects.cache_clear()
+    with pytest.raises(UsageError, match="windage exists already"):
+        effects(str(tmp_path))
+    with pytest.raises(UsageError, match="unknown effect friction"):
+        chosen(("friction",))
+
+
+def test_values_are_handed_over_by_their_short_names():
+    values = {"windage.drag_nm": 0.5, "stribeck.excess_nm": 0.1}
+    assert values_of(LIBRARY["windage"], machine(), values) == {"drag_nm": 0.5}

@@ -1,0 +1,95 @@
+"""Residuals against closed forms, columns against recomputed residuals, floors against scatter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.linearise import (
+    effect_columns,
+    linearise,
+    noise_floor,
+    projected,
+    row_index,
+    zero,
+)
+from pipeline.criticism.model import Model
+from pipeline.criticism.noise import sensor_noise
+from pipeline.criticism.registry import effects
+from pipeline.criticism.residuals import residual
+from tests.unit.criticism.machines import BASE, log, machine
+
+LIBRARY = effects()
+PLAIN = Model(machine(), ())
+
+
+def test_a_machine_that_obeys_the_equations_leaves_nothing():
+    """The closed-form log: what is left is the stencil's own error, 1e-6 of the voltage."""
+    left = np.abs(projected(log(), residual(log(), PLAIN, BASE)))
+    gain = log().weak.functions[0, 0].sum()
+    assert (left / gain)[0].max() < 1e-5 * 8.0
+    assert (left / gain)[1].max() < 1e-5 * 8.0
+    assert (left / gain)[2].max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("constant", "channel", "closed"),
+    [
+        ("r_ohm", 0, lambda s: -s["id_a"]),
+        ("r_ohm", 1, lambda s: -s["iq_a"]),
+        ("b_nm_s_rad", 2, lambda s: np.gradient(s["theta_mech_rad"], 5e-5)),
+    ],
+)
+def test_a_wrong_constant_shows_as_its_own_signal(constant, channel, closed):
+    segment = log()
+    moved = {**BASE, constant: BASE[constant] * 1.1}
+    change = residual(segment, PLAIN, moved)[channel] - residual(segment, PLAIN, BASE)[channel]
+    expected = 0.1 * BASE[constant] * closed(segment.recorded)
+    assert change[60:-60] == pytest.approx(expected[60:-60], rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_a_column_is_the_change_of_the_whole_residual(name):
+    """The hook's own column against a residual computed anew with the effect in the model."""
+    effect, segment = LIBRARY[name], log()
+    sigma = noise_floor(segment, PLAIN, BASE, 1)
+    columns = effect_columns(effect, PLAIN)
+    model = PLAIN.with_effects(effect)
+    start = {**BASE, **zero(effect, model)}
+    before = linearise(segment, PLAIN, BASE, columns, sigma)
+    for n, column in enumerate(columns):
+        moved = {**start, column.name: start[column.name] + column.step}
+        after = linearise(segment, model, moved, [], sigma)
+        expected = (after.residual - before.residual) / column.step
+        size = np.abs(expected).max()
+        assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)
+
+
+def test_the_noise_floor_is_the_scatter_over_seeds():
+    """chi²/n of a sound machine is 1 in every signal, over 6 logs of fresh noise."""
+    total: dict[str, list[float]] = {}
+    sigma = noise_floor(log(noise=1.0), PLAIN, BASE, 1)
+    for seed in range(6):
+        segment = log(noise=1.0, seed=seed)
+        group, _, valid, groups = row_index(segment)
+        weak = projected(segment, residual(segment, PLAIN, BASE)) / sigma[group]
+        for place, (channel, _) in enumerate(groups):
+            total.setdefault(channel, []).extend(weak[valid & (group == place)] ** 2)
+    for channel, squares in total.items():
+        # windows overlap by half, and the floor itself has the scatter of two replicates
+        spread = np.sqrt(2.0 / len(squares)) * 2.5
+        assert np.mean(squares) == pytest.approx(1.0, abs=4 * spread), channel
+
+
+def test_the_level_of_white_noise_is_found_under_a_moving_signal():
+    t = np.arange(20000) * 1e-4
+    rng = np.random.default_rng(8)
+    signal = 5 * np.sin(30 * t) + np.where(t > 1.0, 3.0, 0.0) + rng.normal(0, 0.02, t.size)
+    assert sensor_noise(signal) == pytest.approx(0.02, rel=0.06)
+
+
+def test_a_quantised_ramp_has_its_rounding_noise():
+    step = 2 * np.pi / 2**14
+    ramp = np.round(np.linspace(0, 9.123, 20011) / step) * step
+    assert sensor_noise(ramp) == pytest.approx(step / np.sqrt(12), rel=0.3)
+    assert sensor_noise(np.linspace(0.0, 9.123, 20011)) < 1e-12

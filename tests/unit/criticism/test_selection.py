@@ -1,0 +1,104 @@
+"""Finding effects in logs that are made here, in closed form, with and without them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.judge import leave_out
+from pipeline.criticism.linearise import zero
+from pipeline.criticism.model import Model
+from pipeline.criticism.registry import effects
+from pipeline.criticism.selection import candidates, score_all, search, widened
+from pipeline.criticism.system import Fitted, floors, gauss_newton, own_columns, system
+from tests.unit.criticism.machines import BASE, log, machine
+
+LIBRARY = {
+    name: effects()[name]
+    for name in ("coulomb_friction", "windage", "stribeck", "dead_time", "saturation", "unbalance")
+}
+
+
+def fitted(segments):
+    model = Model(machine(), ())
+    start = Fitted(model, dict(BASE), floors(segments, model, BASE))
+    return gauss_newton(segments, start)[0]
+
+
+def with_drag(drag, seed=5):
+    """The log with a further drag of speed and angle [N·m] at its shaft."""
+    segment = log(noise=1.0, seed=seed)
+    theta = segment.recorded["theta_mech_rad"]
+    omega = np.gradient(log().recorded["theta_mech_rad"], 5e-5)
+    torque = segment.recorded["torque_shaft_nm"] - drag(omega, theta)
+    return replace(segment, recorded={**segment.recorded, "torque_shaft_nm": torque})
+
+
+def test_a_sound_machine_is_left_alone():
+    segments = (log(noise=1.0), log(noise=1.0, seed=6))
+    rungs = search(segments, fitted(segments), LIBRARY)
+    assert [rung.added for rung in rungs] == [()]
+    assert rungs[0].fitted.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+
+
+def test_windage_is_found_with_its_size():
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    rungs = search(segments, fitted(segments), LIBRARY)
+    assert rungs[-1].added == ("windage",)
+    assert rungs[-1].fitted.values["windage.drag_nm"] == pytest.approx(0.03, rel=0.05)
+
+
+def test_two_effects_are_found_whatever_their_order():
+    def drag(omega, theta):
+        return 0.02 * np.sign(omega) + 0.02 * np.sin(theta + 0.4)
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    rungs = search(segments, fitted(segments), LIBRARY)
+    assert set(rungs[-1].added) == {"coulomb_friction", "unbalance"}
+    values = rungs[-1].fitted.values
+    assert np.hypot(values["unbalance.sin_nm"], values["unbalance.cos_nm"]) == pytest.approx(
+        0.02, rel=0.03
+    )
+
+
+def test_a_drag_of_the_wrong_sign_is_no_friction():
+    """Windage that pushes is not offered: physics has no such effect."""
+
+    def drag(omega, _):
+        return -0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    start = fitted(segments)
+    offered = candidates(LIBRARY, start)
+    scores = score_all(widened(segments, start, offered), start, offered)
+    assert "windage" not in {s.candidate.effect.name for s in scores if s.passes}
+
+
+def test_an_unexplained_torque_does_not_move_the_flux():
+    """Noise weights alone would trade ψ for the torque equation's error."""
+
+    def drag(omega, _):
+        return 0.3 * np.tanh(omega / 20.0) ** 3
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    assert fitted(segments).values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=2e-4)
+
+
+def test_a_capture_left_out_is_predicted_from_the_others():
+    segments = tuple(log(noise=1.0, seed=n) for n in (5, 6, 7))
+    start = fitted(segments)
+    held = leave_out(system(segments, start), len(own_columns(start.model)))
+    assert np.isfinite(held.residual).all()
+    assert held.total == pytest.approx(1.0, abs=0.6)
+
+
+def test_zero_of_an_effect_takes_the_trial_shape():
+    model = Model(machine(), ())
+    values = zero(effects()["stribeck"], model)
+    assert values["stribeck.excess_nm"] == 0.0
+    assert values["stribeck.speed_rad_s"] == pytest.approx(0.004 * 250.0)
