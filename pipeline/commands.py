@@ -31,6 +31,18 @@ def _index(*commands: Command) -> dict[str, Command]:
 COMMANDS = _index(
     Command("run", "run", s.RunSettings, "captures in; datasheets, checks, report, recordings out"),
     Command(
+        "compare",
+        "compare",
+        s.CompareSettings,
+        "model against held-out measurements, signal by signal: where it is off",
+    ),
+    Command(
+        "diagnose",
+        "diagnose",
+        s.DiagnoseSettings,
+        "which physical effect the model lacks, how sure that is, what else it could be",
+    ),
+    Command(
         "inspect",
         "inspect_file",
         s.InspectSettings,
@@ -45,6 +57,12 @@ COMMANDS = _index(
         positional=("motor",),
     ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
+    Command(
+        "benchmark",
+        "benchmark.command",
+        s.BenchmarkSettings,
+        "sealed simulated motors, diagnosed blind: how often the answer is right",
+    ),
     Command("schemas", "schemas", s.Settings, "JSON Schemas and glossary, built into the checkout"),
     Command(
         "calc",

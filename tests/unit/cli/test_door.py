@@ -25,7 +25,13 @@ def test_help_of_a_command_names_every_key(capsys: pytest.CaptureFixture[str]) -
 
 @pytest.mark.parametrize(
     "words",
-    [["dance"], ["run", "inptu=x"], ["run", "loose"], ["run", "workers=many"], ["run", "input=/no"]],
+    [
+        ["dance"],
+        ["run", "inptu=x"],
+        ["run", "loose"],
+        ["run", "workers=many"],
+        ["run", "input=/no"],
+    ],
 )
 def test_wrong_usage_is_one_line_and_exit_2(
     words: list[str], capsys: pytest.CaptureFixture[str]
