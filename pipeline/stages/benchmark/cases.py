@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -166,7 +167,7 @@ def cases(master: int, folder: Path) -> Iterator[Case]:
     yield from _gaps(draw)
 
 
-SMALL = {"size": 2, "null": 2, "set": 3, "crowd": 2, "form": 3, "outside": 3, "tie": 2, "gap": 2}
+SMALL = {"size": 2, "null": 1, "set": 2, "crowd": 1, "form": 2, "outside": 2, "tie": 2, "gap": 1}
 
 
 def small(found: Iterator[Case]) -> list[Case]:
@@ -246,7 +247,7 @@ def _single(
     size: float,
     rng: np.random.Generator,
     keep: tuple[str, ...] = STEMS,
-    **further: float,
+    further: Mapping[str, float] = MappingProxyType({}),
 ) -> Case:
     motor, known, model = station(motor_name).motor, draw.sensitivity(motor_name), model_for(effect)
     values = {**shaped(effect, motor, size, rng), **further}
@@ -354,7 +355,9 @@ def _forms(draw: Draw) -> Iterator[Case]:
         motor = station(motor_name).motor
         size = min(typical(effect, motor) * float(rng.uniform(1.0, 2.0)), _largest(effect))
         further = _in_units(effect, change, motor)
-        case = _single(draw, "form", "wrong form", number, motor_name, effect, size, rng, **further)
+        case = _single(
+            draw, "form", "wrong form", number, motor_name, effect, size, rng, further=further
+        )
         if effect == "copper_temperature":
             document = {**case.document(), "outside": "hot_spot", "outside_size": 1.0}
             case = case_from(document)

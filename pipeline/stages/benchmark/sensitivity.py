@@ -129,7 +129,8 @@ class Sensitivity:
         if not ideal:
             fitted += [k + self.effects.index(name) for name in ALWAYS]
         normal = total[np.ix_(fitted, fitted)] + np.diag(prior[fitted])
-        return total[k:, k:] - _explained(normal, total[fitted, k:])
+        left: Array = total[k:, k:] - _explained(normal, total[fitted, k:])
+        return left
 
     def noncentrality(
         self, name: str, size: float, stems: Iterable[str] = STEMS, model: str = "standard"

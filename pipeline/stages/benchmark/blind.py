@@ -1,0 +1,53 @@
+"""The diagnosing side: a process of its own that is handed campaigns and nothing else."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from pipeline.records.capture import Campaign
+
+Diagnose = Callable[[Campaign, str], dict[str, Any]]
+"""Campaign and name of the model in, a document of schema model-diagnosis/1 out."""
+
+
+def product(campaign: Campaign, model: str) -> dict[str, Any]:
+    """What `python -m pipeline diagnose` writes for a campaign."""
+    from pipeline.criticism.diagnosis import diagnose
+    from pipeline.records.comparison import ModelSpec
+    from pipeline.stages.campaigns import start_constants
+
+    document: dict[str, Any] = diagnose(
+        campaign, ModelSpec(model), start_constants(campaign)
+    ).document()
+    return document
+
+
+def attempted(diagnose: Diagnose, campaign: Campaign, model: str) -> dict[str, Any]:
+    """A diagnosis, or a document with `failure` where it broke down: a case is never lost."""
+    try:
+        return diagnose(campaign, model)
+    except Exception as error:  # noqa: BLE001 - whatever breaks is what the benchmark reports
+        return {"failure": f"{type(error).__name__}: {error}"[:300]}
+
+
+def _forget(folder: str) -> None:
+    """Leaves the blind process an empty folder and no words of the command that started it."""
+    os.chdir(folder)
+    sys.argv = [""]
+
+
+@contextmanager
+def blind_process() -> Iterator[ProcessPoolExecutor]:
+    """A worker process in an empty folder: no path of truth or results ever reaches it."""
+    with (
+        TemporaryDirectory() as folder,
+        ProcessPoolExecutor(1, get_context("spawn"), _forget, (folder,)) as pool,
+    ):
+        yield pool
