@@ -3,9 +3,11 @@
     dI/dt = (v - R I)/L(I)
     L(I)  = 2 [cos²g Ld(i_d) + sin²g Lq(i_q)],  i_d + j i_q = (2/√3) I e^{jg}
 
-g is the angle from the d axis to the pair's current. Ld and Lq are incremental and saturate as
-L0/(1 + a i + b i² + c i⁴), on q with |i|, for there both senses are alike. Every integration step
-is an exact exponential with L frozen at its midpoint: exact for a constant L, else second order.
+g is the angle from the d axis to the pair's current. Ld and Lq are incremental and saturate with
+their own flux, L0/(1 + a y + b y² + c y³ + d y⁴), y the flux that the current made; on q with |y|,
+for there both senses are alike. So i is a polynomial of y, which is how iron bends. Every step of
+the integration is an exact exponential with L frozen at its midpoint: exact for a constant L, else
+second order.
 
 References: IEEE Std 1812-2014, 8 (step response at standstill); Hairer, Norsett and Wanner,
 Solving Ordinary Differential Equations I, II.1 (midpoint rule).
@@ -23,14 +25,15 @@ from numpy.typing import NDArray
 from pipeline.fit.step_record import StepRecord
 
 Array = NDArray[np.float64]
-SHARED = ("ld_h", "d_1", "d_2", "d_4", "lq_h", "q_1", "q_2", "q_4")
-LD, LQ = 0, 4
+SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4")
+TERMS = 4
+LD, LQ = 0, 1 + TERMS
 SPACE = 2.0 / math.sqrt(3.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where the parameters sit: six shared ones, then each capture's own.
+    """Where the parameters sit: those of the axes, then each capture's own.
 
     Own ones in order: R, current offset where the voltage has two levels or more, the edges to
     place, the first current where the capture starts unsettled, the inverter's drop where
@@ -110,22 +113,35 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
     return start
 
 
-def inductance(shared: Array, cos_g: Array, current_a: Array) -> Array:
-    """Incremental inductance [m] between the terminals; shared [m, 8], cos_g and current [m]."""
-    sin2 = 1.0 - cos_g**2
-    i_d = SPACE * cos_g * current_a
-    i_q = SPACE * np.sqrt(sin2) * np.abs(current_a)
-    d_part = shared[:, LD] / _bend(shared[:, LD + 1 : LD + 4], i_d)
-    q_part = shared[:, LQ] / _bend(shared[:, LQ + 1 : LQ + 4], i_q)
-    total: Array = 2.0 * (cos_g**2 * d_part + sin2 * q_part)
-    return total
+def axis_inductances(shared: Array, flux_d: Array, flux_q: Array) -> tuple[Array, Array]:
+    """Incremental Ld and Lq [m] at the fluxes [m] made by current; shared [m, 10]."""
+    d_axis = shared[:, LD] / _bend(shared[:, LD + 1 : LD + 1 + TERMS], flux_d)
+    q_axis = shared[:, LQ] / _bend(shared[:, LQ + 1 : LQ + 1 + TERMS], np.abs(flux_q))
+    return d_axis, q_axis
 
 
-def _bend(terms: Array, current_a: Array) -> Array:
-    """L0/L [m] at an axis current [m], kept above 1/20."""
-    square = current_a * current_a
-    bend: Array = 1.0 + current_a * terms[:, 0] + square * (terms[:, 1] + square * terms[:, 2])
-    return np.maximum(bend, 0.05)
+def _bend(terms: Array, flux: Array) -> Array:
+    """L0/L [m] at an axis flux [m], kept above 1/20."""
+    bend = terms[:, 3] * flux
+    for column in (2, 1, 0):
+        bend = (bend + terms[:, column]) * flux
+    return np.maximum(1.0 + bend, 0.05)
+
+
+def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
+    """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0."""
+    one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
+    flux_d, flux_q = np.zeros(1), np.zeros(1)
+    found = np.empty(current_a.size)
+    for k in range(current_a.size):
+        l_d, l_q = axis_inductances(one, flux_d, flux_q)
+        found[k] = 2.0 * float(cos_g**2 * l_d[0] + sin_g**2 * l_q[0])
+        if k + 1 < current_a.size:
+            step = SPACE * float(current_a[k + 1] - current_a[k])
+            middle = flux_d + 0.5 * l_d * cos_g * step, flux_q + 0.5 * l_q * sin_g * step
+            l_d, l_q = axis_inductances(one, *middle)
+            flux_d, flux_q = flux_d + l_d * cos_g * step, flux_q + l_q * sin_g * step
+    return found
 
 
 def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
@@ -138,7 +154,7 @@ def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
             nodes = np.array([0.0, 1.0])
         else:
             reach = min(8.0 * tau, length)
-            fine = np.linspace(0.0, reach, max(int(reach / tau * 12), 4) + 1)
+            fine = np.linspace(0.0, reach, max(int(reach / tau * 16), 4) + 1)
             coarse = np.linspace(reach, length, 8)[1:] if length > reach else np.zeros(0)
             nodes = np.concatenate([fine, coarse]) / length
             nodes[-1] = 1.0
@@ -209,14 +225,24 @@ class StepModel:
         l_mid, target = np.empty((self._count, r.size)), np.empty((self._count, r.size))
         nodes[0] = current
         dropping = bool(np.any(drop))
+        sin_g = np.sqrt(np.maximum(1.0 - cos_g**2, 0.0))
+        l_d, l_q = shared[:, LD], shared[:, LQ]
+        flux_d, flux_q = l_d * SPACE * cos_g * current, l_q * SPACE * sin_g * current
         for k in range(self._count):
             goal = volts[k] / r
             if dropping:
                 goal = goal - drop / r * np.clip(current / knee, -1.0, 1.0)
-            here = inductance(shared, cos_g, current)
-            half = goal + (current - goal) * np.exp(-0.5 * width[k] * r / here)
-            here = inductance(shared, cos_g, half)
-            current = goal + (current - goal) * np.exp(-width[k] * r / here)
+            l_d, l_q = axis_inductances(shared, flux_d, flux_q)
+            here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
+            rise = SPACE * (goal - current) * -np.expm1(-0.5 * width[k] * r / here)
+            l_d, l_q = axis_inductances(
+                shared, flux_d + l_d * cos_g * rise, flux_q + l_q * sin_g * rise
+            )
+            here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
+            step = (goal - current) * -np.expm1(-width[k] * r / here)
+            flux_d = flux_d + l_d * cos_g * SPACE * step
+            flux_q = flux_q + l_q * sin_g * SPACE * step
+            current = current + step
             nodes[k + 1], l_mid[k], target[k] = current, here, goal
         return nodes, l_mid, target
 
@@ -264,10 +290,10 @@ class StepModel:
     def _widths(self, parameters: Array) -> Array:
         largest = SPACE * max(record.largest_a for record in self.records)
         widths = np.empty(parameters.size)
-        powers = largest ** -np.array([0.0, 1.0, 2.0, 4.0])
-        widths[LD : LD + 4] = 1e-6 * powers
-        widths[LQ : LQ + 4] = 1e-6 * powers
-        widths[[LD, LQ]] *= parameters[[LD, LQ]]
+        for place in (LD, LQ):
+            flux = parameters[place] * largest
+            widths[place] = 1e-6 * parameters[place]
+            widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux ** -np.arange(1.0, 1.0 + TERMS)
         for record, at, size in zip(
             self.records, self.layout.starts, self.layout.sizes, strict=True
         ):

@@ -7,6 +7,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 from tests.recovery.harness import BIAS_LIMIT_U, COVERAGE_LIMITS, SCATTER_LIMIT, Case, Verdict, run
@@ -70,8 +71,11 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--output", type=Path, default=DOCUMENT)
     chosen = parser.parse_args(arguments)
     count = len(cases())
-    with ProcessPoolExecutor(chosen.workers) as pool:
-        found = list(pool.map(judged, range(count), [chosen.seeds] * count))
+    if chosen.workers == 1:
+        found = [judged(index, chosen.seeds) for index in range(count)]
+    else:
+        with ProcessPoolExecutor(chosen.workers, get_context("spawn")) as pool:
+            found = list(pool.map(judged, range(count), [chosen.seeds] * count))
     verdicts = [verdict for group in found for verdict in group]
     chosen.output.parent.mkdir(parents=True, exist_ok=True)
     chosen.output.write_text(document(verdicts, chosen.seeds), encoding="utf-8")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from pipeline.fit.instruments import (
     voltage_source,
 )
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.fit.step_model import LD, LQ, SHARED, SPACE, StepModel, inductance, start_of
+from pipeline.fit.step_model import LD, LQ, SHARED, SPACE, TERMS, StepModel, along_ramp, start_of
 from pipeline.fit.step_record import StepRecord, read_step
 from pipeline.numerics.least_squares import (
     NonlinearFit,
@@ -39,7 +38,10 @@ EXPERIMENT = (
     "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
     "and 60), both senses of current, two or more amplitudes"
 )
-AXES = {"ld_h": (LD, (LD + 1, LD + 2, LD + 3)), "lq_h": (LQ, (LQ + 1, LQ + 2, LQ + 3))}
+AXES = {
+    "ld_h": (LD, tuple(range(LD + 1, LD + 1 + TERMS))),
+    "lq_h": (LQ, tuple(range(LQ + 1, LQ + 1 + TERMS))),
+}
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -69,8 +71,8 @@ class Solution:
 def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Least squares of the simulated current on the measured one, all captures together.
 
-    First with all terms of saturation, then with those that the Bayesian information criterion
-    keeps; what the rejected ones would still change is in the uncertainty.
+    Saturation terms come in where the Bayesian information criterion pays for them; what the
+    rejected ones would still change is in the uncertainty.
     Gains scale v and i, and L with v/i. References: Schwarz, Ann. Statist. 6(2), 1978 (BIC);
     Hoeting et al., Statist. Sci. 14(4), 1999, eq. 5 (variance between models).
     """
@@ -81,7 +83,7 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
         reason = "; ".join([*notes, EXPERIMENT])
         return Fit(tuple(not_identifiable(n, "H", NAME, reason) for n in GIVES))
     model = StepModel(records)
-    solution, rich = _solve(model, axes)
+    solution = _solve(model, axes)
     used = tuple(r.capture for r in records)
     notes.append(unstated_note(used, ("voltage", "current")))
     estimates = []
@@ -90,7 +92,7 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
             missing = f"no step with enough current on the {name[1]} axis; {EXPERIMENT}"
             estimates.append(not_identifiable(name, "H", NAME, missing))
             continue
-        estimates.append(_estimate(name, solution, rich, notes))
+        estimates.append(_estimate(name, solution, notes))
     return Fit(tuple(estimates), tuple(_evidence(solution, axes)))
 
 
@@ -122,25 +124,74 @@ def _axes_told(records: Sequence[StepRecord], least_share: float) -> tuple[str, 
     return ("lq_h",) if np.all(cos2 < 0.1 * least_share) else ()
 
 
-def _solve(model: StepModel, axes: Sequence[str]) -> tuple[Solution, Solution]:
-    """The chosen fit, and the one with all saturation terms that it was chosen from."""
-    full = np.ones(model.layout.size, dtype=bool)
-    full[: len(SHARED)] = False
-    for name in axes:
-        full[[AXES[name][0], *AXES[name][1]]] = True
+def _solve(model: StepModel, axes: Sequence[str]) -> Solution:
+    """Adds saturation terms while they pay, then drops those that no longer do.
+
+    A term pays where it lowers the weighted sum of squares by more than log n (BIC). Terms are
+    proposed by the score of the present fit under white noise, one an axis and round, and judged
+    after a fit with them by their own standard error, which counts correlated residuals.
+    """
+    free = np.ones(model.layout.size, dtype=bool)
+    free[: len(SHARED)] = False
+    free[[AXES[name][0] for name in axes]] = True
     start = start_of(model.records, model.layout)
     if len(axes) == 1:
         start[[LD, LQ]] = start[AXES[axes[0]][0]]
-    rich = _fit(model, start, full, [record.sigma_a for record in model.records])
-    chosen = full.copy()
-    start = rich.parameters.copy()
+    solution = _fit(model, start, free, [record.sigma_a for record in model.records])
+    price = math.log(sum(float(r.count.sum()) for r in model.records))
+    for _ in range(TERMS):
+        offers = _offers(solution, axes, [record.sigma_a for record in model.records])
+        wanted = [max(own)[1] for own in offers.values() if own and max(own)[0] > price]
+        if not wanted:
+            break
+        free = solution.free.copy()
+        free[wanted] = True
+        solution = _fit(model, solution.parameters, free, solution.sigmas)
+    while True:
+        worth = {k: _worth(solution, k) for name in axes for k in AXES[name][1] if solution.free[k]}
+        idle = [k for k, value in worth.items() if value < price]
+        if not idle:
+            return solution
+        least = min(idle, key=lambda k: worth[k])
+        free, start = solution.free.copy(), solution.parameters.copy()
+        free[least], start[least] = False, 0.0
+        solution = _fit(model, start, free, solution.sigmas)
+
+
+def _worth(solution: Solution, term: int) -> float:
+    """What dropping one term would cost in weighted squares: (value/u)², Wald."""
+    variance = float(solution.covariance()[term, term])
+    return float(solution.parameters[term]) ** 2 / max(variance, 1e-300)
+
+
+def _offers(
+    solution: Solution, axes: Sequence[str], sigmas: Sequence[float]
+) -> dict[str, list[tuple[float, int, float]]]:
+    """For each axis and each term not in use: gain in weighted squares, term, change of L.
+
+    One Gauss-Newton step of the present fit with that term added (Rao's score test).
+    """
+    everything = solution.free.copy()
     for name in axes:
-        dropped = _ranked(rich, name)[0][1]
-        chosen[list(dropped)] = False
-        start[list(dropped)] = 0.0
-    if np.array_equal(chosen, full):
-        return rich, rich
-    return _fit(model, start, chosen, rich.sigmas), rich
+        everything[list(AXES[name][1])] = True
+    residuals, jacobian = solution.model.residuals(solution.parameters, sigmas, everything)
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    scaled = jacobian / scale
+    normal, gradient = scaled.T @ scaled, scaled.T @ residuals
+    places = np.flatnonzero(everything)
+    offers: dict[str, list[tuple[float, int, float]]] = {}
+    for name in axes:
+        offers[name] = []
+        for term in AXES[name][1]:
+            if solution.free[term]:
+                continue
+            use = np.flatnonzero(solution.free[places] | (places == term))
+            step = -np.linalg.pinv(normal[np.ix_(use, use)], 1e-13, hermitian=True) @ gradient[use]
+            moved = step[np.flatnonzero(places[use] == AXES[name][0])[0]]
+            change = float(moved / scale[np.flatnonzero(places == AXES[name][0])[0]])
+            offers[name].append((-float(step @ gradient[use]), term, change))
+    return offers
 
 
 def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -> Solution:
@@ -180,42 +231,24 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -
     return Solution(model, parameters, free, honest, tuple(sigmas), tuple(found))
 
 
-def _ranked(rich: Solution, name: str) -> list[tuple[float, tuple[int, ...], float]]:
-    """Saturation terms to drop on one axis, best first: (BIC, dropped, change of L).
+def _between_models(solution: Solution, name: str) -> float:
+    """Standard deviation of L between the chosen model and those with one term more.
 
-    From the full fit alone: dropping the set S costs x_S' C_SS^-1 x_S and moves L by
-    -C_LS C_SS^-1 x_S.
+    Each is weighted by exp(-BIC/2), the chosen one by 1.
     """
-    place, terms = AXES[name]
-    covariance = rich.covariance()
-    samples = max(float(sum(r.count.sum() for r in rich.model.records)), 2.0)
-    ranked = []
-    for dropped in chain.from_iterable(combinations(terms, k) for k in range(len(terms) + 1)):
-        index = list(dropped)
-        cost, moved = 0.0, 0.0
-        if index:
-            inverse = np.linalg.pinv(covariance[np.ix_(index, index)], hermitian=True)
-            cost = float(rich.parameters[index] @ inverse @ rich.parameters[index])
-            moved = -float(covariance[place, index] @ inverse @ rich.parameters[index])
-        kept = len(terms) - len(index)
-        ranked.append((cost + kept * math.log(samples), dropped, moved))
-    return sorted(ranked)
+    price = math.log(sum(float(r.count.sum()) for r in solution.model.records))
+    offers = _offers(solution, (name,), solution.sigmas)[name]
+    weights = [math.exp(-0.5 * max(price - gain, 0.0)) for gain, _, _ in offers]
+    spread = sum(w * change**2 for w, (_, _, change) in zip(weights, offers, strict=True))
+    return math.sqrt(spread / (1.0 + sum(weights)))
 
 
-def _between_models(rich: Solution, name: str) -> float:
-    """Standard deviation of L between the models, each weighted by exp(-BIC/2)."""
-    ranked = _ranked(rich, name)
-    weights = np.array([math.exp(-0.5 * (bic - ranked[0][0])) for bic, _, _ in ranked])
-    moved = np.array([change for _, _, change in ranked]) - ranked[0][2]
-    return math.sqrt(float(weights @ moved**2 / weights.sum()))
-
-
-def _estimate(name: str, solution: Solution, rich: Solution, notes: Sequence[str]) -> Estimate:
+def _estimate(name: str, solution: Solution, notes: Sequence[str]) -> Estimate:
     place, terms = AXES[name]
     value = float(solution.parameters[place])
     scatter = math.sqrt(max(float(solution.covariance()[place, place]), 0.0))
     parts = [Contribution(f"scatter:{NAME}:{name}", scatter, "A")]
-    between = _between_models(rich, name)
+    between = _between_models(solution, name)
     parts.append(Contribution(f"scatter:{NAME}:saturation:{name}", between, "A"))
     parts += _gains(name, solution)
     largest = max(SPACE * r.largest_a * abs(_share(r, name)) for r in solution.model.records)
@@ -238,9 +271,9 @@ def _share(record: StepRecord, name: str) -> float:
 
 def _incremental(name: str, solution: Solution, current_a: float) -> float:
     """Incremental inductance of one axis at an axis current [A]."""
-    first = AXES[name][0]
-    low, a, b, c = solution.parameters[first : first + 4]
-    return float(low / (1.0 + current_a * (a + current_a * (b + c * current_a**2))))
+    ramp = np.linspace(0.0, current_a / SPACE, 81)
+    shared = solution.parameters[: len(SHARED)]
+    return float(along_ramp(shared, 1.0 if name == "ld_h" else 0.0, ramp)[-1]) / 2.0
 
 
 def _gains(name: str, solution: Solution) -> list[Contribution]:
@@ -334,8 +367,8 @@ def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:
                 edges[index] += solution.parameters[skip + k] * record.wave.period_s
             peak = float(record.i_a[int(np.argmax(np.abs(record.i_a)))])
             ramp = np.linspace(0.0, peak, 41)
-            shared = np.tile(solution.parameters[: len(SHARED)], (41, 1))
-            inside = inductance(shared, np.full(41, math.cos(record.axis_rad)), ramp)
+            shared = solution.parameters[: len(SHARED)]
+            inside = along_ramp(shared, math.cos(record.axis_rad), ramp)
             x.append(peak)
             y.append(_chord(record, edges))
             fitted.append(float(inside.mean()))
