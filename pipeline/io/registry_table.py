@@ -16,7 +16,7 @@ import random
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
@@ -57,6 +57,10 @@ CONFIGURATION = {
 APPLICATION = "registry"
 # deltalake 1.6 panics at these in a folder's path, and takes %41 for A.
 UNFIT = re.compile(r"""[\x00-\x1f\x7f"*<>\[\]\\^`{|}]|%[0-9A-Fa-f]{2}""")
+# More small files than this are merged into one, which keeps a look at the registry fast; rows,
+# old files and Delta's time travel stay.
+MOST_FILES = 32
+SMALL_BYTES = 16 << 20
 PATIENCE_S = 120.0
 LONGEST_PAUSE_S = 0.25
 
@@ -114,6 +118,7 @@ class EventTable:
                 version = table.version()
                 if self._committed(table, rows):
                     self._sync(table.version())
+                    self._merge_small(table)
                     return before, [event for event, _ in rows]
                 table = self._opened() or self._created()
                 if table.version() == version or time.monotonic() > give_up:
@@ -188,6 +193,17 @@ class EventTable:
         except DeltaError:
             return False
         return True
+
+    def _merge_small(self, table: DeltaTable) -> None:
+        """Merges small files where there are many; a writer that does so too may be faster."""
+        import polars as pl
+        from deltalake.exceptions import DeltaError
+
+        sizes = pl.DataFrame(table.get_add_actions(flatten=True))["size_bytes"].to_list()
+        if sum(size < SMALL_BYTES for size in sizes) > MOST_FILES:
+            with suppress(DeltaError):
+                table.optimize.compact(target_size=SMALL_BYTES)
+                self._sync(table.version())
 
     def _sync(self, version: int) -> None:
         """Waits until the disk has a commit and the files it added."""
