@@ -13,11 +13,13 @@ from pipeline.numerics.plateaus import block_means, find_plateaus
 from pipeline.physics.conventions import phase_from_line
 from pipeline.records.capture import Capture
 from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, derived
 
 Array = NDArray[np.float64]
 BLOCKS = 300
 DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 TURNING = ("psi_pm_wb", "pole_pairs", "ld_h", "lq_h")
+REFERENCE = ("r_phase_ohm", "r_a_ohm", "r_b_ohm", "r_c_ohm", "angle_offset_elec_rad")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +29,8 @@ class HeatRecord:
     `r_phase_ohm` is voltage along the current over current, per wye-equivalent phase; `square_a2`
     is the mean of i_d² + i_q², so that copper loss is 1.5 R times it. Temperatures other than the
     winding's are None where not measured. `turning` says that back-EMF was taken off.
+    `shares` are the weights of phases a, b, c in the resistance seen, None where the current's
+    place in the stator is not known.
     """
 
     capture: Capture
@@ -38,6 +42,7 @@ class HeatRecord:
     temp_second_degc: Array | None
     temp_ambient_degc: Array | None
     turning: bool
+    shares: tuple[float, float, float] | None
 
 
 def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
@@ -54,9 +59,51 @@ def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
     turning = False
     if capture.has(*DQ, "t_s"):
         data, turning = _rotor_frame(capture, others, known)
+        shares = _phase_shares(capture, known)
     else:
         data = _terminal_frame(capture, others)
-    return _blocks(capture, data, second, ambient, turning)
+        pair = pair_of(capture) or ""
+        a, b, c = (0.5 * (phase in pair) for phase in "abc")
+        shares = (a, b, c)
+    return _blocks(capture, data, (second, ambient), turning, shares)
+
+
+def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, float] | None:
+    """(2/3) cos² of the angle from each phase to the current, the mean over the capture.
+
+    Copper loss is the sum of R_k i_k², so a locked rotor sees its own mix of the phases.
+    """
+    offset = known.best("angle_offset_elec_rad")
+    zero = 0.0 if offset is None else offset.number
+    if capture.has("theta_elec_rad"):
+        data = capture.arrays("id_a", "iq_a", "theta_elec_rad")
+        theta = data["theta_elec_rad"]
+    elif capture.has("theta_mech_rad") and (pairs := known.best("pole_pairs")) is not None:
+        data = capture.arrays("id_a", "iq_a", "theta_mech_rad")
+        theta = pairs.number * data["theta_mech_rad"] + zero
+    else:
+        return None
+    angle = theta + np.arctan2(data["iq_a"], data["id_a"])
+    weight = data["id_a"] ** 2 + data["iq_a"] ** 2
+    good = np.isfinite(angle) & np.isfinite(weight)
+    a, b, c = (
+        2.0 / 3.0 * float(np.average(np.cos(angle[good] - place) ** 2, weights=weight[good]))
+        for place in (0.0, 2.0 * math.pi / 3.0, -2.0 * math.pi / 3.0)
+    )
+    return a, b, c
+
+
+def reference_resistance(record: HeatRecord, known: Constants) -> Estimate | None:
+    """R at 25 degC, by the resistance test, of the mix of phases that this run's current saw.
+
+    The mean of the phases where they or the mix are not known; None without a resistance test.
+    """
+    phases = [known.best(f"r_{phase}_ohm") for phase in "abc"]
+    if record.shares is None or any(one is None for one in phases):
+        return known.best("r_phase_ohm")
+    terms = [(w, one) for w, one in zip(record.shares, phases, strict=True) if one is not None]
+    value = sum(w * one.number for w, one in terms)
+    return derived("r_phase_ohm", "ohm", value, terms, terms[0][1].method)
 
 
 def _rotor_frame(
@@ -113,11 +160,12 @@ def _terminal_frame(capture: Capture, others: list[str]) -> dict[str, Array]:
 def _blocks(
     capture: Capture,
     data: dict[str, Array],
-    second: str | None,
-    ambient: str | None,
+    others: tuple[str | None, str | None],
     turning: bool,
+    shares: tuple[float, float, float] | None,
 ) -> HeatRecord | None:
     """Means over equal blocks of the longest settled stretch of current."""
+    second, ambient = others
     needed = ("t_s", "along_va", "square_a2", "temp_winding_degc")
     good = np.all([np.isfinite(data[n]) for n in needed], axis=0)
     data = {name: values[good] for name, values in data.items()}
@@ -139,6 +187,7 @@ def _blocks(
         None if second is None else mean[second],
         None if ambient is None else mean[ambient],
         turning,
+        shares,
     )
 
 

@@ -9,7 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.heat_record import TURNING, HeatRecord, read_heat
+from pipeline.fit.heat_record import (
+    REFERENCE,
+    TURNING,
+    HeatRecord,
+    read_heat,
+    reference_resistance,
+)
 from pipeline.fit.instruments import (
     budget_of,
     current_source,
@@ -64,7 +70,7 @@ def fit_heat_run(campaign: Campaign, known: Constants, options: Mapping[str, flo
         return Fit(tuple(not_identifiable(n, UNITS[n], NAME, reason) for n in GIVES))
     line = min(lines, key=lambda one: one.covariance[1, 1] / one.slope_ohm_k**2)
     resistance = _resistance(line, options, notes)
-    reference = known.best("r_phase_ohm")
+    reference = reference_resistance(line.record, known)
     commanded = line.record.capture.meta.voltage_kind == "commanded"
     if reference is not None and (commanded or line.record.turning):
         alpha = _alpha_against(line, reference, options, notes)
@@ -242,7 +248,7 @@ ESTIMATOR = Estimator(
     ("heat_run",),
     EXPERIMENT,
     fit_heat_run,
-    uses=("r_phase_ohm", "temp_coeff_magnet_1_k", *TURNING),
+    uses=("temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
     options={
         "least_span_k": 5.0,
         "u_lag_s": 0.01,

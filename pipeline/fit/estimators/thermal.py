@@ -9,7 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.heat_record import TURNING, HeatRecord, ambient_degc, read_heat
+from pipeline.fit.heat_record import (
+    REFERENCE,
+    TURNING,
+    HeatRecord,
+    ambient_degc,
+    read_heat,
+    reference_resistance,
+)
 from pipeline.fit.instruments import budget_of, current_source, temperature_source
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.least_squares import (
@@ -19,6 +26,7 @@ from pipeline.numerics.least_squares import (
     linear_fit,
 )
 from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -80,10 +88,10 @@ def fit_thermal(campaign: Campaign, known: Constants, options: Mapping[str, floa
 
 def _losses_w(record: HeatRecord, known: Constants) -> Array:
     """Copper loss [n]: 1.5 R(T) (i_d² + i_q²), R as measured where no resistance test is there."""
-    r25, alpha = known.best("r_phase_ohm"), known.best("temp_coeff_copper_1_k")
+    r25, alpha = reference_resistance(record, known), known.best("temp_coeff_copper_1_k")
     if r25 is None:
         return 1.5 * record.r_phase_ohm * record.square_a2
-    coefficient = 1.0 / 259.5 if alpha is None else alpha.number
+    coefficient = COPPER_COEFFICIENT_25_1_K if alpha is None else alpha.number
     r_ohm = r25.number * (1.0 + coefficient * (record.temp_winding_degc - 25.0))
     losses: Array = 1.5 * r_ohm * record.square_a2
     return losses
@@ -244,7 +252,7 @@ def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Const
     rth = balance.rth_k_w
     thermometer = temperature_source(meta)
     gains = {current_source(meta): 2.0 * (meta.u_rel_current or 0.0)}
-    resistance = known.best("r_phase_ohm")
+    resistance = reference_resistance(record, known)
     if resistance is not None:
         for part in resistance.budget:
             if part.source != thermometer:
@@ -292,6 +300,6 @@ ESTIMATOR = Estimator(
     ("heat_run",),
     EXPERIMENT,
     fit_thermal,
-    uses=("r_phase_ohm", "temp_coeff_copper_1_k", "temp_coeff_magnet_1_k", *TURNING),
+    uses=("temp_coeff_copper_1_k", "temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
     options={"worst_u_rel": 0.25},
 )

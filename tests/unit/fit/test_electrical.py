@@ -401,6 +401,23 @@ def test_an_inverters_drop_leaves_the_coefficient_alone():
     assert found["r_phase_ohm"].u > 0.04
 
 
+def test_a_locked_rotor_sees_its_own_mix_of_unequal_phases():
+    """Current on phase a: R = (2/3)(R_a + R_b/4 + R_c/4); the mean of 0.40 would be 4 % off."""
+    run = heat_capture(alpha=0.0039, drop=0.3)
+    table = run.tables[0].with_columns(pl.lit(0.0).alias("theta_elec_rad"))
+    locked = Capture("locked", "0" * 64, "verified", run.meta, (table,))
+    phases = {"r_a_ohm": 0.416, "r_b_ohm": 0.37, "r_c_ohm": 0.366}
+    assert 2 / 3 * (0.416 + (0.37 + 0.366) / 4) == pytest.approx(0.4)
+    known = Constants(
+        (
+            known_value("r_phase_ohm", 0.384, unit="ohm"),
+            *(known_value(name, r, 0.001, "ohm") for name, r in phases.items()),
+        )
+    )
+    found = estimates(heat_run.ESTIMATOR, locked, known=known)["temp_coeff_copper_1_k"]
+    assert found.number == pytest.approx(0.0039, rel=2e-3)
+
+
 def test_a_measured_voltage_needs_no_other_test():
     found = estimates(heat_run.ESTIMATOR, heat_capture(kind="measured"))
     alpha = found["temp_coeff_copper_1_k"]
