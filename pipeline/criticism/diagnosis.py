@@ -51,7 +51,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     offered = candidates(library, last.fitted)
     held = [leave_out(r.around, len(own_columns(r.fitted.model))) for r in rungs]
     residual = last.around.residual
-    left = remainder(last.around, found, machine, residual)
+    left = remainder(last.around, found, residual)
     sketch = _unknown(found, rungs, left)
     missing = last.added
     ranking = _ranking(rungs, held, offered, library)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.effect import Array
+from pipeline.criticism.linearise import channel_scale
 from pipeline.criticism.segments import Segment
 from pipeline.criticism.system import System
 from pipeline.records.diagnosis import Remainder
@@ -82,7 +83,7 @@ def signal_errors(around: System, residual: Array) -> dict[str, float]:
 
 
 def remainder(
-    around: System, segments: Sequence[Segment], machine: Machine, residual: Array
+    around: System, segments: Sequence[Segment], residual: Array
 ) -> tuple[Remainder, ...]:
     """Groups over their floor, significantly and by a size that matters, the worst first.
 
@@ -99,18 +100,14 @@ def remainder(
         unit = float((around.unit[mine] ** 2).mean())
         more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
-        if size > material_size(segments[number], channel, machine):
+        if size > material_size(segments[number], channel, around):
             found.append(Remainder(segments[number].capture, channel, order, float(q), size))
     return tuple(sorted(found, key=lambda r: (-r.chi2_per_n, r.capture, r.signal, r.order)))
 
 
-def material_size(segment: Segment, channel: str, machine: Machine) -> float:
+def material_size(segment: Segment, channel: str, around: System) -> float:
     """Error [unit of the signal] below which nobody would act."""
-    if channel in ("torque_shaft_nm", "omega_mech_rad_s"):
-        return _MATERIAL * machine.scales["torque_nm"]
-    if channel in ("vd_v", "vq_v") and segment.kind == "dq":
-        return _MATERIAL * machine.scales["voltage_v"]
-    if segment.kind == "open":
-        return _MATERIAL * machine.scales["voltage_v"]
-    column = segment.recorded.get(channel)
-    return _MATERIAL_BENCH * float(np.abs(column).max()) if column is not None else 0.0
+    bench = segment.kind in ("terminal", "lcr", "flux_map")
+    fitted = around.around
+    scale = channel_scale(segment, channel, fitted.model, fitted.values)
+    return (_MATERIAL_BENCH if bench else _MATERIAL) * scale

@@ -47,6 +47,11 @@ class Column:
     effect: Effect | None = None
     at: tuple[tuple[str, float], ...] = ()
 
+    @property
+    def key(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+        """What tells columns apart."""
+        return self.name, self.at
+
 
 @dataclass(frozen=True, slots=True)
 class Rows:
@@ -174,14 +179,17 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
     reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
     reading[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
     part = _MODEL_DRIVE if segment.kind == "dq" else _MODEL_BENCH
-    scales = [_channel_scale(segment, channel, model) for channel in segment.channels]
+    scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
     own = part * _gain(segment) * np.array(scales)[:, None, None]
     return np.hypot(reading, own)
 
 
-def _channel_scale(segment: Segment, channel: str, model: Model) -> float:
-    if channel in ("torque_shaft_nm", "omega_mech_rad_s"):
+def channel_scale(segment: Segment, channel: str, model: Model, values: Values) -> float:
+    """The machine's own size in a channel's unit; of a bench meter its largest reading."""
+    if channel == "torque_shaft_nm":
         return model.machine.scales["torque_nm"]
+    if channel == "omega_mech_rad_s":
+        return model.machine.scales["torque_nm"] / values["j_kgm2"]
     if segment.kind in ("dq", "open"):
         return model.machine.scales["voltage_v"]
     return float(np.abs(segment.recorded[channel]).max())
@@ -306,7 +314,13 @@ class _Sampler:
                 change.drag_nm - before.drag_nm,
             )
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
-        there = predicted(self.segment, self.x, change, plain, self.quiet)
+        if self.segment.kind == "shaft":
+            still = self._pieces_of_nothing()
+            there = predicted(self.segment, self.x, change, plain, self.values) - predicted(
+                self.segment, self.x, still, plain, self.values
+            )
+        else:
+            there = predicted(self.segment, self.x, change, plain, self.quiet)
         return -there / column.step if np.any(there) else None
 
     def _listens(self, effect: Effect) -> bool:
@@ -319,6 +333,11 @@ class _Sampler:
         if effect.hook == "drop":
             return kind in ("dq", "terminal")
         return kind in ("dq", "open", "terminal", "flux_map")
+
+    def _pieces_of_nothing(self) -> Pieces:
+        nothing = np.zeros(self.x.omega_rad_s.shape)
+        still: Complex = nothing.astype(np.complex128)
+        return Pieces(still, nothing, still, nothing)
 
     def _pieces(self, effect: Effect, values: Values) -> Pieces:
         q = values_of(effect, self.model.machine, values)

@@ -9,14 +9,16 @@ import numpy as np
 from pipeline.criticism.effect import Array
 
 _BLOCK = 48
-_QUANTILE, _QUANTILE_Z = 0.3, -0.5244
+_QUIET = (0.3, -0.5244)
+_STEADY = (0.6, 0.2533)
 
 
-def sensor_noise(signal: Array) -> float:
+def sensor_noise(signal: Array, steady: bool = False) -> float:
     """Standard deviation of a signal's white sensor noise [its unit].
 
     Third differences of white noise have variance 20 σ²; their mean square is taken in blocks
-    and a low quantile over the blocks keeps steps and bursts out. It is never below the rounding
+    and a low quantile over the blocks keeps steps and bursts out (a higher one for a `steady`
+    signal, an angle, whose rounding comes and goes with its speed). It is never below the rounding
     noise q/√12 of the signal's step q.
 
     References: [1] von Neumann et al., Ann. Math. Stat. 12 (1941), successive differences; [2]
@@ -30,8 +32,9 @@ def sensor_noise(signal: Array) -> float:
     blocks = third[: third.size // width * width].reshape(-1, width)
     # Wilson and Hilferty's quantile of chi-square with the samples that third differences leave
     spread = 2.0 / (9.0 * width / 2.2)
-    share = (1.0 - spread + _QUANTILE_Z * math.sqrt(spread)) ** 3
-    power = float(np.quantile((blocks**2).mean(axis=1), _QUANTILE))
+    quantile, deviate = _STEADY if steady else _QUIET
+    share = (1.0 - spread + deviate * math.sqrt(spread)) ** 3
+    power = float(np.quantile((blocks**2).mean(axis=1), quantile))
     level = math.sqrt(power / (20.0 * share))
     return max(level, _rounding(third) / math.sqrt(12.0))
 

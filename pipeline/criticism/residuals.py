@@ -267,15 +267,21 @@ def predicted(
 def _shaft_torque(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """Torque at the shaft [n]: air gap less drags less inertia, as the sensor tells it."""
+    """Torque at the shaft [n]: air gap less drags less inertia, as the sensor tells it [N·m].
+
+    Of a coasting shaft the acceleration that its drags leave unexplained [rad/s²].
+    """
     shaft = air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
     if segment.kind == "dq" and values["ripple_torque"]:
         shaft = shaft + _late_torque(x, pieces, segment.ts_s, values)
     finer = x.theta_rad.size // segment.size
     if finer > 1:
         shaft = _averaged(shaft, finer)
-    theta = x.theta_rad[::finer]
-    shaft = shaft - values["j_kgm2"] * _second_difference(theta, segment.ts_s)
+    acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
+    if segment.channels[-1] == "omega_mech_rad_s":
+        # in the angle sensor's units: a torque's noise floor would shrink with the inertia
+        return shaft / values["j_kgm2"] - acceleration
+    shaft = shaft - values["j_kgm2"] * acceleration
     if segment.channels[-1] == "torque_shaft_nm":
         for effect in model.effects:
             if effect.shaft is not None:

@@ -168,7 +168,7 @@ def _segment(
 
 def _prepared(found: dict[str, Array], period: float) -> dict[str, float]:
     """Noise of every column; smooths the temperatures and adds the travel since a reversal."""
-    noise = {name: sensor_noise(column) for name, column in found.items()}
+    noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
     width = max(2 * round(_SMOOTHING_S / period) + 1, 51)
     for name in _SMOOTHED:
         if name in found:
@@ -221,7 +221,8 @@ def _slow_turn(
     if turns <= 0.0:
         return None
     factor = max(int(theta.size / turns / (24 * max(orders))), 1)
-    noise = {n: sensor_noise(column) / math.sqrt(factor) for n, column in found.items()}
+    noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
+    noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
     found = {name: decimated(column, factor) for name, column in found.items()}
     found["travel_rad"] = travel(found["theta_mech_rad"], period * factor)
     keep = decimated(keep.astype(float), factor) > 0.999

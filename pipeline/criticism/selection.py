@@ -92,9 +92,15 @@ def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate
     return tuple(found)
 
 
-def widened(segments: Sequence[Segment], fitted: Fitted, offered: Sequence[Candidate]) -> System:
+def widened(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    offered: Sequence[Candidate],
+    before: System | None = None,
+) -> System:
     """The system around a fit with the candidates' columns behind its own, in order."""
-    return system(segments, fitted, [c for candidate in offered for c in candidate.columns])
+    columns = [c for candidate in offered for c in candidate.columns]
+    return system(segments, fitted, columns, before)
 
 
 def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> tuple[Score, ...]:
@@ -181,14 +187,14 @@ def search(
     refused: set[str] = set()
     for _ in range(_MOST):
         offered = candidates(library, fitted)
-        wide = widened(segments, fitted, offered)
+        wide = widened(segments, fitted, offered, rungs[-1].around if rungs else None)
         scores = score_all(wide, fitted, offered)
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
         passing = [s for s in scores if s.passes and s.candidate.effect.name not in refused]
         if not passing:
             break
-        chosen = _refit_best(segments, fitted, passing)
+        chosen = _refit_best(segments, fitted, passing, wide)
         if chosen is None:
             refused |= {s.candidate.effect.name for s in passing[:_REFITS]}
             continue
@@ -200,7 +206,7 @@ def search(
 
 
 def _refit_best(
-    segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score]
+    segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score], wide: System
 ) -> tuple[Fitted, System] | None:
     """Refits with the best candidates, those close to the best fall, and takes the best."""
     close = [s for s in passing[:_REFITS] if s.fall >= _CLOSE * passing[0].fall]
@@ -208,7 +214,7 @@ def _refit_best(
     for score in close:
         model = fitted.model.with_effects(score.candidate.effect)
         values = {**fitted.values, **score.candidate.values, **score.step}
-        tried = gauss_newton(segments, replace(fitted, model=model, values=values))
+        tried = gauss_newton(segments, replace(fitted, model=model, values=values), before=wide)
         if not material(tried[0], score.candidate.effect):
             continue
         if best is None or tried[1].misfit < best[1].misfit:
@@ -242,7 +248,7 @@ def _backward(
             continue
         kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{effect.name}.")}
         model = fitted.model.without(effect.name)
-        tried = gauss_newton(segments, replace(fitted, model=model, values=kept))
+        tried = gauss_newton(segments, replace(fitted, model=model, values=kept), before=around)
         if tried[1].misfit - around.misfit < price:
             fitted, around = tried
     return fitted, around

@@ -27,6 +27,8 @@ _TIE = 1e-11
 _ITERATIONS = 8
 _SEED = 20260302
 _THREADS = 2
+_STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm", "j_kgm2")
+ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 _CONVERGED = 1.0
 _HALVINGS = 3
 _ROUNDS = 30
@@ -63,6 +65,7 @@ class System:
     labels: tuple[tuple[int, str, int], ...]
     penalty: Array
     pull: Array
+    around: Fitted
 
     @property
     def size(self) -> int:
@@ -102,29 +105,33 @@ class System:
         wanted = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
 
-    def best(
-        self, places: NDArray[np.int64], rows: NDArray[np.bool_] | None = None
-    ) -> tuple[Array, Array]:
-        """Step [k] along columns at `places` of least misfit, and its residual [R].
+    def best(self, places: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Step [k] along columns at `places` of least misfit, and the residual [R] after it.
 
-        Weighted least squares, the weights renewed until the misfit stays. `rows` [R] leaves
-        samples out of the fit.
+        Weighted least squares, the weights renewed until the misfit stays. That has more than one
+        end: a group may be given up that another start would have saved, so it is begun with the
+        weights of the residual at hand, with their square roots and with equal ones.
         """
-        matrix, right = self.matrix[:, places], self.residual
-        chosen = np.ones(right.size) if rows is None else rows.astype(float)
-        left, step = self.residual, np.zeros(places.size)
-        before = np.inf
+        now = np.maximum(self.spreads(self.residual), 1.0)
+        ends = [self._descended(places, now**power) for power in (1.0, 0.5, 0.0)]
+        step, left, _ = min(ends, key=lambda end: end[2])
+        return step, left
+
+    def _descended(self, places: NDArray[np.int64], spreads: Array) -> tuple[Array, Array, float]:
+        matrix, penalty = self.matrix[:, places], np.diag(self.penalty[places])
+        left, step, before = self.residual, np.zeros(places.size), np.inf
         for _ in range(_ROUNDS):
-            weight = chosen / np.maximum(self.spreads(left), 1.0)[self.group]
-            normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
-            slope = matrix.T @ (weight * right) + self.pull[places]
-            step = -_pseudo_inverse(normal) @ slope
-            left = right + matrix @ step
-            now = self.misfit_of(self.spreads(left))
+            weight = 1.0 / np.maximum(spreads, 1.0)[self.group]
+            weighted = matrix * weight[:, None]
+            slope = weighted.T @ self.residual + self.pull[places]
+            step = -_pseudo_inverse(weighted.T @ matrix + penalty) @ slope
+            left = self.residual + matrix @ step
+            spreads = self.spreads(left)
+            now = self.misfit_of(spreads)
             if abs(before - now) < _SETTLED:
                 break
             before = now
-        return step, left
+        return step, left, now
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance [k, k] of the parameters at `places` when they are fitted together."""
@@ -173,14 +180,27 @@ def _each(
 
 
 def system(
-    segments: Sequence[Segment], fitted: Fitted, candidates: Sequence[Column] = ()
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    candidates: Sequence[Column] = (),
+    before: System | None = None,
 ) -> System:
-    """Linearises every segment around a fit, along its own columns and those of candidates."""
+    """Linearises every segment around a fit, along its own columns and those of candidates.
+
+    Columns of hooks that are linear stay as they were in `before`, a system around a fit with the
+    same noise floor and the same sensor effects.
+    """
     model, values = fitted.model, fitted.values
     columns = [*own_columns(model), *candidates]
-    rows = _each(
-        lambda s, sigma: linearise(s, model, values, columns, sigma), segments, fitted.sigma
-    )
+    known = _kept(before, fitted)
+    new = [column for column in columns if column.key not in known]
+    rows = _each(lambda s, sigma: linearise(s, model, values, new, sigma), segments, fitted.sigma)
+    fresh = {column.key: n for n, column in enumerate(new)}
+    made = np.concatenate([r.columns for r in rows])
+    matrix = np.empty((made.shape[0], len(columns)))
+    for place, column in enumerate(columns):
+        old = known.get(column.key)
+        matrix[:, place] = made[:, fresh[column.key]] if old is None else old
     penalty, pull = _priors(columns, values)
     first, labels, groups = 0, [], []
     for number, one in enumerate(rows):
@@ -190,14 +210,48 @@ def system(
     return System(
         columns=tuple(columns),
         residual=np.concatenate([r.residual for r in rows]),
-        matrix=np.concatenate([r.columns for r in rows]),
+        matrix=matrix,
         group=np.concatenate(groups),
         window=np.concatenate([r.window for r in rows]),
         unit=np.concatenate([r.unit for r in rows]),
         labels=tuple(labels),
         penalty=penalty,
         pull=pull,
+        around=fitted,
     )
+
+
+def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
+    """Columns of an earlier system that hold at a new fit too."""
+    if before is None or before.around.sigma is not fitted.sigma:
+        return {}
+    sensors = [
+        tuple(e.name for e in f.model.effects if e.hook == "sensor")
+        for f in (before.around, fitted)
+    ]
+    if sensors[0] != sensors[1] or _moved_base(before.around.values, fitted.values):
+        return {}
+    return {
+        column.key: before.matrix[:, place]
+        for place, column in enumerate(before.columns)
+        if _linear(column, fitted.model)
+    }
+
+
+def _moved_base(before: Values, now: Values) -> bool:
+    """Whether a physical constant moved by more than a hundredth since."""
+    return any(abs(now[n] - before[n]) > 1e-2 * abs(before[n]) for n in _STEADY)
+
+
+def _linear(column: Column, model: Model) -> bool:
+    """Whether the residual is linear along a column, whatever the other parameters are."""
+    effect = column.effect
+    if effect is None:
+        return True
+    if effect not in model.effects:
+        return True
+    shaped = any(not p.amplitude for p in effect.parameters_of(model.machine))
+    return effect.hook != "sensor" and not shaped
 
 
 def _priors(columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
@@ -222,6 +276,7 @@ def own_columns(model: Model) -> list[Column]:
 def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
     """Values moved inside their bounds."""
     inside = dict(values)
+    inside["j_kgm2"] = max(values["j_kgm2"], 1e-3 * base_scales(model.machine)["j_kgm2"])
     for name, (_, p) in model.parameters().items():
         scale = model.machine.scale(p)
         inside[name] = min(max(values[name], p.low * scale), p.high * scale)
@@ -229,21 +284,25 @@ def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
 
 
 def gauss_newton(
-    segments: Sequence[Segment], fitted: Fitted, renew: bool = False, iterations: int = _ITERATIONS
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    renew: bool = False,
+    iterations: int = _ITERATIONS,
+    before: System | None = None,
 ) -> tuple[Fitted, System]:
     """Fits a model's own parameters; returns the fit and the system around it.
 
     A step that makes χ² worse is halved. With `renew` the noise floor is computed again on the
     way, which a start far from the truth needs.
     """
-    around = system(segments, fitted)
+    around = system(segments, fitted, before=before)
     for _ in range(iterations):
         step, _ = around.best(np.arange(len(around.columns)))
         for _ in range(_HALVINGS):
             moved = _moved(fitted, around.columns, step)
             if renew:
                 moved = replace(moved, sigma=floors(segments, moved.model, moved.values))
-            tried = system(segments, moved)
+            tried = system(segments, moved, before=around)
             if renew or tried.misfit < around.misfit + _CONVERGED:
                 break
             step = 0.3 * step
@@ -268,5 +327,5 @@ def first_fit(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System
     """Fits a model from orders of magnitude: three steps that renew the noise floor, then more."""
     values = start_values(model, model.machine)
     fitted = Fitted(model, values, floors(segments, model, values))
-    fitted, _ = gauss_newton(segments, fitted, renew=True, iterations=3)
-    return gauss_newton(segments, fitted)
+    fitted, around = gauss_newton(segments, fitted, renew=True, iterations=3)
+    return gauss_newton(segments, fitted, before=around)

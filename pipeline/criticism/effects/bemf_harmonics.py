@@ -12,24 +12,24 @@ from pipeline.criticism.effect import Effect, Operating, Parameter, Values
 def _coenergy(x: Operating, q: Values) -> Any:
     total = 0.0
     for order in (6, 12):
-        angle = order * x.eps_rad
-        total = total + q[f"d{order}"] * x.id_a * np.cos(angle)
-        total = total + q[f"q{order}"] * x.iq_a * np.sin(angle)
+        cosine, sine = np.cos(order * x.eps_rad), np.sin(order * x.eps_rad)
+        total = total + x.id_a * (q[f"d{order}_cos"] * cosine + q[f"d{order}_sin"] * sine)
+        total = total + x.iq_a * (q[f"q{order}_cos"] * cosine + q[f"q{order}_sin"] * sine)
     return x.base["psi_wb"] * total
 
 
 EFFECT = Effect(
     name="bemf_harmonics",
-    words="ψ_d gains ψ d_n cos nε and ψ_q gains ψ q_n sin nε, n = 6, 12",
+    words="ψ_d and ψ_q gain waves of nε, n = 6, 12; symmetric: d cos and q sin alone",
     signature="orders 6ε and 12ε: proportional to speed in voltage, to current in torque",
     tests=("open_circuit", "torque_map"),
     experiment="an open-circuit spin",
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 4",
-    parameters=(
-        Parameter("d6", "1", 0.01, 0.0003, low=-0.3, high=0.3),
-        Parameter("q6", "1", 0.01, 0.0003, low=-0.3, high=0.3),
-        Parameter("d12", "1", 0.005, 0.0003, low=-0.3, high=0.3),
-        Parameter("q12", "1", 0.005, 0.0003, low=-0.3, high=0.3),
+    parameters=tuple(
+        Parameter(f"{axis}{order}_{wave}", "1", 0.06 / order, 0.0003, low=-0.3, high=0.3)
+        for order in (6, 12)
+        for axis in "dq"
+        for wave in ("cos", "sin")
     ),
     rivals={"cogging": "a slow turn without current"},
     coenergy=_coenergy,
