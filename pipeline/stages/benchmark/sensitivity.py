@@ -16,7 +16,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -112,6 +112,7 @@ class Sensitivity:
     stems: tuple[str, ...]
     gram: Array
     prior: Array
+    known: dict[tuple[frozenset[str], str], Array] = field(default_factory=dict, repr=False)
 
     def remaining(self, stems: Iterable[str] = STEMS, model: str = "standard") -> Array:
         """Inner products [effects, effects] left when a model is fitted to these captures.
@@ -119,7 +120,9 @@ class Sensitivity:
         `standard` has temperatures and Coulomb friction, so their sizes are fitted as well;
         `ideal` has none of the three.
         """
-        wanted = set(stems)
+        wanted = frozenset(stems)
+        if (wanted, model) in self.known:
+            return self.known[wanted, model]
         rows = [n for n, stem in enumerate(self.stems) if stem in wanted]
         total = self.gram[rows].sum(axis=0)
         k = len(self.nuisances)
@@ -130,6 +133,7 @@ class Sensitivity:
             fitted += [k + self.effects.index(name) for name in ALWAYS]
         normal = total[np.ix_(fitted, fitted)] + np.diag(prior[fitted])
         left: Array = total[k:, k:] - _explained(normal, total[fitted, k:])
+        self.known[wanted, model] = left
         return left
 
     def noncentrality(
