@@ -56,6 +56,13 @@ COMMANDS = _index(
         "which test to record next, for which constant or doubt",
         positional=("motor",),
     ),
+    Command(
+        "registry",
+        "registry",
+        s.RegistrySettings,
+        "every datasheet version: list, show, diff, at, verify, approve, revoke",
+        positional=("action", "motor"),
+    ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
     Command(
         "benchmark",
@@ -89,7 +96,7 @@ def usage(command: Command) -> str:
     lines = [f"usage: python -m pipeline {command.name}{places} key=value ...", ""]
     lines += [command.words, "", "keys"]
     for key in fields(command.settings):
-        lines.append(f"  {key.name}={_default(key)}")
+        lines.append(f"  {key.name.rstrip('_')}={_default(key)}")
         if words := key.metadata.get("words"):
             lines.append(f"      {words}")
     return "\n".join(lines)

@@ -26,6 +26,8 @@ def load_settings(command: Command, words: list[str]) -> Settings:
     rest: list[str] = []
     for word in named:
         key, _, value = word.partition("=")
+        if f"{key}_" in kinds:
+            key = f"{key}_"  # the key is a word of Python, such as `from`
         if _is_text(kinds.get(key)):
             texts[key] = _unquoted(value)
         elif command.free and key not in kinds:

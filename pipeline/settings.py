@@ -41,6 +41,12 @@ class RunSettings(Settings):
     workers: int = key(0, "motors worked on at once; 0 is one a core", result=False)
     recordings: bool = key(True, "write a Rerun recording a capture", result=False)
     report: bool = key(True, "write the HTML report", result=False)
+    registry: str | None = key(
+        "auto",
+        "folder or URL that keeps every version; auto is registry/ in output, null is none",
+        result=False,
+    )
+    registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
     gates: dict[str, Any] = key({}, "options of a gate: gates.GATE.OPTION=number")
     crosscheck: dict[str, Any] = key({}, "options of a check: crosscheck.CHECK.OPTION=number")
@@ -67,6 +73,23 @@ class PlanSettings(Settings):
 
     output: str = key("reports/demo", "output folder of a run")
     motor: str | None = key(None, "motor_id; every motor without it")
+
+
+@dataclass(kw_only=True)
+class RegistrySettings(Settings):
+    """`registry`: the versions that runs published."""
+
+    action: str = key("", "list, show, diff, at, verify, approve or revoke")
+    motor: str | None = key(None, "motor_id; for `at` the date may stand here")
+    registry: str = key("reports/demo/registry", "folder or URL of the registry")
+    registry_options: dict[str, Any] = key({}, "of deltalake, for a URL")
+    revision: str | None = key(None, "1, 2, ... of the motor, for show, approve and revoke")
+    version: str | None = key(None, "beginning of the version's digest, instead of a revision")
+    from_: str | None = key(None, "revision, for diff")
+    to: str | None = key(None, "revision, for diff")
+    date: str | None = key(None, "2026-03-01 (its end, UTC) or 2026-03-01T12:00Z, for at")
+    by: str | None = key(None, "who approves or revokes")
+    why: str | None = key(None, "why")
 
 
 @dataclass(kw_only=True)

@@ -7,6 +7,8 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from pipeline.fit.registry import estimators
 from pipeline.io.ingest import Entry, Survey, survey
 from pipeline.io.limits import limits_file, required_constants
 from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.registry import Registry
 from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import MachineError, PipelineError, UsageError
@@ -29,6 +32,15 @@ from pipeline.stages.motor import MotorJob, MotorResult, process_motor
 MANIFEST = "outputs.json"
 
 
+@dataclass(frozen=True, slots=True)
+class Registered:
+    """What became of the datasheets in the registry: exit code, a line of text, error lines."""
+
+    code: int = 0
+    text: str = ""
+    errors: tuple[str, ...] = ()
+
+
 def main(settings: RunSettings) -> Outcome:
     """Every motor of `input` to `output`; refused captures are named and the rest goes on."""
     watch = Stopwatch()
@@ -36,6 +48,7 @@ def main(settings: RunSettings) -> Outcome:
     folder = Path(settings.input)
     if not folder.is_dir():
         raise UsageError(f"input={settings.input} is no folder", "name the folder of captures")
+    registry = _registry(settings)
     conf = configuration_folder()
     limits = limits_file(conf / "limits", settings.limits)
     with watch.stage("survey"):
@@ -48,10 +61,18 @@ def main(settings: RunSettings) -> Outcome:
     )
     with watch.stage("fleet"):
         _publish(settings, results, findings)
+    with watch.stage("registry"):
+        registered = _register(registry, _datasheets(results))
     for result in results:
         for name, seconds in result.seconds.items():
             watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
-    return _outcome(settings, results, findings, found, watch)
+    outcome = _outcome(settings, results, findings, found, watch)
+    return Outcome(
+        first_that_applies(outcome.exit_code, registered.code),
+        "\n".join(filter(None, [outcome.text, registered.text])),
+        (*outcome.errors, *registered.errors),
+        outcome.timings,
+    )
 
 
 def _known_options(settings: RunSettings) -> None:
@@ -69,6 +90,34 @@ def _known_options(settings: RunSettings) -> None:
                 if option not in known[name]:
                     has = ", ".join(known[name]) or "none"
                     raise UsageError(f"{room}.{name}.{option}: no such option", f"it has {has}")
+
+
+def _registry(settings: RunSettings) -> Registry | None:
+    """The registry of this run; raises UsageError for a place where none can be."""
+    if settings.registry is None:
+        return None
+    place = settings.registry
+    if place in ("", "auto"):
+        place = (Path(settings.output) / "registry").as_posix()
+    return Registry(place, {name: str(v) for name, v in settings.registry_options.items()})
+
+
+def _register(registry: Registry | None, datasheets: Sequence[Datasheet]) -> Registered:
+    """Publishes all datasheets in one commit; a registry that fails leaves the outputs whole."""
+    if registry is None or not datasheets:
+        return Registered()
+    try:
+        receipt = registry.publish((sheet.document() for sheet in datasheets), datetime.now(UTC))
+    except MachineError as error:
+        return Registered(error.exit_code, errors=(f"error: {error}",))
+    counts = f"{len(receipt.added)} new, {len(receipt.known)} known"
+    text = f"registry {registry.place}: {counts}"
+    errors = tuple(
+        f"error: motor {event.motor_id}: version {event.version[:12]} is registered with other "
+        "content; the same work gave other bytes, so the registered one stays"
+        for event in receipt.conflicts
+    )
+    return Registered(1 if errors else 0, text, errors)
 
 
 def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:

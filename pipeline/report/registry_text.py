@@ -1,0 +1,170 @@
+"""What `registry` prints: versions, one datasheet, a difference, what verification found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+
+from pipeline.physics.notation import MINUS, quantity, reading
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.difference import Change
+from pipeline.records.estimate import Estimate
+from pipeline.records.ledger import Event, Version
+
+NONE = "-"
+SHOWN_DIGITS = 12
+
+
+def versions_table(versions: Sequence[Version]) -> str:
+    """One line a version: motor, revision, status, lot, type, when, digest, last decision."""
+    head = ("motor", "revision", "status", "lot", "type", "published", "version", "decided")
+    rows = [
+        (
+            v.motor_id,
+            str(v.revision),
+            v.status,
+            v.published.lot or NONE,
+            v.published.motor_type or NONE,
+            when(v.published.recorded_at),
+            v.version[:SHOWN_DIGITS],
+            decision(v.decisions[-1]) if v.decisions else NONE,
+        )
+        for v in versions
+    ]
+    return table([head, *rows], right=(1,))
+
+
+def in_force_table(versions: Sequence[tuple[str, Version | None, Version]]) -> str:
+    """One line a motor: (motor, what is valid, what is newest) at one moment."""
+    head = ("motor", "valid", "published", "version", "newest")
+    rows = [
+        (
+            motor_id,
+            NONE if valid is None else f"revision {valid.revision}",
+            NONE if valid is None else when(valid.published.recorded_at),
+            NONE if valid is None else valid.version[:SHOWN_DIGITS],
+            f"revision {last.revision}, {last.status}",
+        )
+        for motor_id, valid, last in versions
+    ]
+    return table([head, *rows])
+
+
+def datasheet_text(version: Version, sheet: Datasheet) -> str:
+    """A version with its constants, checks and decisions."""
+    own = version.published
+    lines = [
+        f"{safe(version.motor_id)} revision {version.revision}: {version.status}",
+        f"version    {version.version}",
+        f"published  {when(own.recorded_at)}",
+        f"type {safe(own.motor_type or NONE)}, lot {safe(own.lot or NONE)}, "
+        f"station {safe(', '.join(own.stations) or NONE)}, {len(sheet.captures)} captures, "
+        f"code {safe(sheet.code_version)}",
+    ]
+    lines += [f"  {sheet.status} as published: {safe(reason)}" for reason in sheet.why]
+    lines += [f"  {decision(event)}" for event in version.decisions]
+    rows = [(name, _value(est), est.status) for name, est in sorted(sheet.constants.items())]
+    checks = [(c.name, c.status, c.meaning) for c in sheet.checks]
+    for part in (rows, checks):
+        if part:
+            lines += ["", table(part)]
+    return "\n".join(lines)
+
+
+def difference_text(before: Version, after: Version, changes: Sequence[Change]) -> str:
+    """Two versions of a motor and the change of every constant in units of its uncertainty."""
+    name = safe(after.motor_id)
+    lines = [
+        f"{name}: revision {before.revision} ({before.status}) to "
+        f"{after.revision} ({after.status})",
+        "",
+    ]
+    head = ("constant", "before", "after", "change", "change/u", "change/u_d", "")
+    rows = [
+        (
+            change.name,
+            _value(change.before),
+            _value(change.after),
+            NONE if change.change is None else _change(change),
+            _ratio(change.in_u),
+            _ratio(change.in_u_of_difference),
+            _remark(change),
+        )
+        for change in changes
+    ]
+    lines.append(table([head, *rows], right=(1, 2, 3, 4, 5)))
+    lines += [
+        "",
+        "u: both uncertainties, root sum of squares; u_d: what one instrument adds to both cancels",
+    ]
+    return "\n".join(lines)
+
+
+def decision(event: Event) -> str:
+    """`approved by NAME on DATE: why`."""
+    word = "approved" if event.kind == "approve" else "revoked"
+    who, why = safe(event.by or NONE), safe(event.why or NONE)
+    return f"{word} by {who} on {when(event.recorded_at)}: {why}"
+
+
+def when(moment: datetime) -> str:
+    """A moment to the second, in UTC."""
+    return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
+    """Columns of text, left-aligned but for those named; nothing in a cell moves the cursor."""
+    cells = [[safe(cell) for cell in row] for row in rows]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
+    return "\n".join(
+        "  ".join(
+            cell.rjust(width) if column in right else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in cells
+    )
+
+
+def safe(text: str) -> str:
+    """The text with everything that a terminal would act on written out."""
+    return "".join(
+        char if char.isprintable() else char.encode("unicode_escape").decode() for char in text
+    )
+
+
+def _value(estimate: Estimate | None) -> str:
+    if estimate is None or estimate.value is None:
+        return NONE
+    return reading(estimate.number, estimate.u, estimate.unit).text()
+
+
+def _change(change: Change) -> str:
+    value = change.change or 0.0
+    if value == 0.0:
+        return "0"
+    text = quantity(value, change.unit, 3)
+    return text if value < 0.0 else f"+{text}"
+
+
+def _ratio(value: float | None) -> str:
+    if value is None:
+        return NONE
+    if math.isinf(value):
+        return "exact"
+    return f"{value:+.2f}".replace("-", MINUS) if value else "0"
+
+
+def _remark(change: Change) -> str:
+    """What else than the value changed: it came, it went, its conditions or its status."""
+    before, after = change.before, change.after
+    if before is None or after is None:
+        return "came" if before is None else "went"
+    remarks = []
+    if before.status != after.status:
+        remarks.append(f"{before.status} to {after.status}")
+    if before.known and after.known and dict(before.at) != dict(after.at):
+        remarks.append("at other conditions")
+    if before.method != after.method:
+        remarks.append(f"{before.method} to {after.method}")
+    return ", ".join(remarks)

@@ -1,0 +1,181 @@
+"""`registry`: what was published, what changed, what was valid when, who approved what."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime, time
+from typing import Literal
+
+from pipeline.io.registry import Registry, one_of
+from pipeline.records.difference import changes
+from pipeline.records.errors import UsageError
+from pipeline.records.ledger import Selection, Version, histories, in_force, select
+from pipeline.records.outcome import Outcome
+from pipeline.report.registry_text import (
+    datasheet_text,
+    decision,
+    difference_text,
+    in_force_table,
+    safe,
+    versions_table,
+    when,
+)
+from pipeline.settings import RegistrySettings
+
+PREFIX = re.compile("[0-9a-f]{4,64}")
+
+
+def main(settings: RegistrySettings) -> Outcome:
+    """Does one action; raises UsageError for an action or a key that is missing or wrong."""
+    if settings.action not in ACTIONS:
+        said = f"no action {settings.action!r}" if settings.action else "the action is missing"
+        raise UsageError(f"registry: {said}", f"one of {', '.join(ACTIONS)}")
+    options = {name: str(value) for name, value in settings.registry_options.items()}
+    return ACTIONS[settings.action](Registry(settings.registry, options), settings)
+
+
+def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
+    events = registry.events()
+    found = select(events, Selection(motor_id=settings.motor))
+    if settings.motor is not None and not found:
+        raise _unknown(registry, settings.motor)
+    motors = len({version.motor_id for version in found})
+    lines = [versions_table(found), ""] if found else []
+    return Outcome(text="\n".join([*lines, f"{motors} motors, {len(found)} versions"]))
+
+
+def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
+    version = _version(registry, settings, newest=True)
+    (sheet,) = registry.datasheets([version])
+    return Outcome(text=datasheet_text(version, sheet))
+
+
+def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
+    motor = _needed(settings, "motor")
+    history = registry.history(motor)
+    if not history:
+        raise _unknown(registry, motor)
+    pair = []
+    for name in ("from", "to"):
+        number = _whole(name, _needed(settings, name))
+        wanted = Selection(motor_id=motor, revision=number)
+        pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
+    one, other = registry.datasheets(pair)
+    told = changes(one.constants, other.constants)
+    return Outcome(text=difference_text(pair[0], pair[1], told))
+
+
+def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
+    motor, date = settings.motor, settings.date
+    if date is None:
+        # `registry at DATE`: the second word is the date.
+        motor, date = None, motor
+    if date is None:
+        raise UsageError("registry at: the date is missing", "registry at 2026-03-01")
+    until = moment(date)
+    motors = histories(registry.events(), until)
+    if motor is not None:
+        motors = {motor_id: own for motor_id, own in motors.items() if motor_id == motor}
+    if not motors:
+        return Outcome(text=f"nothing was published by {when(until)}")
+    rows = [(motor_id, in_force(own), own[-1]) for motor_id, own in motors.items()]
+    valid = sum(version is not None for _, version, _ in rows)
+    text = f"{len(rows)} motors, {valid} with a released datasheet at {when(until)}"
+    return Outcome(text="\n".join([in_force_table(rows), "", text]))
+
+
+def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
+    found = registry.verify()
+    counted = f"{found.versions} versions, {found.decisions} decisions"
+    verdict = f"{len(found.faults)} mismatches" if found.faults else "all of it as published"
+    errors = (*(f"mismatch: {line}" for line in found.faults), *(f"note: {n}" for n in found.notes))
+    return Outcome(1 if found.faults else 0, f"{settings.registry}: {counted}, {verdict}", errors)
+
+
+def _approve(registry: Registry, settings: RegistrySettings) -> Outcome:
+    return _decide("approve", registry, settings)
+
+
+def _revoke(registry: Registry, settings: RegistrySettings) -> Outcome:
+    return _decide("revoke", registry, settings)
+
+
+def _decide(
+    kind: Literal["approve", "revoke"], registry: Registry, settings: RegistrySettings
+) -> Outcome:
+    by, why = _needed(settings, "by"), _needed(settings, "why")
+    wanted = _wanted(settings)
+    if wanted.revision is None and wanted.version is None:
+        raise UsageError(
+            f"registry {kind}: which version is missing", "name it by revision= or version="
+        )
+    version, new = registry.decide(kind, wanted, by, why, datetime.now(UTC))
+    said = "" if new else " (already so)"
+    text = f"{safe(version.motor_id)} revision {version.revision} is {version.status}{said}: "
+    return Outcome(text=text + decision(version.decisions[-1]))
+
+
+ACTIONS: Mapping[str, Callable[[Registry, RegistrySettings], Outcome]] = {
+    "list": _list,
+    "show": _show,
+    "diff": _diff,
+    "at": _at,
+    "verify": _verify,
+    "approve": _approve,
+    "revoke": _revoke,
+}
+
+
+def moment(text: str) -> datetime:
+    """The moment that ISO 8601 text names, in UTC where it says no zone; a date means its end.
+
+    Raises UsageError for other text.
+    """
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError as error:
+        remedy = "write 2026-03-01 or 2026-03-01T12:00Z"
+        raise UsageError(f"date={text} is no date", remedy) from error
+    if len(text) <= len("2026-03-01"):
+        found = datetime.combine(found.date(), time.max)
+    return (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+
+
+def _version(registry: Registry, settings: RegistrySettings, *, newest: bool) -> Version:
+    """The version that `motor` and `revision` or `version` name, else the newest of the motor."""
+    wanted = _wanted(settings)
+    history = registry.history(wanted.motor_id or "")
+    if not history:
+        raise _unknown(registry, wanted.motor_id or "")
+    found = [version for version in history if wanted.takes(version)]
+    if newest and wanted.revision is None and wanted.version is None:
+        found = found[-1:]
+    return one_of(found, wanted, registry.place)
+
+
+def _wanted(settings: RegistrySettings) -> Selection:
+    motor = _needed(settings, "motor")
+    revision, version = settings.revision, settings.version
+    if version is not None and not PREFIX.fullmatch(version):
+        raise UsageError(f"version={version} is no digest", "at least its first 4 hex digits")
+    number = None if revision is None else _whole("revision", revision)
+    return Selection(motor_id=motor, revision=number, version=version)
+
+
+def _needed(settings: RegistrySettings, name: str) -> str:
+    """The text of a key that the action needs; raises UsageError where it is missing or blank."""
+    value = getattr(settings, f"{name}_" if name == "from" else name)
+    if value is None or not value.strip():
+        raise UsageError(f"registry {settings.action}: {name}= is missing", f"add {name}=...")
+    return str(value)
+
+
+def _whole(name: str, text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 19):
+        raise UsageError(f"{name}={text} is no revision", "a whole number: 1, 2, ...")
+    return int(text)
+
+
+def _unknown(registry: Registry, motor: str) -> UsageError:
+    return UsageError(f"no motor {motor!r} in {registry.place}", "`registry list` shows all")
