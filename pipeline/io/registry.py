@@ -217,7 +217,7 @@ class Registry:
             event = rows[number]
             if _digest(text.encode()) != event.content_sha256:
                 yield f"row {number} ({event.motor_id!r}): its datasheet is not what was published"
-            elif _said(json.loads(text)) != _said_by(event):
+            elif not _agrees(event, text):
                 yield f"row {number} ({event.motor_id!r}): says other than its datasheet"
         yield from (f"row {number}: its datasheet is missing" for number in sorted(left))
 
@@ -324,9 +324,14 @@ def _said(document: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _said_by(event: Event) -> dict[str, Any]:
-    names = ("motor_type", "lot", "stations", "status", "reasons")
-    return {name: getattr(event, name) for name in names}
+def _agrees(event: Event, text: str) -> bool:
+    """Whether a row says what its datasheet says."""
+    try:
+        document = json.loads(text)
+        said = {"motor_id": document["motor_id"], "version": document["version"], **_said(document)}
+    except (ValueError, LookupError, TypeError):
+        return False
+    return all(getattr(event, name) == value for name, value in said.items())
 
 
 def _utc(moment: datetime) -> datetime:

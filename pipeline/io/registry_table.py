@@ -235,10 +235,14 @@ class EventTable:
 def _rows(table: DeltaTable, columns: Sequence[str], where: str = "true") -> pl.DataFrame:
     import polars as pl
     from deltalake import QueryBuilder
+    from deltalake.exceptions import DeltaError
 
     names = ", ".join(f'"{name}"' for name in columns)
     query = f'SELECT {names} FROM events WHERE {where} ORDER BY "sequence"'  # noqa: S608 (numbers)
-    return pl.DataFrame(QueryBuilder().register("events", table).execute(query).read_all())
+    try:
+        return pl.DataFrame(QueryBuilder().register("events", table).execute(query).read_all())
+    except Exception as error:
+        raise DeltaError(str(error)) from error
 
 
 def _events(table: DeltaTable) -> list[Event]:

@@ -134,12 +134,12 @@ def moment(text: str) -> datetime:
     """
     try:
         found = datetime.fromisoformat(text)
-    except ValueError as error:
+        if len(text) <= len("2026-03-01"):
+            found = datetime.combine(found.date(), time.max)
+        return (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+    except (ValueError, OverflowError) as error:
         remedy = "write 2026-03-01 or 2026-03-01T12:00Z"
         raise UsageError(f"date={text} is no date", remedy) from error
-    if len(text) <= len("2026-03-01"):
-        found = datetime.combine(found.date(), time.max)
-    return (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
 
 
 def _version(registry: Registry, settings: RegistrySettings, *, newest: bool) -> Version:
