@@ -157,7 +157,7 @@ def _score(
     ]
     after = around.spreads(left)
     fall = around.misfit_of(before) - around.misfit_of(after)
-    share = _share(around, before, after)
+    share = _share(around, candidate.effect, before, after)
     return Score(candidate, fall, 0.0, mine, share, max(sizes, default=math.inf))
 
 
@@ -165,16 +165,20 @@ def _outside(value: float, parameter: Parameter) -> bool:
     return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
 
 
-def _share(around: System, before: Array, after: Array) -> float:
-    """Largest share, over recorded signals, of the removable misfit that went away."""
+def _share(around: System, effect: Effect, before: Array, after: Array) -> float:
+    """Largest share of the removable misfit that went away: of one recorded signal, or of the
+    captures of the tests that excite the effect.
+    """
     excess = around.counts * np.log(np.maximum(before, 1.0))
     left = around.counts * np.log(np.maximum(after, 1.0))
     channel = np.array([name for _, name, _ in around.labels])
+    places = [channel == name for name in dict.fromkeys(channel.tolist())]
+    places.append(np.array([around.tests[n] in effect.tests for n, _, _ in around.labels]))
     shares = []
-    for name in dict.fromkeys(channel.tolist()):
-        had = float(excess[channel == name].sum())
+    for inside in places:
+        had = float(excess[inside].sum())
         if had > _WORTH:
-            shares.append(1.0 - float(left[channel == name].sum()) / had)
+            shares.append(1.0 - float(left[inside].sum()) / had)
     return max(shares, default=0.0)
 
 

@@ -53,7 +53,7 @@ class System:
     group that misses its noise floor, χ²/n = q > 1, count 1/q: the likelihood of a group whose
     scatter is at least the floor but otherwise unknown. An equation with an effect missing so
     keeps no hold on constants that sound equations know. `penalty` [P] is the inverse prior
-    variance of nuisances, `pull` [P] the penalty's slope.
+    variance of nuisances, `pull` [P] the penalty's slope, `tests` each segment's test.
     """
 
     columns: tuple[Column, ...]
@@ -66,6 +66,7 @@ class System:
     penalty: Array
     pull: Array
     around: Fitted
+    tests: tuple[str, ...]
 
     @property
     def size(self) -> int:
@@ -218,6 +219,7 @@ def system(
         penalty=penalty,
         pull=pull,
         around=fitted,
+        tests=tuple(segment.test for segment in segments),
     )
 
 

@@ -74,7 +74,9 @@ def window_starts(
 
     `hop` is half a window unless told; of more than `most` windows an even selection stays.
     """
-    starts = np.arange(0, max(keep.size - length, -1) + 1, hop or max(length // 2, 1))
+    starts: NDArray[np.int64] = np.arange(
+        0, max(keep.size - length, -1) + 1, hop or max(length // 2, 1)
+    )
     missing = np.concatenate([[0], np.cumsum(~keep)])
     starts = starts[missing[starts + length] == missing[starts]]
     if most is not None and starts.size > most:

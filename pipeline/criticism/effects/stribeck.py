@@ -8,14 +8,14 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    bump = np.exp(-((x.omega_rad_s / q["speed_rad_s"]) ** 2))
+    bump = np.exp(-(np.abs(x.omega_rad_s / q["speed_rad_s"]) ** q["exponent"]))
     drag: Array = q["excess_nm"] * bump * np.sign(x.omega_rad_s)
     return drag
 
 
 EFFECT = Effect(
     name="stribeck",
-    words="drag (T_s − T_c) exp(−(ω/ω_s)²) sign(ω)",
+    words="drag (T_s − T_c) exp(−|ω/ω_s|^δ) sign(ω)",
     signature="a bump of drag at low speed",
     tests=("spin_down", "cogging", "drive"),
     experiment="a spin-down to standstill, and slow reversals",
@@ -32,6 +32,7 @@ EFFECT = Effect(
             high=0.3,
             scan=(0.004, 0.012, 0.036, 0.1),
         ),
+        Parameter("exponent", "1", 2.0, 0.0, low=0.3, high=4.0, scan=(2.0,)),
     ),
     rivals={"presliding": "a reversal slow enough to see the angle within a milliradian"},
     torque=_torque,

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.judge import leave_out
+from pipeline.criticism.judge import leave_out, remainder
 from pipeline.criticism.linearise import zero
 from pipeline.criticism.model import Model
 from pipeline.criticism.registry import effects
+from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.selection import candidates, score_all, search, widened
 from pipeline.criticism.system import Fitted, floors, gauss_newton, own_columns, system
+from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
 
 LIBRARY = {
@@ -102,3 +104,34 @@ def test_zero_of_an_effect_takes_the_trial_shape():
     values = zero(effects()["stribeck"], model)
     assert values["stribeck.excess_nm"] == 0.0
     assert values["stribeck.speed_rad_s"] == pytest.approx(0.004 * 250.0)
+
+
+def test_an_unknown_drag_is_told_by_its_variable_and_curve():
+    """An eddy-current brake, in no library: peak 0.2 N·m at 40 rad/s, falling beyond."""
+
+    def drag(omega, _):
+        return 0.4 * (omega / 40.0) / (1.0 + (omega / 40.0) ** 2)
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    start = fitted(segments)
+    assert remainder(system(segments, start), segments, system(segments, start).residual)
+    sketch, gain = unknown_structure(segments, start, ["torque_shaft_nm"])
+    assert gain > 100.0
+    assert sketch.signal == "torque_shaft_nm"
+    assert sketch.variables == ("omega_mech_rad_s",)
+    assert {unit for _, _, unit in sketch.sketch} == {"N·m"}
+
+
+def test_a_rival_is_told_where_the_captures_cannot_part_them():
+    """Two names of one formula are one class; friction of another shape is not in it."""
+    twin = replace(effects()["windage"], name="brake")
+    library = {**LIBRARY, "brake": twin}
+
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    last = search(segments, fitted(segments), library)[-1]
+    assert last.added in {("windage",), ("brake",)}
+    rivals = rivals_of(last.added[0], last.fitted, last.around, candidates(library, last.fitted))
+    assert set(rivals) == {"windage", "brake"} - set(last.added)
