@@ -4,7 +4,7 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-data test test-slow lint lock screenshots clean
+.PHONY: help demo demo-data test test-slow lint lock screenshots recovery clean
 
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
@@ -13,6 +13,7 @@ help:
 	@echo "make lint      style, types, import direction"
 	@echo "make demo-data simulate data/demo anew"
 	@echo "make screenshots  docs/images from the demo's report (needs chromium)"
+	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
 
@@ -40,6 +41,9 @@ test: $(READY)
 
 test-slow: $(READY)
 	$(PY) -m pytest -n logical --dist loadfile -m "slow or not slow"
+
+recovery: $(READY)
+	$(PY) -m tests.recovery.table --seeds 1000 --workers 2
 
 lint: $(READY)
 	$(VENV)/bin/ruff check .

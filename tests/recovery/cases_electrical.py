@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -31,7 +30,6 @@ from tests.recovery.simulated import BENCH, MOTOR, Plan, recorded
 
 SIGMA_I = BENCH.current_noise_rel * MOTOR.current_rated_a
 SIGMA_V = BENCH.voltage_noise_rel * MOTOR.vdc_v
-EXACT_CURRENT = replace(BENCH, u_rel_current=0.0)
 WARM_DEGC = 62.0
 RESISTANCE: Plan = (
     ("resistance_ab", "resistance", {"pair": "ab"}),
@@ -282,7 +280,7 @@ def _heat_bound() -> Mapping[str, float]:
 
 
 def _thermal_trial(seed: int) -> Trial:
-    campaign, real = recorded((*LONG_HEAT, *RESISTANCE), seed, bench=EXACT_CURRENT)
+    campaign, real = recorded((*LONG_HEAT, *RESISTANCE), seed)
     known = Constants(
         resistance.ESTIMATOR.fit(campaign, Constants(), resistance.ESTIMATOR.options).estimates
     )
