@@ -104,8 +104,8 @@ def lines(pairs: Pairs) -> list[Line]:
     floors = [row for row in rows if row.case.family in LIBRARY and row.floor is not None]
     made.append(_line("held-out error at most 1.05 of the floor", floors, _at_floor, least=0.9))
     values = [found for case, document in pairs for found in compared(case, document)]
-    covered = sum(value.covered for value in values)
-    made.append(Line("value inside its 95 % interval", covered, len(values), 0.92, 0.98))
+    inside = [value.covered for value in values if value.covered is not None]
+    made.append(Line("value inside its 95 % interval", sum(inside), len(inside), 0.92, 0.98))
     made.append(_line("diagnosis broke down", rows, lambda row: row.mark == "failed", most=0.0))
     return made
 
@@ -195,11 +195,12 @@ def table(pairs: Pairs, heading: str) -> str:
     out += [line.text() for line in lines(pairs)]
     points = sum(row.points for row in rows)
     out += ["", f"Points (right and tie +1, wrong -5, else 0): {points} of {len(rows)}."]
-    if values:
-        median = 100.0 * statistics.median(value.error for value in values)
-        out.append(
-            f"Median error of {len(values)} values: {median:.2g} % (asked for: at most 1 %)."
-        )
+    exact = [value.error for value in values if value.covered is not None]
+    sizes = [value.error for value in values if value.covered is None]
+    for what, errors in (("values", exact), ("sizes of effects of another form", sizes)):
+        if errors:
+            median = 100.0 * statistics.median(errors)
+            out.append(f"Median error of {len(errors)} {what}: {median:.2g} % (asked for: 1 %).")
     return "\n".join(out) + "\n"
 
 

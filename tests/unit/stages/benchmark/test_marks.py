@@ -202,3 +202,47 @@ def test_a_gain_is_the_fault_and_the_stations_own() -> None:
     (found,) = compared(hidden, document("missing", "torque_scale", parameters=said))
     assert found.error < 1e-12
     assert abs(gain - 1.0) > 1e-5
+
+
+@pytest.mark.parametrize(
+    ("effect", "names"),
+    [
+        ("phase_imbalance", ("cosine", "sine")),
+        ("current_gain", ("cosine", "sine")),
+        ("current_offset", ("alpha_a", "beta_a")),
+    ],
+)
+def test_vectors_of_three_phases(effect: str, names: tuple[str, str]) -> None:
+    """The vector of three phases, worked out from the phases, gives the size back."""
+    import numpy as np
+
+    size, angle = 0.03, 0.4
+    axis = np.exp(2j * np.pi * np.arange(3) / 3.0)
+    if effect == "phase_imbalance":
+        # (2/3) sum R_k i_k a_k with i_k = Re(i conj(a_k)): the part along conj(i)
+        factor = size * np.cos(2.0 * np.pi * np.arange(3) / 3.0 - angle)
+        vector = np.sum(factor * axis**2) / 3.0
+    elif effect == "current_gain":
+        vector = np.sum(np.array([0.0, size, 0.0]) * axis**2) / 3.0
+    else:
+        vector = 2.0 / 3.0 * np.sum(np.array([0.0, size, 0.0]) * axis)
+    said = {
+        effect: {
+            names[0]: {"value": float(vector.real), "u": 1e-6},
+            names[1]: {"value": float(vector.imag), "u": 1e-6},
+        }
+    }
+    hidden = case(truth=(effect,), effects={effect: {"size": size}})
+    (found,) = compared(hidden, document("missing", effect, parameters=said))
+    assert (found.error, found.covered) == (pytest.approx(0.0, abs=1e-9), True)
+
+
+def test_size_of_an_effect_of_another_form() -> None:
+    """Windage c w² at 0.95 of rated speed; 2 % more is an error of 2 %, without an interval."""
+    from pipeline.stages.benchmark.bench import station
+
+    speed = 0.95 * station("gimbal-5208").motor.speed_rated_rad_s
+    hidden = case(truth=("windage",), effects={"windage": {"size": 1e-7}})
+    said = {"windage": {"drag_nm": {"value": 1.02 * 1e-7 * speed**2, "u": 1e-9}}}
+    (found,) = compared(hidden, document("missing", "windage", parameters=said))
+    assert (found.error, found.covered) == (pytest.approx(0.02), None)
