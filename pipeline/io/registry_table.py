@@ -63,6 +63,8 @@ MOST_FILES = 32
 SMALL_BYTES = 16 << 20
 PATIENCE_S = 120.0
 LONGEST_PAUSE_S = 0.25
+TREE = re.compile("\x1b\\[[0-9;]*m|\u21b3")
+LONGEST_REASON = 160
 
 Row = tuple[Event, str | None]
 Decide = Callable[[Sequence[Event]], Sequence[Row]]
@@ -226,10 +228,16 @@ class EventTable:
         try:
             yield
         except (DeltaError, OSError) as error:
-            lines = str(error).strip().splitlines() or [type(error).__name__]
             raise MachineError(
-                f"registry {self.place}: {lines[0]}", "`registry verify` looks into it"
+                f"registry {self.place}: {_reason(error)}", "is it whole, and open to you?"
             ) from error
+
+
+def _reason(error: Exception) -> str:
+    """One line of an error that object stores print as a coloured tree: its root and its cause."""
+    lines = [TREE.sub("", line).strip() for line in str(error).strip().splitlines()]
+    said = dict.fromkeys([lines[0], lines[-1]]) if lines else [type(error).__name__]
+    return ": ".join(line[:LONGEST_REASON] for line in said)
 
 
 def _rows(table: DeltaTable, columns: Sequence[str], where: str = "true") -> pl.DataFrame:
