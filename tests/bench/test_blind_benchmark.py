@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.stages.benchmark.blind import product
-from pipeline.stages.benchmark.cases import Case, cases
+from pipeline.stages.benchmark.cases import Case
+from pipeline.stages.benchmark.drawing import cases
 from pipeline.stages.benchmark.running import Book, code_digest, run
 from pipeline.stages.benchmark.scoring import judged
 from pipeline.stages.benchmark.sealing import blind_campaign

@@ -9,7 +9,8 @@ from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import BenchmarkSettings
 from pipeline.stages.benchmark.blind import product
-from pipeline.stages.benchmark.cases import Case, cases, small
+from pipeline.stages.benchmark.cases import Case
+from pipeline.stages.benchmark.drawing import cases, small
 from pipeline.stages.benchmark.running import Book, code_digest, run, share_of
 from pipeline.stages.benchmark.table import by_effect, table
 

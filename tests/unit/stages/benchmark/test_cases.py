@@ -11,8 +11,9 @@ import pytest
 from pipeline.simulator.effects import ALWAYS, FORMS
 from pipeline.simulator.plant import plant_of
 from pipeline.stages.benchmark.bench import MOTORS, STEMS, station
-from pipeline.stages.benchmark.cases import Case, case_from, cases, small
+from pipeline.stages.benchmark.cases import Case, case_from
 from pipeline.stages.benchmark.corruption import corrupted, noise_of
+from pipeline.stages.benchmark.drawing import cases, small
 from pipeline.stages.benchmark.sealing import blind_campaign, blind_name
 
 SECRETS = [name for name in FORMS if name != "cogging"] + list(MOTORS)

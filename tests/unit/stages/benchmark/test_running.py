@@ -12,8 +12,9 @@ from pipeline.records.capture import Campaign
 from pipeline.records.errors import UsageError
 from pipeline.settings import BenchmarkSettings
 from pipeline.stages.benchmark.blind import attempted, blind_process
-from pipeline.stages.benchmark.cases import Case, cases
+from pipeline.stages.benchmark.cases import Case
 from pipeline.stages.benchmark.command import BEGIN, END, main
+from pipeline.stages.benchmark.drawing import cases
 from pipeline.stages.benchmark.running import Book, code_digest, run, share_of
 
 
