@@ -27,6 +27,7 @@ DENSE = 64
 MOST_LINES = 40
 ALIKE = 0.3
 WHOLE_TURN = 0.98
+GRID_A_CYCLE = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,19 +297,43 @@ def waveform(lines: Sequence[OrderLine], theta_rad: Array) -> Array:
     return out
 
 
-def half_peak_to_peak(lines: Sequence[OrderLine], points: int = 20_000) -> tuple[float, float]:
+def half_peak_to_peak(lines: Sequence[OrderLine]) -> tuple[float, float]:
     """Half the peak-to-peak of the sum of the orders, and its standard uncertainty.
 
-    u² = sum_k u_k² |exp(j k theta_max) - exp(j k theta_min)|² / 4, first order.
+    The grid follows the highest order over the common period of all, and Newton's method takes
+    both extremes from it to where the slope is zero. u² = sum_k u_k² |exp(j k theta_max) -
+    exp(j k theta_min)|² / 4, first order. Raises ValueError without an order.
     """
-    theta = np.linspace(0.0, TURN_RAD, points, endpoint=False)
+    if not lines:
+        raise ValueError("no order, no peak")
+    orders = [line.order for line in lines]
+    period = TURN_RAD / np.gcd.reduce(orders)
+    cells = max(1024, GRID_A_CYCLE * max(orders) // int(np.gcd.reduce(orders)))
+    theta = np.arange(cells) * (period / cells)
     wave = waveform(lines, theta)
-    top, bottom = theta[int(np.argmax(wave))], theta[int(np.argmin(wave))]
+    top, bottom = (
+        _extreme(lines, float(theta[index]), period / cells)
+        for index in (int(np.argmax(wave)), int(np.argmin(wave)))
+    )
     variance = sum(
         line.u**2 * abs(np.exp(1j * line.order * top) - np.exp(1j * line.order * bottom)) ** 2 / 4
         for line in lines
     )
-    return float(np.ptp(wave)) / 2.0, float(np.sqrt(variance))
+    high, low = waveform(lines, np.array([top, bottom]))
+    return float(high - low) / 2.0, float(np.sqrt(variance))
+
+
+def _extreme(lines: Sequence[OrderLine], theta_rad: float, cell_rad: float) -> float:
+    """The angle of zero slope within a cell of `theta_rad`, by Newton's method."""
+    start = theta_rad
+    for _ in range(8):
+        turning = [line.coefficient * np.exp(1j * line.order * theta_rad) for line in lines]
+        slope = -sum(line.order * value.imag for line, value in zip(lines, turning, strict=True))
+        bend = -sum(line.order**2 * value.real for line, value in zip(lines, turning, strict=True))
+        if bend == 0.0:
+            break
+        theta_rad = float(np.clip(theta_rad - slope / bend, start - cell_rad, start + cell_rad))
+    return theta_rad
 
 
 def phase_modulated(lines: Sequence[OrderLine], order: int) -> list[OrderLine]:

@@ -34,6 +34,7 @@ from pipeline.records.uncertainty import Budget, Contribution
 NAME = "cogging"
 COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
 GIVES = (*COGGING, "torque_coulomb_nm")
+STRANGER_LEVEL = 1e-6
 EXPERIMENT = (
     "record a cogging test: zero current, at least one slow whole turn each way, with "
     "theta_mech_rad and torque_shaft_nm"
@@ -78,6 +79,47 @@ def part_orders(
     return [line for line in lines if line not in slow], slow
 
 
+def peak_orders(
+    lines: Sequence[OrderLine],
+    spec: Spectrum,
+    teeth: Sequence[int],
+    sides: Sequence[OrderLine],
+) -> list[OrderLine]:
+    """The orders that the peak is made of: what the motor can make, and strangers past doubt.
+
+    Over a turn the crest of any further order meets that of the others somewhere, so a false one
+    adds its whole height. Multiples of the leading order, of `teeth` (slots, poles) and the
+    encoder's `sides` count as found, others only where p < `STRANGER_LEVEL`. The second and third
+    multiple of the leading order are in whatever their test says: they bend the crests of every
+    real motor, and as measured they are unbiased.
+    """
+    leading = lines[0].order
+    known = [leading, *teeth]
+    kept = [
+        line
+        for line in lines
+        if line in sides
+        or line.p_value < STRANGER_LEVEL
+        or any(line.order % order == 0 for order in known)
+    ]
+    there = {line.order for line in kept}
+    local, _, dof = noise_power(spec)
+    for order in (2 * leading, 3 * leading):
+        if order not in there and order <= int(spec.orders[-1]):
+            mean = complex(spec.coefficients[:, order - 1].mean())
+            u = float(np.sqrt(local[order - 1] / (2.0 * spec.turns)))
+            kept.append(OrderLine(order, mean, u, dof, 1.0))
+    return kept
+
+
+def _teeth(known: Constants, campaign: Campaign) -> list[int]:
+    """Slots and poles a turn, as far as they are known."""
+    pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
+    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    found = [slots, 2 * poles if isinstance(poles, int) else None]
+    return [n for n in found if isinstance(n, int) and n > 1]
+
+
 def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign) -> str:
     """What each order found says of the motor, in words."""
     pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
@@ -120,7 +162,7 @@ def _cogging(
     note = f"N·m by order: {name_orders(lines, known, campaign)}; {tested}{also}"
     if sides:
         note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
-    peak, u_peak = half_peak_to_peak(lines)
+    peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
     gain = instrument_uncertainties(captures, ("torque",))
     note += "; " * bool(unstated_note(captures, ("torque",))) + unstated_note(captures, ("torque",))
     paths = tuple(c.path for c in captures)

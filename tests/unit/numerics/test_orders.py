@@ -109,6 +109,22 @@ def test_half_peak_to_peak_of_two_orders() -> None:
     assert u == pytest.approx(0.1 * np.sqrt(3.0) / 2.0, rel=1e-3)
 
 
+@pytest.mark.parametrize("order", [7, 500])
+def test_half_peak_to_peak_keeps_its_accuracy_at_high_orders(order: int) -> None:
+    """cos(x) - e sin(2x), odd about a quarter period: crests where sin(x) = -2 e cos(2x).
+
+    With s = sin(x) that is 4 e s² - s - 2 e = 0, and the crest is sqrt(1 - s²) (1 - 2 e s).
+    """
+    e = 0.15
+    s = (1.0 - np.sqrt(1.0 + 32.0 * e**2)) / (8.0 * e)
+    lines = [
+        OrderLine(order, complex(np.exp(0.4j)), 0.0, 9.0, 0.0),
+        OrderLine(2 * order, complex(1j * e * np.exp(0.8j)), 0.0, 9.0, 0.0),
+    ]
+    peak, _ = half_peak_to_peak(lines)
+    assert peak == pytest.approx(np.sqrt(1.0 - s**2) * (1.0 - 2.0 * e * s), rel=1e-9)
+
+
 def test_eccentric_encoder_makes_sidebands_that_belong_to_the_order() -> None:
     """An angle read as theta + a sin(theta): the power of order 60 spreads, none is lost."""
     made = []
