@@ -16,6 +16,7 @@ from pipeline.fit.instruments import (
 )
 from pipeline.fit.operating_points import Point, PointTable, operating_points, pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.torque_slope import Slope, slope_without_d
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.glossary import CONSTANTS, Term
@@ -194,12 +195,14 @@ def _estimates(
     def values(shift: Mapping[str, float]) -> Array:
         shifted = [p.shifted(shift) for p in points]
         again = _regress(shifted, alpha + shift.get(ASSUMED_COEFFICIENT, 0.0), chosen)
-        return np.array([again.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
+        bent = _slope(shifted, alpha + shift.get(ASSUMED_COEFFICIENT, 0.0), chosen, again)
+        return np.array([bent.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
 
+    slope_k = _slope(points, alpha, chosen, model)
     type_b = contributions(values, gains)
     slope = float((values({ASSUMED_COEFFICIENT: 1e-4}) - values({}))[0]) / 1e-4
     type_b[0] += propagate([(slope, tuple(alpha_parts))])
-    type_b[0].append(Contribution("assumed:torque_form", _form_doubt(points, alpha, chosen), "B"))
+    type_b[0].append(Contribution("assumed:torque_form", slope_k.form_nm_a, "B"))
     note = _note(captures, table, points, chosen)
     paths = tuple(sorted({p.capture.path for p in points}))
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
@@ -210,7 +213,7 @@ def _estimates(
         return Estimate(name, value, _unit(name), "measured", NAME, budget, at, paths, note)
 
     u = np.sqrt(np.diag(model.covariance))
-    found = [estimate(GIVES[0], model.kt_nm_a, float(u[model.index("iq")]), type_b[0])]
+    found = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, type_b[0])]
     if "id iq" in model.names:
         u_rel = float(u[model.index("id iq")])
         found.append(estimate(GIVES[1], _reluctance(model), u_rel, type_b[1]))
@@ -281,16 +284,33 @@ def _reluctance(model: Regression) -> float:
 
 
 def _form_doubt(points: Sequence[Point], alpha: float, chosen: Sequence[str]) -> float:
-    """How far K moves with the last column that bends the torque: the series may go on.
+    """How far K moves with one of the last two columns that bend the torque: the series may go on.
 
     Without any the torque is straight and there is no doubt.
     """
     bent = [name for name in chosen if name in BENDING]
     if not bent:
         return 0.0
-    without = [name for name in chosen if name != bent[-1]]
-    shorter = _regress(points, alpha, without).kt_nm_a
-    return abs(_regress(points, alpha, chosen).kt_nm_a - shorter) / 2.0
+    full = _regress(points, alpha, chosen).kt_nm_a
+    shorter = [
+        _regress(points, alpha, [name for name in chosen if name != left]).kt_nm_a
+        for left in bent[-2:]
+    ]
+    return max(abs(full - value) for value in shorter) / 2.0
+
+
+def _slope(
+    points: Sequence[Point], alpha: float, chosen: Sequence[str], model: Regression
+) -> Slope:
+    """K at small current: of all points, or of those without d current where the torque bends."""
+    u = float(np.sqrt(model.covariance[model.index("iq"), model.index("iq")]))
+    if not any(name in BENDING for name in chosen):
+        return Slope(model.kt_nm_a, u, 0.0)
+    turned = any(name in chosen for name in ("id", "id sense", "iq^2 - id^2"))
+    found = slope_without_d(points, alpha, turned, "|iq| sense" in chosen)
+    if found is None:
+        return Slope(model.kt_nm_a, u, _form_doubt(points, alpha, chosen))
+    return found.times(model.kt_nm_a / model.of("iq"))
 
 
 def _note(
