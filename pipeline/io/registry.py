@@ -10,6 +10,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
@@ -100,11 +101,17 @@ class Registry:
 
         try:
             before, added = self._table.append(decide)
-        except BaseException:
-            for key in prepared:
-                self._exports.discard(key)
+        except PipelineError:
+            self._withdraw(prepared)
             raise
         return self._settled(sheets, before, added)
+
+    def _withdraw(self, prepared: Iterable[Key]) -> None:
+        """Takes away the pending files whose rows surely are not in the table."""
+        with suppress(PipelineError):
+            known = {event.key for event in self._table.events() or ()}
+            for key in set(prepared) - known:
+                self._exports.discard(key)
 
     def _settled(
         self, sheets: Mapping[Key, _Sheet], before: Sequence[Event], added: Sequence[Event]
@@ -232,6 +239,8 @@ class Registry:
                 found.append(f"{place}: the file is missing; publishing the version writes it")
             elif _digest(content) != sha256:
                 found.append(f"{place}: the file is not what was published")
+        if left := self._exports.pending():
+            notes.append(f"{left} pending files of writers that were interrupted or still write")
         rows = {place_of(event.key) for event in published}
         lost = (name for name in self._exports.names() if name not in rows)
         found += [f"{name}: the file has no row; the table lost it" for name in lost]

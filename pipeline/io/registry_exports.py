@@ -103,6 +103,12 @@ class Exports:
         files = (path.relative_to(root.parent).as_posix() for path in root.rglob("*.json"))
         return sorted(files)
 
+    def pending(self) -> int:
+        """How many files have no name yet, of a disk only."""
+        if self.folder is None:
+            return 0
+        return sum(1 for _ in (self.folder / FOLDER).glob(f"*/.*{PENDING}"))
+
     def _put(self, key: Key, content: bytes) -> None:
         stream = self._store().open_output_stream(place_of(key))
         stream.write(content)

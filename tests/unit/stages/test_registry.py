@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -16,16 +17,22 @@ from tests.registered import HOUR, NOON, document, version_of
 SERIAL = "joint/7\x1b[31m"
 
 
-@pytest.fixture
-def place(tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Revisions 1, 2, 3 of a motor (the last refused), 10 mohm apart; one of another."""
-    place = str(tmp_path / "registry")
+    place = str(tmp_path_factory.mktemp("built") / "registry")
     registry = Registry(place)
     registry.publish([document(SERIAL, 1, r_ohm=0.30), document("00123", 1)], NOON)
     registry.publish([document(SERIAL, 2, r_ohm=0.31)], NOON + HOUR)
     why = ["check kt_vs_ke failed: Kt over 1.5 p psi"]
     registry.publish([document(SERIAL, 3, status="refused", why=why)], NOON + 2 * HOUR)
     return place
+
+
+@pytest.fixture
+def place(built: str, tmp_path: Path) -> str:
+    """A copy to write to; a registry may be moved."""
+    return str(shutil.copytree(built, tmp_path / "registry"))
 
 
 def told(capsys: pytest.CaptureFixture[str], place: str, *words: str) -> tuple[int, str, str]:
@@ -129,9 +136,9 @@ def test_verify(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_mistake_is_one_line_and_exit_2(
-    place: str, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+    built: str, capsys: pytest.CaptureFixture[str], words: list[str], said: str
 ) -> None:
-    code, out, err = told(capsys, place, *words)
+    code, out, err = told(capsys, built, *words)
     assert (code, out) == (2, "")
     assert err.startswith("error: ")
     assert err.count("\n") == 1
