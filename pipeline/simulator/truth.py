@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from pipeline.simulator.design import Motor
 from pipeline.simulator.effects import ALWAYS, active, cogging_order
 from pipeline.simulator.plant import Plant, plant_of
+from pipeline.simulator.protocols import TorqueMap
 
 ANGLES: NDArray[np.float64] = np.linspace(0.0, 2.0 * math.pi, 720, endpoint=False)
 AT_DEGC = 25.0
+D_SHARE = min(TorqueMap().id_levels)
 
 
 def rth_winding(p: Plant) -> float:
@@ -51,12 +53,13 @@ def _inductances(motor: Motor, p: Plant, psi: float) -> dict[str, float]:
 
     near = np.mean(inductances(ANGLES, AT_DEGC, p), axis=0)
     rated = motor.current_rated_a
-    psi_d, _ = mean_flux_wb(-rated, 0.0, p)
+    i_d = D_SHARE * rated
+    psi_d, _ = mean_flux_wb(i_d, 0.0, p)
     _, psi_q = mean_flux_wb(0.0, rated, p)
     return {
         "ld_h": float(near[0]),
         "lq_h": float(near[1]),
-        "ld_rated_h": (psi_d - psi) / -rated,
+        "ld_rated_h": (psi_d - psi) / i_d,
         "lq_rated_h": psi_q / rated,
         "saliency_ratio": float(near[1] / near[0]),
     }
@@ -81,17 +84,25 @@ def _coupling(motor: Motor, p: Plant, psi: float, r: float) -> dict[str, float |
     }
 
 
+def _crest(wave: NDArray[np.float64]) -> float:
+    """Maximum of a periodic wave between its samples, by the parabola through the three highest."""
+    at = int(np.argmax(wave))
+    before, top, after = wave[at - 1], wave[at], wave[(at + 1) % wave.size]
+    bend = before - 2.0 * top + after
+    return float(top - (after - before) ** 2 / (8.0 * bend)) if bend < 0.0 else float(top)
+
+
 def _cogging(motor: Motor, p: Plant) -> dict[str, float | int | None]:
     from pipeline.simulator.field import cogging
 
     if p.lines == 0:
         return {"cogging_peak_nm": 0.0, "cogging_order": None, "cogging_amplitude_nm": None}
-    theta = np.arange(64 * cogging_order(motor)) * 2.0 * math.pi / (64 * cogging_order(motor))
-    torque = np.array([cogging(x, p) for x in theta])
-    lines = 2.0 * np.abs(np.fft.rfft(torque)) / theta.size
+    n = 64 * cogging_order(motor)
+    torque = np.array([cogging(x, p) for x in np.arange(n) * 2.0 * math.pi / n])
+    lines = 2.0 * np.abs(np.fft.rfft(torque)) / n
     order = int(np.argmax(lines[1:])) + 1
     return {
-        "cogging_peak_nm": 0.5 * float(np.max(torque) - np.min(torque)),
+        "cogging_peak_nm": 0.5 * (_crest(torque) + _crest(-torque)),
         "cogging_order": order,
         "cogging_amplitude_nm": float(lines[order]),
     }
@@ -101,7 +112,8 @@ def truth(motor: Motor) -> dict[str, object]:
     """Constants (names of `contract/outputs.md`), hidden effects and their sizes.
 
     Inductances are incremental at zero current, averaged over a turn; `ld_rated_h` is
-    (psi_d - psi_pm)/i_d at minus rated d current, `lq_rated_h` psi_q/i_q at rated q current;
+    (psi_d - psi_pm)/i_d at the largest d current of the bench's torque map without q current,
+    `lq_rated_h` psi_q/i_q at rated q current without d current, `at` says which currents;
     `kt_peak_nm_a` is the slope at zero current. Magnet and copper are at 25 degC.
     """
     p = plant_of(motor)
@@ -136,4 +148,8 @@ def truth(motor: Motor) -> dict[str, object]:
         "hidden": hidden + unknown,
         "sizes": {name: {k: float(v) for k, v in values.items()} for name, values in sizes.items()},
         "nameplate": dict(motor.nameplate),
+        "at": {
+            "ld_rated_h": {"id_a": D_SHARE * motor.current_rated_a, "iq_a": 0.0},
+            "lq_rated_h": {"id_a": 0.0, "iq_a": motor.current_rated_a},
+        },
     }

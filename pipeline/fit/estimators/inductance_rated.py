@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.fit.flux_pairs import SAME, Flux, flux_pairs, frame_of, instant_voltage
 from pipeline.fit.instruments import (
     budget_of,
     contributions,
@@ -31,23 +31,9 @@ EXPERIMENT = (
     "record a torque_map at constant speed with vd_v and vq_v: q current stepped to plus and minus "
     "rated, at zero d current and at rated d current"
 )
-SAME = 0.03
+FRAME = "assumed:frame_angle"
 MAGNET_COEFFICIENT_1_K = -0.0011
 HOLD = "assumed:voltage_hold"
-
-
-@dataclass(frozen=True, slots=True)
-class Flux:
-    """Flux linkages of one pair of points with +i_q and -i_q at one speed and one d current."""
-
-    group: int
-    id_a: float
-    iq_a: float
-    psi_d_wb: float
-    psi_q_wb: float
-    u_d_wb: float
-    u_q_wb: float
-    temp_magnet_degc: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +55,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     psi_d = (v_q+ + v_q-) / 2 w, psi_q = (v_d- - v_d+) / 2 w of points with +i_q and -i_q, so that
     R and odd inverter errors cancel. The voltage's timing and the angle it is late by are taken
     out first. Reference: Armando, Bojoi, Guglielmi, Pellegrino, Pastorelli, IEEE Trans. Ind. Appl.
-    49(5), 2013.
+    49(5), 2013. In a frame turned by e the drop of R is taken off along the pair's own current
+    (fit.flux_pairs), which leaves L_other tan² e on each axis; that is taken off here.
     """
     del options
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]
@@ -85,9 +72,15 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     words = f"{table.note()}; {_timing_words(captures)}"
     points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
     fluxes = flux_pairs(points, pairs)
+    angle, behind_s = frame_of(points, pairs)
+    words += f"; frame turned by {angle:.3f} rad, currents {1e6 * behind_s:.3g} µs late, taken out"
+    behind = behind_s * pairs * max(abs(p.omega_mech_rad_s) for p in points)
+    own = _direct(fluxes, magnet), _quadrature(fluxes, magnet)
     estimates = []
-    for name, find in (("ld_rated_h", _direct), ("lq_rated_h", _quadrature)):
-        found = find(fluxes, magnet)
+    for name, find, found, other in (
+        ("ld_rated_h", _direct, *own),
+        ("lq_rated_h", _quadrature, *own[::-1]),
+    ):
         if found is None:
             why = "no settled pair of plus and minus q current at the currents needed"
             estimates.append(not_identifiable(name, "H", NAME, f"{why}; {EXPERIMENT}"))
@@ -100,13 +93,17 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         gains = instrument_uncertainties(captures, ("voltage", "current"))
         parts = contributions(value, gains)[0]
         parts.append(Contribution(HOLD, found.value_h * _hold_doubt(points, pairs), "B"))
+        across = found.value_h if other is None else other.value_h
+        inductance = found.value_h - across * float(np.tan(angle)) ** 2
+        doubt = 2.0 * abs(angle * behind) + behind**2 + (other is None) * angle**2
+        parts.append(Contribution(FRAME, across * doubt, "B"))
         parts.append(Contribution(f"scatter:{NAME}:{name}", found.u_h, "A"))
         paths = tuple(sorted({p.capture.path for p in points}))
         at = {"id_a": found.id_a, "iq_a": found.iq_a}
         unstated = unstated_note(captures, ("voltage", "current"))
         note = f"{words}; {unstated}" if unstated else words
         estimates.append(
-            Estimate(name, found.value_h, "H", "measured", NAME, budget_of(parts), at, paths, note)
+            Estimate(name, inductance, "H", "measured", NAME, budget_of(parts), at, paths, note)
         )
     return Fit(tuple(estimates), _evidence(fluxes))
 
@@ -132,120 +129,12 @@ def _without_ripple(
             continue
         omega = pole_pairs * point.omega_mech_rad_s
         half = 0.5 * omega * point.period_s
-        bend = _instant(point, pole_pairs) / (1j * omega)
+        bend = instant_voltage(point, pole_pairs) / (1j * omega)
         short = complex(bend.real / direct.value_h, bend.imag / quadrature.value_h)
         drop = -resistance.number * short * half**2 / 3.0 * np.exp(1j * half)
         voltage = complex(point.vd_v, point.vq_v) - drop
         corrected.append(replace(point, vd_v=voltage.real, vq_v=voltage.imag))
     return corrected
-
-
-def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
-    """Flux linkages from every pair of settled points with opposite q current.
-
-    A point with no q current is a pair with itself. Voltages are first brought to the sampling
-    instant (`voltage_timing`) and turned back by the angle delta + tau w_e that the pairs without
-    d current show: there v+ + v- = 2 j w_e psi_d, whatever R and L. What of that angle differs
-    from pair to pair (an eccentric encoder) goes into the uncertainty.
-    """
-    largest = max(max(abs(p.iq_a), abs(p.id_a)) for p in points)
-    matched = [
-        (one, other)
-        for one, other in combinations_with_replacement(points, 2)
-        if one.group == other.group
-        and abs(one.id_a - other.id_a) < SAME * largest
-        and abs(one.iq_a + other.iq_a) < SAME * largest
-        and (one is not other or abs(one.iq_a) < SAME * largest)
-    ]
-    offset, late_s, wobble = _lateness(matched, pole_pairs, largest)
-    fluxes = []
-    for one, other in matched:
-        plus, minus = (one, other) if one.iq_a >= other.iq_a else (other, one)
-        first, v_first = _corrected(plus, pole_pairs, offset, late_s)
-        second, v_second = _corrected(minus, pole_pairs, offset, late_s)
-        omega = 0.5 * pole_pairs * (plus.omega_mech_rad_s + minus.omega_mech_rad_s)
-        half = (v_first + v_second) / 2.0
-        gap = (v_second - v_first) / 2.0
-        share = 0.5 if plus is not minus else np.sqrt(0.5)
-        fluxes.append(
-            Flux(
-                plus.group,
-                float((first + second).real) / 2.0,
-                float((first - second).imag) / 2.0,
-                half.imag / omega,
-                gap.real / omega,
-                _root_sum(
-                    share * plus.u_vq_v,
-                    share * minus.u_vq_v,
-                    wobble * (abs(half.real) + abs(gap.real)) / np.sqrt(2.0),
-                )
-                / abs(omega),
-                _root_sum(
-                    share * plus.u_vd_v,
-                    share * minus.u_vd_v,
-                    wobble * (abs(half.imag) + abs(gap.imag)) / np.sqrt(2.0),
-                )
-                / abs(omega),
-                0.5 * (plus.temp_magnet_degc + minus.temp_magnet_degc),
-            )
-        )
-    return fluxes
-
-
-def _root_sum(*parts: float) -> float:
-    return float(np.sqrt(sum(part**2 for part in parts)))
-
-
-def _instant(point: Point, pole_pairs: int) -> complex:
-    """The dq voltage at the sampling instant, of a mean over the period about or after it.
-
-    Over one period T the mean of a vector turning at w is sinc(w T / 2) exp(j w T / 2) of what it
-    is at the start of the period, and sinc alone of what it is in the middle.
-    """
-    voltage = complex(point.vd_v, point.vq_v)
-    timing = point.capture.meta.voltage_timing
-    if timing == "instant":
-        return voltage
-    half = 0.5 * pole_pairs * point.omega_mech_rad_s * point.period_s
-    turned = np.exp(1j * half) if timing == "held" else 1.0
-    return complex(voltage / (np.sinc(half / np.pi) * turned))
-
-
-def _lateness(
-    matched: Sequence[tuple[Point, Point]], pole_pairs: int, largest: float
-) -> tuple[float, float, float]:
-    """Angle offset [rad] and delay [s] of the voltages, and the rms angle left [rad].
-
-    With one speed alone the two are one, and all of it is taken as delay.
-    """
-    omegas, angles = [], []
-    for one, other in matched:
-        if max(abs(one.id_a), abs(other.id_a)) > SAME * largest:
-            continue
-        omega = 0.5 * pole_pairs * (one.omega_mech_rad_s + other.omega_mech_rad_s)
-        total = (_instant(one, pole_pairs) + _instant(other, pole_pairs)) / (1j * omega)
-        omegas.append(omega)
-        angles.append(float(np.angle(total)))
-    if not omegas:
-        return 0.0, 0.0, 0.0
-    spread = np.ptp(omegas) > 0.1 * np.max(np.abs(omegas))
-    columns = [np.ones(len(omegas)), np.array(omegas)] if spread else [np.array(omegas)]
-    design = np.column_stack(columns)
-    found = np.linalg.lstsq(design, np.array(angles), rcond=None)[0]
-    free = len(angles) - design.shape[1]
-    left = np.array(angles) - design @ found
-    wobble = float(np.sqrt(left @ left / free)) if free > 0 else 0.0
-    return (float(found[0]) if spread else 0.0), float(found[-1]), wobble
-
-
-def _corrected(
-    point: Point, pole_pairs: int, offset: float, late_s: float
-) -> tuple[complex, complex]:
-    """Current and voltage in the magnet's frame."""
-    turn = np.exp(-1j * offset)
-    late = np.exp(-1j * late_s * pole_pairs * point.omega_mech_rad_s)
-    current = complex(point.id_a, point.iq_a)
-    return complex(current * turn), complex(_instant(point, pole_pairs) * turn * late)
 
 
 def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:

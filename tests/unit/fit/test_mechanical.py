@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 from pipeline.fit.estimators.cogging import ESTIMATOR as COGGING
+from pipeline.fit.estimators.cogging import peak_orders
 from pipeline.fit.estimators.drive_voltage import ESTIMATOR as DRIVE_VOLTAGE
 from pipeline.fit.estimators.holding_current import ESTIMATOR as HOLDING_CURRENT
 from pipeline.fit.estimators.inductance_rated import ESTIMATOR as INDUCTANCE_RATED
@@ -17,11 +18,13 @@ from pipeline.fit.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.fit.estimators.spin_down import ESTIMATOR as SPIN_DOWN
 from pipeline.fit.estimators.torque_map import ESTIMATOR as TORQUE_MAP
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.numerics.orders import OrderLine, Spectrum, half_peak_to_peak
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import type_b
 from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.bench import truth as simulated_truth
 from pipeline.simulator.catalogue import with_effects
 from pipeline.simulator.design import EXACT, Bench
 from tests.simulated import campaign_of, design
@@ -103,6 +106,21 @@ def test_saturation_does_not_bend_the_torque_constant() -> None:
     assert kt.u / kt.number < 0.006
 
 
+@pytest.mark.parametrize(
+    "effects", ["saturation,cross_saturation", "cross_saturation=0.15", "saturation=0.25"]
+)
+def test_a_bent_map_leaves_the_small_current_torque_constant(effects: str) -> None:
+    """1.5 p psi within 0.06 % whatever bends the map, and within what the budget says of form."""
+    motor = design("servo-ipm")
+    kt = chain(recorded(effects, "servo-ipm", ("torque_map",)), TORQUE_MAP).best("kt_peak_nm_a")
+    assert kt is not None
+    truth = 1.5 * motor.pole_pairs * motor.psi_pm_wb
+    assert kt.number == pytest.approx(truth, rel=6e-4)
+    form = next((p.u for p in kt.budget if p.source == "assumed:torque_form"), 0.0)
+    assert abs(kt.number - truth) < 3.0 * float(np.hypot(kt.u_a, form))
+    assert form < 5e-3 * truth
+
+
 @pytest.mark.parametrize("effect", ["torque_offset", "torque_lag", "load_dependent_friction"])
 def test_sensor_and_friction_do_not_reach_the_torque_constant(effect: str) -> None:
     motor = design("gimbal-5208")
@@ -127,6 +145,70 @@ def test_rated_inductances() -> None:
     assert lq is not None
     assert lq.number == pytest.approx(motor.lq_h, rel=3e-3)
     assert lq.at["iq_a"] == pytest.approx(motor.current_rated_a, rel=0.02)
+
+
+def test_a_false_order_does_not_raise_the_cogging_peak() -> None:
+    """Over a turn the crest of a stranger meets the others' somewhere: its whole height would add.
+
+    Order 84 with 15 % of order 168 in quadrature; an order 131 at the level of the test is one in
+    a hundred of noise. The weak second multiple counts as measured, tested or not.
+    """
+    orders = np.arange(1, 401, dtype=np.int64)
+    coefficients = np.zeros((2, 400), dtype=np.complex128)
+    coefficients[:, 83], coefficients[:, 167], coefficients[:, 130] = 1.0, 0.15j, 0.1
+    coefficients[0, 200], coefficients[1, 200] = 0.01, -0.01
+    spec = Spectrum(orders, coefficients, np.zeros(2), np.array([1, -1]))
+    leading = OrderLine(84, 1.0 + 0.0j, 0.01, 20.0, 0.0)
+    stranger = OrderLine(131, 0.1 + 0.0j, 0.01, 20.0, 5e-3)
+    sure = replace(stranger, p_value=1e-9)
+    kept = {line.order for line in peak_orders([leading, stranger], spec, [12, 14], [])}
+    assert kept == {84, 168, 252}
+    assert 131 in {line.order for line in peak_orders([leading, sure], spec, [12, 14], [])}
+    s = (1.0 - np.sqrt(1.0 + 32.0 * 0.15**2)) / (8.0 * 0.15)
+    peak = half_peak_to_peak(peak_orders([leading, stranger], spec, [12, 14], []))[0]
+    assert peak == pytest.approx(np.sqrt(1.0 - s**2) * (1.0 - 0.3 * s), rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.03, -0.05])
+def test_an_angle_offset_is_no_inductance(size: float) -> None:
+    """Turned by e, the drop of R on the other axis reads as R tan(e) / w: 11 % on this motor."""
+    motor = design("joint-11p")
+    captures = recorded(f"angle_offset={size}", "joint-11p", ("torque_map",))
+    known = chain(captures, INDUCTANCE_RATED)
+    for name, truth in (("ld_rated_h", motor.ld_h), ("lq_rated_h", motor.lq_h)):
+        found = known.best(name)
+        assert found is not None
+        assert found.number == pytest.approx(truth, rel=8e-4)
+        assert f"frame turned by {size:.3f} rad" in found.note
+
+
+def test_currents_sampled_late_are_no_inductance() -> None:
+    """Late by d, the current stands w d beside the voltages' frame: R d adds to both axes, 2.5 %.
+
+    No voltage shows it; the torque of d current does, K i_d sin(w d).
+    """
+    motor = design("joint-11p")
+    delay = 0.03 / (motor.pole_pairs * motor.speed_rated_rad_s)
+    captures = recorded("current_delay", "joint-11p", ("torque_map",))
+    known = chain(captures, INDUCTANCE_RATED)
+    for name, truth in (("ld_rated_h", motor.ld_h), ("lq_rated_h", motor.lq_h)):
+        found = known.best(name)
+        assert found is not None
+        assert found.number == pytest.approx(truth, rel=2e-3)
+        late = float(found.note.split("currents ")[1].split(" µs")[0])
+        assert late == pytest.approx(1e6 * delay, rel=0.15)
+
+
+def test_rated_d_inductance_of_a_saturated_axis_is_what_the_truth_means() -> None:
+    """Root-form d saturation and cross-saturation: flux over the map's largest d current."""
+    motor = with_effects(replace(design("servo-ipm"), effects={}), "saturation,cross_saturation")
+    captures = recorded("saturation,cross_saturation", "servo-ipm", ("torque_map",))
+    ld = chain(captures, INDUCTANCE_RATED).best("ld_rated_h")
+    assert ld is not None
+    true = simulated_truth(motor)
+    assert true["at"]["ld_rated_h"]["id_a"] == pytest.approx(ld.at["id_a"], rel=0.01)
+    assert abs(ld.number - true["constants"]["ld_rated_h"]) < 2.0 * ld.u
+    assert true["constants"]["ld_rated_h"] > 1.03 * motor.ld_h
 
 
 def test_rated_inductance_of_a_saturated_axis_is_apparent_flux_over_current() -> None:
