@@ -32,6 +32,9 @@ _MOST = 8
 _REFITS = 2
 _CLOSE = 0.7
 _WORTH = 30.0
+_GLANCE = ((1.0,), 3)
+_THOROUGH = ((1.0, 0.0), 20)
+_PROMISING = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,11 +117,14 @@ def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> t
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        score = _score(around, fitted, own, places, candidate, before)
+        dof = len(candidate.effect.parameters_of(fitted.model.machine))
+        cost = dof * price + search_price
+        score = _score(around, fitted, own, places, candidate, before, _GLANCE)
+        if score is not None and score.fall > _PROMISING * cost:
+            score = _score(around, fitted, own, places, candidate, before, _THOROUGH)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known.fall):
-            dof = len(candidate.effect.parameters_of(fitted.model.machine))
-            best[candidate.effect.name] = replace(score, price=dof * price + search_price)
+            best[candidate.effect.name] = replace(score, price=cost)
     return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
@@ -129,6 +135,7 @@ def _score(
     places: NDArray[np.int64],
     candidate: Candidate,
     before: Array,
+    effort: tuple[tuple[float, ...], int],
 ) -> Score | None:
     """Score of one candidate with parameters on the wrong side of a bound left at zero."""
     machine = fitted.model.machine
@@ -138,7 +145,7 @@ def _score(
     }
     live = places
     while live.size:
-        step, left = around.best(np.concatenate([own, live]))
+        step, left = around.best(np.concatenate([own, live]), *effort)
         mine = dict(zip((around.columns[n].name for n in live), step[own.size :], strict=True))
         wrong = [
             n
@@ -284,4 +291,4 @@ def loss_without(
     move = np.array([-fitted.values[n] if amplitude[n] else 0.0 for n in names_out])
     moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
     here = around.misfit_of(around.spreads(around.residual))
-    return moved.misfit_of(moved.spreads(moved.best(stay)[1])) - here
+    return moved.misfit_of(moved.spreads(moved.best(stay, *_THOROUGH)[1])) - here

@@ -106,22 +106,30 @@ class System:
         wanted = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
 
-    def best(self, places: NDArray[np.int64]) -> tuple[Array, Array]:
+    def best(
+        self,
+        places: NDArray[np.int64],
+        starts: Sequence[float] = (1.0, 0.5, 0.0),
+        rounds: int = _ROUNDS,
+    ) -> tuple[Array, Array]:
         """Step [k] along columns at `places` of least misfit, and the residual [R] after it.
 
         Weighted least squares, the weights renewed until the misfit stays. That has more than one
         end: a group may be given up that another start would have saved, so it is begun with the
-        weights of the residual at hand, with their square roots and with equal ones.
+        weights of the residual at hand, with their square roots and with equal ones, or with
+        the powers in `starts`.
         """
         now = np.maximum(self.spreads(self.residual), 1.0)
-        ends = [self._descended(places, now**power) for power in (1.0, 0.5, 0.0)]
+        ends = [self._descended(places, now**power, rounds) for power in starts]
         step, left, _ = min(ends, key=lambda end: end[2])
         return step, left
 
-    def _descended(self, places: NDArray[np.int64], spreads: Array) -> tuple[Array, Array, float]:
+    def _descended(
+        self, places: NDArray[np.int64], spreads: Array, rounds: int
+    ) -> tuple[Array, Array, float]:
         matrix, penalty = self.matrix[:, places], np.diag(self.penalty[places])
         left, step, before = self.residual, np.zeros(places.size), np.inf
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             weight = 1.0 / np.maximum(spreads, 1.0)[self.group]
             weighted = matrix * weight[:, None]
             slope = weighted.T @ self.residual + self.pull[places]
