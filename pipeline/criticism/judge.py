@@ -14,7 +14,7 @@ from pipeline.criticism.segments import Segment
 from pipeline.criticism.system import System
 from pipeline.records.diagnosis import Remainder
 
-_GROWTH = 30.0
+_GROWTH = 5.0
 _OVER = 1.0
 _MATERIAL = 5e-4
 _MATERIAL_BENCH = 1e-2
