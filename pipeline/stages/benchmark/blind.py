@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from pipeline.io.publish import canonical_json
 from pipeline.records.capture import Campaign
 
 Diagnose = Callable[[Campaign, str], dict[str, Any]]
@@ -30,11 +31,16 @@ def product(campaign: Campaign, model: str) -> dict[str, Any]:
 
 
 def attempted(diagnose: Diagnose, campaign: Campaign, model: str) -> dict[str, Any]:
-    """A diagnosis, or a document with `failure` where it broke down: a case is never lost."""
+    """A diagnosis, or a document with `failure` where it broke down: a case is never lost.
+
+    A document that no file may hold (NaN, infinity) is a failure as well.
+    """
     try:
-        return diagnose(campaign, model)
+        document = diagnose(campaign, model)
+        canonical_json(document)
     except Exception as error:  # noqa: BLE001 - whatever breaks is what the benchmark reports
         return {"failure": f"{type(error).__name__}: {error}"[:300]}
+    return document
 
 
 def _forget(folder: str) -> None:

@@ -131,6 +131,17 @@ def test_a_diagnosis_that_breaks_is_a_result(few: list[Case], tmp_path: Path) ->
     assert book.document(few[0]) == {"failure": "ZeroDivisionError: standard"}
 
 
+def test_a_document_with_nan_is_a_failure(few: list[Case], tmp_path: Path) -> None:
+    """No file may hold NaN; the case counts as broken down and the run goes on."""
+
+    def odd(campaign: Campaign, model: str) -> dict[str, Any]:
+        return {**fake(campaign, model), "ladder": [{"held_out": float("nan")}]}
+
+    book = Book(tmp_path, "code")
+    assert run(few[:2], book, odd, blind=False) == 2
+    assert "nan" in (book.document(few[0]) or {})["failure"]
+
+
 def test_the_command_prints_what_there_is(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
