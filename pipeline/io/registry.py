@@ -79,9 +79,10 @@ class Registry:
         self._table = EventTable(place, options)
         self._exports = Exports(place, options)
 
-    def publish(self, documents: Iterable[Mapping[str, Any]], now: datetime) -> Receipt:
-        """Registers datasheet documents (`contract/outputs.md`) in one commit, each version once.
+    def publish(self, documents: Iterable[Mapping[str, Any] | bytes], now: datetime) -> Receipt:
+        """Registers datasheets (`contract/outputs.md`) in one commit, each version once.
 
+        A datasheet is a document, or the bytes of the file that a run wrote.
         When it returns, the disk has the rows and the files. Safe to repeat after any failure and
         beside other writers. Raises MachineError where the registry cannot be written.
         """
@@ -275,9 +276,10 @@ def _allowed(kind: str, version: Version) -> None:
         raise UsageError(f"{name} is not ready for approval: {reasons}", "complete it first")
 
 
-def _sheet(document: Mapping[str, Any]) -> _Sheet:
+def _sheet(given: Mapping[str, Any] | bytes) -> _Sheet:
     """The document with its bytes; raises UsageError where it is no datasheet."""
     try:
+        document = json.loads(given) if isinstance(given, bytes) else given
         motor_id, version = document["motor_id"], document["version"]
         _said(document)
     except (LookupError, TypeError) as error:
@@ -287,7 +289,7 @@ def _sheet(document: Mapping[str, Any]) -> _Sheet:
     if not isinstance(motor_id, str) or not DIGEST.fullmatch(str(version)):
         raise UsageError(f"motor {motor_id!r}: version {version!r} is no sha256", "run again")
     try:
-        content = canonical_json(document)
+        content = given if isinstance(given, bytes) else canonical_json(document)
     except UnicodeEncodeError as error:
         raise UsageError(f"motor {motor_id!r}: its text is not Unicode", "rename it") from error
     return _Sheet(document, content, _digest(content))

@@ -62,7 +62,7 @@ def main(settings: RunSettings) -> Outcome:
     with watch.stage("fleet"):
         _publish(settings, results, findings)
     with watch.stage("registry"):
-        registered = _register(registry, _datasheets(results))
+        registered = _register(registry, Path(settings.output), results)
     for result in results:
         for name, seconds in result.seconds.items():
             watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
@@ -102,12 +102,16 @@ def _registry(settings: RunSettings) -> Registry | None:
     return Registry(place, {name: str(v) for name, v in settings.registry_options.items()})
 
 
-def _register(registry: Registry | None, datasheets: Sequence[Datasheet]) -> Registered:
+def _register(
+    registry: Registry | None, output: Path, results: Sequence[MotorResult]
+) -> Registered:
     """Publishes all datasheets in one commit; a registry that fails leaves the outputs whole."""
-    if registry is None or not datasheets:
+    names = [name for r in results for name in r.files if name.startswith("datasheets/")]
+    if registry is None or not names:
         return Registered()
     try:
-        receipt = registry.publish((sheet.document() for sheet in datasheets), datetime.now(UTC))
+        sheets = ((output / name).read_bytes() for name in names)
+        receipt = registry.publish(sheets, datetime.now(UTC))
     except MachineError as error:
         return Registered(error.exit_code, errors=(f"error: {error}",))
     counts = f"{len(receipt.added)} new, {len(receipt.known)} known"

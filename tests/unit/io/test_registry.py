@@ -315,3 +315,14 @@ def test_selections(registry: Registry) -> None:
     assert chosen(status="released") == [("a", 2)]
     assert chosen(version=version_of("b", 1)[:6]) == [("b", 1)]
     assert revisions(newest(registry.select(Selection(lot="A")))) == [("a", 2)]
+
+
+def test_the_bytes_of_a_file_are_kept_as_they_are(registry: Registry, tmp_path: Path) -> None:
+    """A document and the file that a run made of it are one version; other text is none."""
+    content = canonical_json(document("a", 1))
+    registry.publish([content], NOON)
+    assert len(registry.publish([document("a", 1)], NOON).known) == 1
+    assert (tmp_path / "registry" / place_of(("a", version_of("a", 1)))).read_bytes() == content
+    for other in (b"", b"{", b"[]", b"{}", b"\xff\xfe", b'{"motor_id": "a"}'):
+        with pytest.raises(UsageError, match="no datasheet"):
+            registry.publish([other], NOON)
