@@ -102,10 +102,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         at = {"id_a": found.id_a, "iq_a": found.iq_a}
         unstated = unstated_note(captures, ("voltage", "current"))
         note = f"{words}; {unstated}" if unstated else words
+        if name == "ld_rated_h":
+            note += _other_side(fluxes, magnet, found)
         estimates.append(
             Estimate(name, inductance, "H", "measured", NAME, budget_of(parts), at, paths, note)
         )
-    return Fit(tuple(estimates), _evidence(fluxes))
+    return Fit(tuple(estimates), _evidence(fluxes, *own))
 
 
 def _without_ripple(
@@ -158,6 +160,7 @@ def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
 def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     """Change of psi_d from no d current to the largest, at the smallest q current that has both.
 
+    Of two d currents of one size the negative, which a drive uses: iron saturates on the other.
     Some q current is preferred: with none at all the inverter's dead time has no sign to cancel.
     """
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
@@ -172,7 +175,8 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     if not both:
         return None
     rated = max(abs(f.id_a) for f, _ in both)
-    at_rated = [(f, zero) for f, zero in both if abs(f.id_a) > (1.0 - SAME) * rated]
+    side = 1.0 if min(f.id_a for f, _ in both) > -(1.0 - SAME) * rated else -1.0
+    at_rated = [(f, zero) for f, zero in both if side * f.id_a > (1.0 - SAME) * rated]
     driven = [f.iq_a for f, _ in at_rated if f.iq_a > SAME * reach]
     smallest = min(driven, default=0.0)
     used = [(f, zero) for f, zero in at_rated if abs(f.iq_a - smallest) < SAME * reach]
@@ -186,6 +190,15 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     weights /= weights.sum()
     u = float(np.sqrt(np.sum(weights**2 * variances)))
     return Result(float(weights @ values), u, used[0][0].id_a, smallest)
+
+
+def _other_side(fluxes: Sequence[Flux], magnet: float, found: Result) -> str:
+    """L_d at the largest d current of the other sign in words, empty where there is none."""
+    across = [f for f in fluxes if f.id_a * found.id_a <= 0.0]
+    reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
+    near = [f for f in fluxes if abs(f.id_a) < SAME * reach and f not in across]
+    other = _direct([*across, *near], magnet)
+    return "" if other is None else f"; {other.value_h:.4g} H at {other.id_a:.3g} A of d current"
 
 
 def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:
@@ -208,12 +221,18 @@ def _timing_words(captures: Sequence[Capture]) -> str:
     return f"voltage timing {', '.join(timings)} and its lateness taken out"
 
 
-def _evidence(fluxes: Sequence[Flux]) -> tuple[Evidence, ...]:
+def _evidence(
+    fluxes: Sequence[Flux], direct: Result | None, quadrature: Result | None
+) -> tuple[Evidence, ...]:
+    """Flux linkages with the line of the published inductance through the flux at no current."""
     if not fluxes:
         return ()
     reach = max(max(abs(f.id_a), f.iq_a) for f in fluxes)
     plots = []
-    for axis, current, flux in (("q", "iq_a", "psi_q_wb"), ("d", "id_a", "psi_d_wb")):
+    for axis, current, flux, found in (
+        ("q", "iq_a", "psi_q_wb", quadrature),
+        ("d", "id_a", "psi_d_wb", direct),
+    ):
         other = "id_a" if axis == "q" else "iq_a"
         series = []
         levels = sorted({round(getattr(f, other) / (SAME * reach)) for f in fluxes})
@@ -223,9 +242,26 @@ def _evidence(fluxes: Sequence[Flux]) -> tuple[Evidence, ...]:
             x = np.array([getattr(f, current) for f in mine])
             y = np.array([getattr(f, flux) for f in mine])
             label = f"{other} {float(np.mean([getattr(f, other) for f in mine])):.3g} A"
-            series.append(Series(label, x, y, np.array([])))
+            line = np.array([])
+            if found is not None:
+                still = x[np.abs(x) < SAME * reach], y[np.abs(x) < SAME * reach]
+                start = (
+                    float(np.mean(still[1] - found.value_h * still[0])) if still[0].size else 0.0
+                )
+                line = start + found.value_h * x if axis == "q" or still[0].size else line
+            series.append(Series(label, x, y, line))
         title = f"Flux linkage of the {axis} axis at constant speed"
-        plots.append(Evidence(NAME, title, current, flux, "scatter", tuple(series)))
+        plots.append(
+            Evidence(
+                NAME,
+                title,
+                current,
+                flux,
+                "scatter",
+                tuple(series),
+                caption="line: the published apparent inductance",
+            )
+        )
     return tuple(plots)
 
 

@@ -192,7 +192,9 @@ def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidenc
         title = f"Acceleration in the {word}"
         caption = "window means, no derivative taken"
         plots.append(
-            Evidence(NAME, title, "t_s", "acceleration_rad_s2", "line", (series,), caption=caption)
+            Evidence(
+                NAME, title, "t_s", "acceleration_rad_s2", "line", (series,), capture.path, caption
+            )
         )
     speed, drag, line = found.curve(rows)
     curve = Series("drag", speed, drag, line)

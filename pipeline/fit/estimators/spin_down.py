@@ -331,7 +331,16 @@ def _evidence(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> t
         if coast.of_angle:
             angle = Series(word, t, coast.measured[keep], fitted[keep])
             plots.append(
-                Evidence(NAME, f"Angle travelled {word}", "t_s", "theta_mech_rad", "line", (angle,))
+                Evidence(
+                    NAME,
+                    f"Angle travelled {word}",
+                    "t_s",
+                    "theta_mech_rad",
+                    "line",
+                    (angle,),
+                    coast.path,
+                    "angle from the start of the coast",
+                )
             )
     return tuple(plots)
 

@@ -395,3 +395,44 @@ def test_masked_rows_are_not_used() -> None:
     kt = fitted(TORQUE_MAP, Campaign("m", tuple(holed))).estimates[0]
     whole = fitted(TORQUE_MAP, captures).estimates[0]
     assert kt.number == pytest.approx(whole.number, rel=1e-3)
+
+
+def test_both_sides_of_d_current_are_stated_and_the_negative_published() -> None:
+    """Saturated along the magnet: 20 % apart on the two sides, never averaged into one."""
+    design_motor = with_effects(replace(design("gimbal-5208"), effects={}), "saturation.size_d=0.2")
+    levels = {"id_levels": (-0.6, 0.0, 0.6)}
+    plan = tuple(
+        (f"map_{k}", "torque_map", {**levels, "speed": w}) for k, w in ((0, 0.3), (1, -0.5))
+    )
+    captures = campaign_of(campaign(design_motor, EXACT_BENCH, 4, plan))
+    found = chain(captures, INDUCTANCE_RATED).best("ld_rated_h")
+    assert found is not None
+    assert found.at["id_a"] == pytest.approx(-0.6 * design_motor.current_rated_a, rel=0.01)
+    assert found.number > 1.02 * design_motor.ld_h
+    other = float(found.note.rsplit("; ", 1)[1].split(" H at ")[0])
+    assert other < 0.98 * design_motor.ld_h
+
+
+def test_plots_over_time_name_their_capture() -> None:
+    """A recording shows only series that say which capture they belong to."""
+    captures = recorded("")
+    coasting = fitted(SPIN_DOWN, captures)
+    known = Constants(coasting.estimates).adding(fitted(TORQUE_MAP, captures).estimates)
+    paths = {c.path for c in captures.of("drive", "spin_down")}
+    for found in (coasting, fitted(INERTIA, captures, known)):
+        timed = [one for one in found.evidence if one.x_name == "t_s"]
+        assert timed
+        assert {one.capture for one in timed} <= paths
+        assert all(series.fitted.size == series.x.size for one in timed for series in one.series)
+
+
+def test_flux_plots_hold_the_published_inductance() -> None:
+    found = fitted(INDUCTANCE_RATED, recorded("", tests=("torque_map",)))
+    values = {e.name: e.number for e in found.estimates}
+    for one, name in zip(found.evidence, ("lq_rated_h", "ld_rated_h"), strict=True):
+        curves = [s for s in one.series if s.fitted.size and np.ptp(s.x) > 1.0]
+        assert curves
+        for series in curves:
+            slope = float(np.polyfit(series.x, series.fitted, 1)[0])
+            assert slope == pytest.approx(values[name], rel=1e-6)
+            assert np.std(series.measured - series.fitted) < 0.02 * np.ptp(series.measured)
