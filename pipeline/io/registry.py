@@ -282,10 +282,8 @@ def _sheet(given: Mapping[str, Any] | bytes) -> _Sheet:
         document = json.loads(given) if isinstance(given, bytes) else given
         motor_id, version = document["motor_id"], document["version"]
         _said(document)
-    except (LookupError, TypeError) as error:
-        raise UsageError(
-            f"no datasheet: {error!r} is missing", "publish what `run` wrote"
-        ) from error
+    except (LookupError, TypeError, ValueError) as error:
+        raise UsageError(f"no datasheet: {error!r}", "publish what `run` wrote") from error
     if not isinstance(motor_id, str) or not DIGEST.fullmatch(str(version)):
         raise UsageError(f"motor {motor_id!r}: version {version!r} is no sha256", "run again")
     try:
