@@ -52,7 +52,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     held = [leave_out(r.around, len(own_columns(r.fitted.model))) for r in rungs]
     residual = last.around.residual
     left = remainder(last.around, found, residual)
-    sketch = _unknown(found, rungs, left)
+    sketch = None if _explained(rungs, left) else _unknown(found, rungs, left)
     missing = last.added
     ranking = _ranking(rungs, held, offered, library)
     unseen = _unseen(campaign, library, last, offered)
@@ -98,8 +98,6 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
 def _unknown(
     found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder]
 ) -> UnknownStructure | None:
-    if not left:
-        return None
     sketch, _ = unknown_structure(found, rungs[-1].fitted, [r.signal for r in left])
     return sketch
 

@@ -148,7 +148,7 @@ def _waves(signal: str, variable: str, machine: Machine) -> Port:
         angle = x.eps_rad if electrical else x.theta_rad
         total = 0.0 * angle
         for name, value in q.items():
-            if name.startswith(axis):
+            if value and name.startswith(axis):
                 bare = name.removeprefix(axis)
                 wave = np.sin if bare.startswith("sin") else np.cos
                 total = total + value * wave(int(bare[3:]) * angle)
@@ -179,7 +179,8 @@ def _flux_map() -> Port:
     def coenergy(x: Operating, q: Values) -> Any:
         size = x.machine.scales["current_a"]
         d, i = x.id_a / size, x.iq_a / size
-        return size * sum(q[f"d{a}q{b}"] * d**a * i**b for a, b in powers)
+        terms = {(a, b): q[f"d{a}q{b}"] for a, b in powers}
+        return size * sum(c * d**a * i**b for (a, b), c in terms.items() if c)
 
     effect = _effect(
         "port:flux:current",

@@ -13,8 +13,10 @@ def _coenergy(x: Operating, q: Values) -> Any:
     total = 0.0
     for order in (6, 12):
         cosine, sine = np.cos(order * x.eps_rad), np.sin(order * x.eps_rad)
-        total = total + x.id_a * (q[f"d{order}_cos"] * cosine + q[f"d{order}_sin"] * sine)
-        total = total + x.iq_a * (q[f"q{order}_cos"] * cosine + q[f"q{order}_sin"] * sine)
+        for current, axis in ((x.id_a, "d"), (x.iq_a, "q")):
+            for wave, shape in (("cos", cosine), ("sin", sine)):
+                if size := q[f"{axis}{order}_{wave}"]:
+                    total = total + size * current * shape
     return x.base["psi_wb"] * total
 
 
