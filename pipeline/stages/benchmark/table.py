@@ -13,6 +13,8 @@ from pipeline.stages.benchmark.values import Compared, compared
 
 CONFIDENCE = 0.95
 MATTERS = 0.01
+FEW = 20
+"""Cases below which a share says little; the table marks it."""
 LIBRARY = ("size", "set", "tie", "gap")
 
 
@@ -48,6 +50,8 @@ class Line:
             return f"| {self.what} | no cases | | {self._asked()} | |"
         low, high = interval(self.count, self.total)
         met = {True: "yes", False: "no", None: ""}[self.met]
+        if met and self.total < FEW:
+            met += " (few)"
         share = f"{100.0 * self.share:.1f} % ({self.count}/{self.total})"
         spread = f"{100.0 * low:.1f} to {100.0 * high:.1f} %"
         return f"| {self.what} | {share} | {spread} | {self._asked()} | {met} |"

@@ -162,7 +162,7 @@ def test_shares_of_the_table() -> None:
 
 def test_the_table_holds_counts_intervals_and_points() -> None:
     text = table(PAIRS, "heading")
-    assert "| 2 a*: right | 33.3 % (1/3) | 0.8 to 90.6 % | at least 98 % | no |" in text
+    assert "| 2 a*: right | 33.3 % (1/3) | 0.8 to 90.6 % | at least 98 % | no (few) |" in text
     assert "| 1 a*" not in text
     assert "-8 of 8" in text.splitlines()[-1]
     assert "| `windage` | 1/2 |" in by_effect(PAIRS)
