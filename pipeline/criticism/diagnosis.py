@@ -54,7 +54,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     left = remainder(last.around, found, residual)
     sketch = None if _explained(rungs, left) else _unknown(found, rungs, left)
     missing = last.added
-    ranking = _ranking(rungs, held, offered, library)
+    ranking = _ranking(rungs, held, offered, library, found)
     unseen = _unseen(campaign, library, last, offered)
     verdict = _verdict(missing, left, rungs, unseen)
     return Diagnosis(
@@ -158,13 +158,14 @@ def _ranking(
     held: Sequence[HeldOut],
     offered: Sequence[Candidate],
     library: dict[str, Effect],
+    captured: Sequence[Segment],
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last rung."""
     last = rungs[-1]
     found = []
     for place, name in enumerate(last.added):
         effect = library[name]
-        confused = rivals_of(name, last.fitted, last.around, offered)
+        confused = rivals_of(name, last.fitted, last.around, offered, captured)
         loss = loss_without(last.around, last.fitted, (name,))
         dof = len(effect.parameters_of(last.fitted.model.machine))
         found.append(

@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.selection import TIE, Candidate, loss_without
-from pipeline.criticism.system import Fitted, System, own_columns
+from pipeline.criticism.segments import Segment
+from pipeline.criticism.selection import TIE, Candidate, loss_without, material
+from pipeline.criticism.system import Fitted, System, gauss_newton, own_columns
+
+_NEAR = 0.5
+_MOST = 3
 
 
 def rivals_of(
-    name: str, fitted: Fitted, wide: System, offered: Sequence[Candidate]
+    name: str,
+    fitted: Fitted,
+    wide: System,
+    offered: Sequence[Candidate],
+    segments: Sequence[Segment],
 ) -> tuple[str, ...]:
-    """Effects that explain the captures as well in an effect's place (misfit within 12)."""
-    first = len(own_columns(fitted.model))
-    found: dict[str, float] = {}
+    """Effects that explain the captures as well in an effect's place (misfit within 12).
+
+    Those that to first order keep most of what the effect explains are refitted in its place.
+    """
     effect = next(e for e in fitted.model.effects if e.name == name)
+    lost = loss_without(wide, fitted, (name,))
+    first = len(own_columns(fitted.model))
+    near: dict[str, tuple[float, Candidate]] = {}
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
@@ -25,8 +38,23 @@ def rivals_of(
             continue
         rise = loss_without(wide, fitted, (name,), places)
         other = candidate.effect.name
-        found[other] = min(rise, found.get(other, np.inf))
-    return tuple(sorted(other for other, rise in found.items() if rise < TIE))
+        if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
+            near[other] = rise, candidate
+    nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))[:_MOST]
+    enough = wide.misfit + TIE
+    ties = [c.effect.name for _, c in nearest if _refitted(name, fitted, c, segments) < enough]
+    return tuple(sorted(ties))
+
+
+def _refitted(
+    name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment]
+) -> float:
+    """Misfit with a candidate in an effect's place."""
+    model = fitted.model.without(name).with_effects(candidate.effect)
+    kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{name}.")}
+    start = replace(fitted, model=model, values={**kept, **candidate.values})
+    swapped, around = gauss_newton(segments, start)
+    return around.misfit if material(swapped, candidate.effect) else np.inf
 
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:

@@ -29,7 +29,7 @@ from pipeline.criticism.system import (
 LEAST_SHARE = 0.1
 TIE = 12.0
 _MOST = 8
-_REFITS = 2
+_REFITS = 3
 _CLOSE = 0.7
 _WORTH = 30.0
 _GLANCE = ((1.0,), 3)
@@ -222,14 +222,15 @@ def _refit_best(
     """Refits with the best candidates, those close to the best fall, and takes the best."""
     close = [s for s in passing[:_REFITS] if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
+    least = math.inf
     for score in close:
-        model = fitted.model.with_effects(score.candidate.effect)
+        effect = score.candidate.effect
+        model = fitted.model.with_effects(effect)
         values = {**fitted.values, **score.candidate.values, **score.step}
         tried = gauss_newton(segments, replace(fitted, model=model, values=values), before=wide)
-        if not material(tried[0], score.candidate.effect):
-            continue
-        if best is None or tried[1].misfit < best[1].misfit:
-            best = tried
+        cost = tried[1].misfit + score.price
+        if material(tried[0], effect) and cost < least:
+            best, least = tried, cost
     return best
 
 

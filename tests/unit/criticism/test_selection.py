@@ -133,5 +133,6 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
     segments = (with_drag(drag), with_drag(drag, 6))
     last = search(segments, fitted(segments), library)[-1]
     assert last.added in {("windage",), ("brake",)}
-    rivals = rivals_of(last.added[0], last.fitted, last.around, candidates(library, last.fitted))
+    offered = candidates(library, last.fitted)
+    rivals = rivals_of(last.added[0], last.fitted, last.around, offered, segments)
     assert set(rivals) == {"windage", "brake"} - set(last.added)
