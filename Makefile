@@ -33,7 +33,7 @@ screenshots: demo
 	  --screenshot=docs/images/fleet.png file://$(CURDIR)/reports/demo/report/index.html
 
 demo-data: $(READY)
-	rm -rf data/demo
+	rm -rf data/demo/*/
 	$(PY) -m pipeline simulate output=data/demo fleet=demo
 
 test: $(READY)
