@@ -280,18 +280,19 @@ class _Sampler:
         return change if np.any(change) else None
 
     def _concerns(self, effect: Effect | None) -> bool:
-        kind = self.segment.kind
-        if effect is None or kind == "flux_map":
-            return effect is None or effect.current is not None
+        """Whether a segment's residual can hear a sensor effect at all."""
+        if effect is None or self.segment.kind == "lcr":
+            return True
+        kinds: tuple[str, ...] = ()
         if effect.angle is not None:
-            return kind in ("dq", "open", "shaft")
+            kinds += ("dq", "open", "shaft")
         if effect.current is not None:
-            return kind in ("dq", "terminal")
+            kinds += ("dq", "terminal", "flux_map")
         if effect.voltage is not None:
-            return kind in ("dq", "open", "terminal")
-        if effect.load is not None or effect.shaft is not None:
-            return "torque_shaft_nm" in self.segment.channels
-        return True
+            kinds += ("dq", "open", "terminal", "flux_map")
+        loaded = effect.load is not None or effect.shaft is not None
+        heard = loaded and "torque_shaft_nm" in self.segment.channels
+        return heard or self.segment.kind in kinds
 
     def _with(self, column: Column) -> tuple[Model, dict[str, float]]:
         effect = column.effect

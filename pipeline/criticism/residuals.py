@@ -176,7 +176,10 @@ def _operate_still(
         eps, current = np.radians(signals["theta_elec_deg"]), np.zeros(n, dtype=complex)
         freq = signals.get("freq_hz", zero)
     else:
-        eps, current, freq = zero, signals["id_a"] + 1j * signals["iq_a"], zero
+        eps, freq = zero, zero
+        current = signals["id_a"] + 1j * signals["iq_a"]
+        table = Recorded(current, zero, eps, zero, segment.ts_s, False, segment.instrument)
+        current = _true_current(table, model, values)
     x = _operating(segment, signals, model, values, current, zero, zero, freq)
     return replace(x, eps_rad=eps)
 
@@ -248,7 +251,9 @@ def predicted(
     if segment.kind == "lcr":
         return _predict_lcr(segment, x, model, values)
     if segment.kind == "flux_map":
-        return np.stack([pieces.psi_wb.real, pieces.psi_wb.imag])
+        # a flux linkage is a voltage's integral: the voltmeter's gain is in it
+        psi = _recorded_voltage(pieces.psi_wb, segment, x, model, values)
+        return np.stack([psi.real, psi.imag])
     rows: list[Array] = []
     if segment.kind in ("dq", "open"):
         voltage = _rotor_voltage(segment, x, pieces, values)

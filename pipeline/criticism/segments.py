@@ -330,4 +330,4 @@ def _flux_map(capture: Capture, _: Machine) -> Segment | None:
         return None
     found = capture.arrays(*names)
     noise = {name: 1e-3 * float(np.ptp(found[name])) for name in names}
-    return _segment(capture, "flux_map", "bench", 1.0, found, noise, ("psi_d_wb", "psi_q_wb"), None)
+    return _segment(capture, "flux_map", "drive", 1.0, found, noise, ("psi_d_wb", "psi_q_wb"), None)
