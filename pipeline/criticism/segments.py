@@ -228,9 +228,10 @@ def _slow_turn(
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
-    window = max(int(size / max(round(turns), 1)), 8) if turns > 1.2 else size
+    window = max(int(size / round(turns)), 8) if turns > 1.2 else size - 2
     window = min(window, size - 2)
-    starts = window_starts(keep, window)
+    # the first and the last sample have no neighbours
+    starts = 1 + window_starts(keep[1:-1], window)
     weak = projection(found["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
     return _segment(capture, "shaft", "bench", period * factor, found, noise, (channel,), weak)
 

@@ -1,0 +1,37 @@
+"""From captures to segments: windows that a short or a long recording leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.segments import segments
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from tests.unit.criticism.machines import machine
+
+
+def slow_turn(turns):
+    t = np.arange(int(8000 * turns)) * 1e-3
+    theta = 2 * np.pi * t / 8.0
+    torque = 0.01 * np.sin(84 * theta) + np.random.default_rng(2).normal(0, 1e-4, t.size)
+    table = pl.DataFrame({"t_s": t, "theta_mech_rad": theta, "torque_shaft_nm": torque})
+    return Capture("cog.mcap", "0", "verified", CaptureMeta("m", "cogging"), (table,))
+
+
+@pytest.mark.parametrize("turns", [1.0, 1.1, 2.0, 2.5])
+def test_a_slow_turn_has_a_window_a_turn_whatever_its_length(turns):
+    """One whole turn once gave no window at all, and its cogging went unseen."""
+    found = segments(Campaign("m", (slow_turn(turns),)), machine())
+    assert len(found) == 1
+    assert found[0].weak.starts.size >= 1
+    weak = found[0].weak.project(found[0].recorded["torque_shaft_nm"][None])[0]
+    own = weak[0, found[0].weak.orders == 84]
+    gain = np.sqrt(found[0].weak.length) / 2
+    assert np.hypot(*own) > 0.5 * 0.01 * gain * 0.7
+
+
+def test_a_capture_that_lacks_its_equations_signals_is_left_out():
+    table = pl.DataFrame({"t_s": [0.0, 1.0, 2.0], "id_a": [0.0, 1.0, 2.0]})
+    capture = Capture("x.csv", "0", "verified", CaptureMeta("m", "torque_map"), (table,))
+    assert segments(Campaign("m", (capture,)), machine()) == ()
