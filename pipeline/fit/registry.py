@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.fit import estimators as estimators_room
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.physics.glossary import CONSTANTS
+from pipeline.physics.glossary import CONSTANTS, Term
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -70,7 +70,7 @@ def fit_all(
                 result = Fit(_missing(estimator, reason))
         else:
             result = Fit(_missing(estimator, estimator.experiment))
-        found.append((estimator.rank, order, result))
+        found.append((estimator.rank, order, _possible(estimator, result)))
         ranked = sorted(found, key=lambda item: item[:2])
         known = Constants(tuple(e for _, _, fit in ranked for e in fit.estimates))
     evidence = tuple(e for _, _, fit in found for e in fit.evidence)
@@ -82,6 +82,32 @@ def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:
         not_identifiable(name, _unit(estimator, name), estimator.name, note)
         for name in estimator.gives
     )
+
+
+def _possible(estimator: Estimator, result: Fit) -> Fit:
+    """The result with every value outside its term's range turned into its own refusal."""
+    own = {term.name: term for term in estimator.terms}
+    return Fit(
+        tuple(
+            _possible_estimate(e, own.get(e.name) or CONSTANTS.get(e.name))
+            for e in result.estimates
+        ),
+        result.evidence,
+    )
+
+
+def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
+    if not estimate.known or term is None or _in_range(estimate.number, term):
+        return estimate
+    note = (
+        f"came out as {estimate.number:.4g} {estimate.unit}, outside {term.low:g} to "
+        f"{term.high:g}: look at signs and units of {', '.join(estimate.captures[:3])}"
+    )
+    return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
+
+
+def _in_range(value: float, term: Term) -> bool:
+    return (term.low is None or value >= term.low) and (term.high is None or value <= term.high)
 
 
 def _unit(estimator: Estimator, name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from contextlib import suppress
@@ -34,9 +35,13 @@ def write_whole(path: Path, content: bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             temporary.unlink()
-        raise MachineError(
-            f"cannot write {path.name}: {error.strerror}", "free the disk"
-        ) from error
+        raise MachineError(f"cannot write {path}: {error.strerror}", _remedy(error)) from error
+
+
+def _remedy(error: OSError) -> str:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return "free the disk and run again"
+    return "name an output folder that can be written"
 
 
 def write_synced(path: Path, content: bytes) -> None:

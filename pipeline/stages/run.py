@@ -48,6 +48,8 @@ def main(settings: RunSettings) -> Outcome:
     folder = Path(settings.input)
     if not folder.is_dir():
         raise UsageError(f"input={settings.input} is no folder", "name the folder of captures")
+    if Path(settings.output).exists() and not Path(settings.output).is_dir():
+        raise UsageError(f"output={settings.output} is a file", "name a folder to write to")
     registry = _registry(settings)
     conf = configuration_folder()
     limits = limits_file(conf / "limits", settings.limits)

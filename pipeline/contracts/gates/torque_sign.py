@@ -29,7 +29,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         raise CaptureError(
             "torque_sign",
             f"torque_shaft_nm falls as iq_a grows (correlation {correlation:.2f})",
-            "turn the sign of the torque in conf/source: positive drives positive rotation",
+            "turn the sign of the torque or of the currents in conf/source: positive torque drives "
+            "positive rotation, currents are positive into the motor",
         )
     return Passed()
 

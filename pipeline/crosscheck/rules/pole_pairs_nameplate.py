@@ -9,6 +9,7 @@ from pipeline.crosscheck.protocol import Rule
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
+from pipeline.records.estimate import Estimate
 
 NAME = "pole_pairs_nameplate"
 
@@ -25,10 +26,16 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if not wrong:
         return Check(NAME, "pass", words, 0.0, 0.0, "1")
     difference = counted.number - wrong[0]
-    return Check(NAME, "fail", words, difference, 0.0, "1", _suspect(counted.number / wrong[0]))
+    return Check(NAME, "fail", words, difference, 0.0, "1", _suspect(counted, wrong, campaign))
 
 
-def _suspect(ratio: float) -> str:
+def _suspect(counted: Estimate, wrong: list[int], campaign: Campaign) -> str:
+    """The odd files where most nameplates are right, else what the ratio tells."""
+    plates = [c for c in campaign.captures if c.meta.pole_pairs]
+    odd = [c.path for c in plates if c.meta.pole_pairs in wrong]
+    if 2 * len(odd) < len(plates):
+        return f"the metadata of {', '.join(odd[:3])}: {len(odd)} of {len(plates)} captures"
+    ratio = counted.number / wrong[0]
     if ratio == 0.5:
         return "2: the nameplate states poles, not pole pairs"
     if ratio == 2.0:

@@ -1,0 +1,49 @@
+"""A passive winding that delivers power: the current or the voltage is turned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+
+FRAME = ("vd_v", "vq_v", "id_a", "iq_a")
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Refuses a two-terminal test or heat run whose terminals deliver energy over the recording.
+
+    The sum of v·i over that of |v·i| is near 1 in a winding that only dissipates and stores.
+    """
+    pair = capture.meta.pair or "ab"
+    terminals = (f"v{pair}_v", f"i{pair[0]}_a")
+    if capture.has(*terminals):
+        data = capture.arrays(*terminals)
+        power = data[terminals[0]] * data[terminals[1]]
+    elif capture.has(*FRAME):
+        data = capture.arrays(*FRAME)
+        power = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
+    else:
+        return Passed()
+    power = power[np.isfinite(power)]
+    whole = float(np.abs(power).sum())
+    if whole == 0.0 or float(power.sum()) > -options["share"] * whole:
+        return Passed()
+    raise CaptureError(
+        "power_sign",
+        "voltage and current have opposite signs: the winding would deliver power",
+        "turn the sign of the current or of the voltage in conf/source: currents are positive "
+        "into the motor",
+    )
+
+
+GATE = Gate(
+    "power_sign",
+    ("resistance", "current_step", "heat_run"),
+    check,
+    # Noise alone gives a share near 0, a turned sign near 1; half way is neither by chance.
+    {"share": 0.5},
+)

@@ -1,0 +1,45 @@
+"""An angle that jumps by a whole turn: recorded modulo 2 pi where it must be unwrapped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.contracts.protocol import Gate, Passed, span_of
+from pipeline.physics.glossary import TESTS
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+
+ANGLES = ("theta_mech_rad", "theta_elec_rad")
+TURN_RAD = 2.0 * np.pi
+
+
+def check(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Refuses an angle that steps back by about a turn while it otherwise moves in small steps."""
+    for name in ANGLES:
+        if not capture.has(name):
+            continue
+        steps = np.diff(capture.arrays(name, masked=False)[name])
+        steps = np.where(np.isfinite(steps), steps, 0.0)
+        if steps.size < 3 or float(np.median(np.abs(steps))) > options["usual_rad"]:
+            continue
+        turns = np.abs(np.abs(steps) - TURN_RAD) < options["near_rad"]
+        if np.any(turns):
+            first, last = span_of(turns)
+            raise CaptureError(
+                "wrapped_angle",
+                f"{name} jumps by a whole turn {int(np.count_nonzero(turns))} times",
+                "record it unwrapped, or leave it out where the speed is there",
+                rows=(first + 1, last + 1),
+            )
+    return Passed()
+
+
+GATE = Gate(
+    "wrapped_angle",
+    tuple(TESTS),
+    check,
+    # A sample apart by a radian or more would leave the direction of rotation unknown anyway.
+    {"usual_rad": 1.0, "near_rad": 1.5},
+)
