@@ -52,8 +52,9 @@ def find_plateaus(
     """Settled stretches of at least `least` rows of a stepped signal [n].
 
     A row belongs to a step where the means of the `window` rows before and after it differ by
-    more than six of their standard errors and `tolerance` of the signal's span. What is left is
-    trimmed at its start while blocks still approach the level of its later half.
+    more than six of their standard errors, `tolerance` of the signal's span and what rounding of
+    the running sum can make up, eps n max|x|. What is left is trimmed at its start while blocks
+    still approach the level of its later half.
     """
     n = signal.size
     if n < 2 * least:
@@ -67,17 +68,19 @@ def find_plateaus(
     )
     span = float(np.ptp(signal))
     sigma = white_noise_sigma(signal)
-    limit = max(6.0 * sigma * math.sqrt(2.0 / window), tolerance * span, 1e-300)
+    rounding = float(np.finfo(np.float64).eps) * n * float(np.max(np.abs(signal)))
+    limit = max(6.0 * sigma * math.sqrt(2.0 / window), tolerance * span, rounding)
     moving = jump[:n] > limit
     found = []
-    for start, stop in _runs(~moving):
+    for start, stop in true_runs(~moving):
         trimmed = _trim(signal, start, stop, window, sigma, limit)
         if stop - trimmed >= least:
             found.append(Plateau(trimmed, stop))
     return tuple(found)
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Start and stop (excluded) of every run of true values in flags [n]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 

@@ -90,7 +90,10 @@ def _lines(
         except KeyError as error:
             notes.append(str(error.args[0]))
             continue
-        line = None if record is None else _line(record)
+        if record is None:
+            notes.append(f"{capture.path}: no steady current found")
+            continue
+        line = _line(record)
         if line is None or line.span_k < options["least_span_k"]:
             notes.append(f"{capture.path}: the winding warms too little")
         else:

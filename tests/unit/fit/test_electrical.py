@@ -426,6 +426,24 @@ def test_a_measured_voltage_needs_no_other_test():
     assert abs(sources.get("voltage@s", 0.0)) < 1e-9
 
 
+def with_current(run, i_a):
+    """The same run with its d current replaced by i_a [n], the voltage by R(T) times it."""
+    warm = run.arrays("temp_winding_degc")["temp_winding_degc"] - 25.0
+    volts = 0.4 * (1.0 + 0.0039 * warm) * i_a
+    table = run.tables[0].with_columns(pl.Series("id_a", i_a), pl.Series("vd_v", volts))
+    return Capture("set", "0" * 64, "verified", run.meta, (table,))
+
+
+def test_a_current_that_is_exactly_constant_is_steady():
+    run = heat_capture(kind="measured")
+    held = with_current(run, np.full(4000, 5.16))
+    found = estimates(heat_run.ESTIMATOR, held)["temp_coeff_copper_1_k"]
+    assert found.number == pytest.approx(0.0039, rel=2e-3)
+    swept = with_current(run, 5.0 * np.sin(np.arange(4000) / 30.0))
+    lost = estimates(heat_run.ESTIMATOR, swept)["temp_coeff_copper_1_k"]
+    assert "no steady current found" in lost.note
+
+
 def test_a_turning_rotor_without_its_flux_is_refused():
     found = estimates(heat_run.ESTIMATOR, heat_capture(speed=5.0))
     assert found["temp_coeff_copper_1_k"].status == "not_identifiable"

@@ -28,6 +28,12 @@ def test_plateaus_of_any_scale(scale):
     assert levels == pytest.approx([0.0, 2.0, 1.0, -2.0], abs=0.004)
 
 
+@pytest.mark.parametrize("level", [5.16, -5.16e-9, 5.16e9, 0.0])
+def test_an_exact_constant_is_one_plateau(level):
+    """The running sum of 20 000 times 5.16 is rounded; that is no motion."""
+    assert [(p.start, p.stop) for p in find_plateaus(np.full(20_000, level))] == [(0, 20_000)]
+
+
 def test_a_ramp_has_no_plateau():
     signal = np.linspace(0.0, 5.0, 1000) + 0.001 * np.random.default_rng(2).standard_normal(1000)
     assert all(p.size < 200 for p in find_plateaus(signal))
