@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from pipeline.fit.terminals import PAIR_ANGLE_RAD, PAIRS
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
-from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.numerics.plateaus import true_runs, white_noise_sigma
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
@@ -143,17 +144,52 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
     sigma = math.hypot(white_noise_sigma(vector.real), white_noise_sigma(vector.imag))
     moving = size > max(6.0 * sigma, 0.02 * float(np.quantile(size, 0.99)))
     stretches: list[Stretch] = []
-    for start, stop in _runs(moving):
-        rows = np.arange(start, stop)
-        smooth = _smooth_phase(spin.t_s[rows], np.unwrap(np.angle(vector[rows])))
-        if smooth is not None:
-            stretches += _split(rows, *smooth, change)
+    for start, stop in _unbroken(spin.t_s, vector, moving):
+        unwrapped = np.unwrap(np.angle(vector[start:stop]))
+        for first, last in _one_way(unwrapped):
+            rows = np.arange(start + first, start + last)
+            smooth = _smooth_phase(spin.t_s[rows], unwrapped[first:last])
+            if smooth is not None:
+                stretches += _split(rows, *smooth, change)
     return stretches, int(np.count_nonzero(moving))
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Runs of moving rows, parted where rows are missing for more than half a cycle.
+
+    Across such a gap the phase cannot be unwrapped. Half a cycle is told by nine tenths of the
+    advances from row to row.
+    """
+    both = np.flatnonzero(moving[1:] & moving[:-1])
+    if not both.size:
+        return []
+    advance = np.abs(np.angle(vector[both + 1] * np.conj(vector[both])))
+    usual_s, after_s = float(np.median(np.diff(t_s)[both])), np.diff(t_s)
+    lost = float(np.quantile(advance, 0.9)) * after_s > math.pi * usual_s
+    gaps = np.flatnonzero(lost & (after_s > 1.5 * usual_s)) + 1 if usual_s > 0.0 else both[:0]
+    found: list[tuple[int, int]] = []
+    for start, stop in true_runs(moving):
+        inner = gaps[(gaps > start) & (gaps < stop)]
+        edges = [start, *(int(k) for k in inner), stop]
+        found += pairwise(edges)
+    return found
+
+
+def _one_way(phase: Array) -> list[tuple[int, int]]:
+    """Rows start..stop that part a phase [n] wherever it turns back by a cycle or more."""
+    open_pieces, found = [(0, phase.size)], []
+    while open_pieces:
+        start, stop = open_pieces.pop()
+        forward = phase[start:stop] * (1.0 if phase[stop - 1] >= phase[start] else -1.0)
+        back = np.maximum.accumulate(forward) - forward
+        low = int(np.argmax(back))
+        if back[low] < TURN:
+            found.append((start, stop))
+            continue
+        high = int(np.argmax(forward[: low + 1]))
+        edges = sorted({start, start + high, start + low, stop})
+        open_pieces += pairwise(edges)
+    return sorted(found)
 
 
 def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Rows] | None:

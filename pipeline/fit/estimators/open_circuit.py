@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.back_emf import (
+    LEAST_CYCLES,
     Spin,
     Stretch,
     StretchFlux,
@@ -149,6 +150,10 @@ def _groups(
         except (KeyError, ValueError):
             notes.append(f"{capture.path}: needs two line voltages")
             continue
+        if not stretches:
+            notes.append(
+                f"{capture.path}: no steady stretch of {LEAST_CYCLES} electrical cycles found"
+            )
         for stretch in stretches:
             flux = flux_of(spin, stretch, ORDERS)
             temp = fallback if flux.temp_degc is None else flux.temp_degc

@@ -347,6 +347,28 @@ def test_a_gear_is_no_pole_pair_count():
     assert not found["ke_phase_peak_v_s_rad"].known
 
 
+def rows_of(run, keep):
+    return Capture("cut", "0" * 64, "verified", run.meta, (run.tables[0].filter(pl.Series(keep)),))
+
+
+@pytest.mark.parametrize("dropped", [0, 700])
+def test_equal_travel_both_ways_without_a_row_at_standstill(dropped):
+    """Reversals within one sample, or with 35 ms of rows left out: the net phase is nothing."""
+    run = spin_capture((80.0, -80.0) * 3)
+    keep = np.arange(36_000) % 6000 >= dropped
+    found = estimates(open_circuit.ESTIMATOR, rows_of(run, keep))
+    assert found["psi_pm_wb"].number == pytest.approx(4e-3, rel=5e-5)
+    assert found["pole_pairs"].value == 5
+    assert found["phase_order"].value == 1
+
+
+def test_too_few_cycles_are_named_as_such():
+    run = rows_of(spin_capture((80.0,)), np.arange(6000) < 500)
+    found = estimates(open_circuit.ESTIMATOR, run)["psi_pm_wb"]
+    assert found.status == "not_identifiable"
+    assert "no steady stretch of 3 electrical cycles" in found.note
+
+
 # Hand turn
 
 
