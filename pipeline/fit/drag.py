@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.fit.shaft_rows import COAST, DRIVE, OVERLAP, ShaftRows
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns
@@ -21,6 +21,9 @@ BUMPS = tuple(float(f"{0.008 * 1.2**k:.3g}") for k in range(19))
 MOST_NUISANCES = 14
 MATERIAL = 0.02
 ENOUGH_COASTING = 12
+ROWS_A_COLUMN = 10
+LEAST_FREEDOM = 8
+LEAST_CLUSTERS = 10
 
 
 def _hat(index: int) -> Callable[[Array], Array]:
@@ -91,7 +94,7 @@ class DragFit:
         return np.array([inertia, level * inertia, slope * inertia])
 
     def scatter(self) -> Array:
-        """Lower triangle [3, 3]: rows J, T_c, B; columns the scatter sources that they share."""
+        """Factor [3, 3] of the covariance: rows J, T_c, B; columns the sources that they share."""
         step = 1e-6 * np.maximum(np.abs(self.coefficients), np.sqrt(np.diag(self.covariance)))
         columns = []
         for k in range(self.coefficients.size):
@@ -102,8 +105,9 @@ class DragFit:
         joint = slope @ self.covariance @ slope.T
         scale = np.sqrt(np.maximum(np.diag(joint), 1e-300))
         correlation = joint / np.outer(scale, scale) + 1e-12 * np.eye(3)
-        lower: Array = np.linalg.cholesky(correlation) * scale[:, None]
-        return lower
+        values, vectors = np.linalg.eigh(correlation)
+        factor: Array = vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
+        return factor
 
     def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
         """Speed, drag torque and the published line, one point a window (at most 2000)."""
@@ -133,10 +137,13 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
     base = np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
     curve_columns = [-rows.columns[n] for n in CURVE]
     rich = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in usable)])
+    if rows.disjoint(DRIVE) < rich.shape[1]:
+        rich = base
+    most = min(MOST_NUISANCES, max(0, rows.disjoint(DRIVE) // ROWS_A_COLUMN - _drive_columns(rows)))
     sigma = _balanced(rows, rich, y)
     tau = autocorrelation_time(linear_fit(rich, y, sigma).residuals / sigma, 200)
     pool = {n: candidates[n] for n in [*usable, "windage"]}
-    chosen = needed_columns(base, pool, y, sigma, level, MOST_NUISANCES, tau)
+    chosen = needed_columns(base, pool, y, sigma, level, most, tau)
     start = np.column_stack([base, *(candidates[n] for n in chosen)])
     bumps = {n: candidates[n] for n in STRIBECK}
     chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
@@ -154,7 +161,7 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
         design, names = curve, curve_names
         sigma = _balanced(rows, design, y)
     found = linear_fit(design, y, sigma)
-    covariance, dof = cluster_covariance(design, found.residuals, sigma, rows.cluster)
+    covariance, dof = _covariance(rows, design, found, sigma)
     u_form, reasons = _form(found.coefficients, free, rows)
     if not free:
         u_form = _shape_doubt(base, candidates, chosen, found.coefficients, y, sigma)
@@ -162,6 +169,58 @@ def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level:
         names, found.coefficients, covariance, found.residuals, dof, free, u_form, reasons,
         design, sigma, y, rows.fastest_rad_s,
     )  # fmt: skip
+
+
+def freedom(rows: ShaftRows) -> int:
+    """Disjoint drive windows beyond the columns that drives alone must determine."""
+    return rows.disjoint(DRIVE) - _drive_columns(rows)
+
+
+def _drive_columns(rows: ShaftRows) -> int:
+    """Columns that drives determine: g, and drag's two where no coast-down fixes them."""
+    return 1 if np.count_nonzero(rows.kind == COAST) >= ENOUGH_COASTING else 3
+
+
+def too_short(rows: ShaftRows) -> str:
+    """Why the drive windows cannot carry an inertia with its uncertainty, else empty.
+
+    The scatter s of v degrees of freedom is itself known to 1/sqrt(2v): a quarter at
+    `LEAST_FREEDOM`. Fewer tell neither how sure J is nor whether a nuisance is there.
+    Reference: JCGM 100:2008, E.4.3.
+    """
+    if freedom(rows) >= LEAST_FREEDOM:
+        return ""
+    return (
+        f"the drive logs hold only {rows.disjoint(DRIVE)} windows that share no sample and in "
+        f"which the shaft turns, {LEAST_FREEDOM + _drive_columns(rows)} are needed to know how "
+        "sure the inertia is"
+    )
+
+
+def torque_is_parted(design: Array, sigma: Array) -> bool:
+    """Whether the torque column (the first) is no combination of the others."""
+    scaled = design / sigma[:, None]
+    norm = np.linalg.norm(scaled, axis=0)
+    scaled = scaled / np.where(norm > 0.0, norm, 1.0)
+    others = scaled[:, 1:]
+    ranks = [int(np.linalg.matrix_rank(m, tol=1e-8)) for m in (scaled, others)]
+    return ranks[0] > ranks[1]
+
+
+def _covariance(
+    rows: ShaftRows, design: Array, found: LinearFit, sigma: Array
+) -> tuple[Array, int]:
+    """Covariance of the coefficients and its degrees of freedom.
+
+    Under any correlation inside clusters where the drives fill enough of them; with few, the
+    clusters' scores all but cancel (one alone: exactly, as least squares makes their sum zero),
+    so that the residual variance and the number of windows that count as one stand in.
+    Reference: Cameron and Miller, J. Human Resources 50(2), 2015, VI.
+    """
+    if np.unique(rows.cluster[rows.kind == DRIVE]).size >= LEAST_CLUSTERS:
+        return cluster_covariance(design, found.residuals, sigma, rows.cluster)
+    tau = max(autocorrelation_time(found.residuals / sigma, 200), 1.0 / (1.0 - OVERLAP))
+    return found.covariance * found.chi2_dof * tau, max(freedom(rows), 1)
 
 
 def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
@@ -256,7 +315,7 @@ def _implausible(
 ) -> bool:
     """Whether the fitted drag is no friction: a negative Coulomb or viscous part."""
     found = linear_fit(design, y, sigma)
-    u = np.sqrt(np.diag(cluster_covariance(design, found.residuals, sigma, rows.cluster)[0]))
+    u = np.sqrt(np.diag(_covariance(rows, design, found, sigma)[0]))
     parts = [names.index("coulomb"), names.index("viscous")]
     return any(found.coefficients[k] < -4.0 * u[k] for k in parts)
 
@@ -298,5 +357,5 @@ def drag_words(found: DragFit) -> str:
     """What the fit had to add to Coulomb and viscous drag, in words."""
     added = [n for n in found.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
     words = "drag curve left free, its form is not Coulomb and viscous" if found.free else ""
-    also = f"the data also demand columns {', '.join(added)}" if added else ""
+    also = f"also fitted, because the data demand it: {', '.join(added)}" if added else ""
     return "; ".join(w for w in (words, also) if w) or "Coulomb and viscous drag hold"

@@ -7,6 +7,7 @@ of the angle against derivatives of the window.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,7 @@ LONGEST_COAST_S = 0.5
 CLUSTER_S = 0.25
 SLOWEST_SHARE = 0.01
 QUIET = 0.02
+OVERLAP = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +60,10 @@ class ShaftRows:
     def count(self) -> int:
         """Number of rows."""
         return int(self.sense.size)
+
+    def disjoint(self, kind: int) -> int:
+        """How many windows of a kind share no sample with another: those that count as one each."""
+        return math.ceil(np.count_nonzero(self.kind == kind) * (1.0 - OVERLAP))
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,17 +163,17 @@ def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
     """Windows long enough for the encoder's noise to be a fiftieth of the acceleration."""
     if kind == COAST:
         share = COAST_SHARE * float(t_s[-1] - t_s[0])
-        return weak_rows(t_s, min(max(share, WIDTHS_S[0]), LONGEST_COAST_S))
+        return weak_rows(t_s, min(max(share, WIDTHS_S[0]), LONGEST_COAST_S), OVERLAP)
     sigma = white_noise_sigma(theta_rad)
     for width in WIDTHS_S:
         try:
-            weak = weak_rows(t_s, width)
+            weak = weak_rows(t_s, width, OVERLAP)
         except ValueError:
             continue
         noise = sigma * weak.noise_gain(2)
         if noise < QUIET * float(np.std(weak.integral(theta_rad, 2))):
             return weak
-    return weak_rows(t_s, WIDTHS_S[-1])
+    return weak_rows(t_s, WIDTHS_S[-1], OVERLAP)
 
 
 def _rows(

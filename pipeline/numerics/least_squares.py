@@ -48,8 +48,8 @@ def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> L
     """Weighted least squares of y [n] on design [n, k].
 
     With `sigma` (the standard deviation of each y) the covariance is (X'WX)^-1; without it, the
-    residual variance is estimated, s² = r'r/(n - k). Columns are scaled before the decomposition.
-    Reference: Golub and Van Loan, Matrix Computations, 4th ed., 5.3.
+    residual variance is estimated, s² = r'r/(n - k), infinite where n = k. Columns are scaled
+    before the decomposition. Reference: Golub and Van Loan, Matrix Computations, 4th ed., 5.3.
     """
     weight = np.ones(y.size) if sigma is None else 1.0 / np.broadcast_to(sigma, y.shape)
     rows = design * weight[:, None]
@@ -64,7 +64,7 @@ def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> L
     chi2_dof = float(np.sum((residuals * weight) ** 2) / dof) if dof > 0 else math.nan
     covariance = (right.T * inverse**2) @ right / np.outer(scale, scale)
     if sigma is None:
-        covariance = covariance * (chi2_dof if dof > 0 else math.inf)
+        covariance = covariance * chi2_dof if dof > 0 else np.full_like(covariance, math.inf)
     return LinearFit(coefficients, covariance, residuals, dof, int(keep.sum()), chi2_dof)
 
 

@@ -26,13 +26,14 @@ def needed_columns(
 
     Forward selection: the column with the largest fall of the weighted sum of squares joins while
     its F(1, n-k-1) is significant at `level` over the candidates left, at most `most` of
-    them (half of the rows by default). `dependence` rows count as one where rows are correlated.
-    Columns are kept orthogonal to those already in, so one step costs one product. References:
-    Draper and Smith, Applied Regression Analysis, 3rd ed., 15.3; Chen, Billings and Luo, Int. J.
-    Control 50(5), 1989 (orthogonal forward selection).
+    them and never more, with the base, than half of the rows that count: `dependence` rows are one
+    where they are correlated. Columns are kept orthogonal to those already in, so one step costs
+    one product. References: Draper and Smith, Applied Regression Analysis, 3rd ed., 15.3; Chen,
+    Billings and Luo, Int. J. Control 50(5), 1989 (orthogonal forward selection).
     """
     names = list(candidates)
-    most = max(0, y.size // 2 - base.shape[1]) if most is None else most
+    room = max(0, int(y.size / (2.0 * dependence)) - base.shape[1])
+    most = room if most is None else min(most, room)
     if not names or most < 1:
         return []
     basis = _basis(base / sigma[:, None])

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.drag import DRAG_FORMS, DragFit, drag_of, drag_words
+from pipeline.fit.drag import (
+    DRAG_FORMS,
+    DragFit,
+    drag_of,
+    drag_words,
+    too_short,
+    torque_is_parted,
+)
 from pipeline.fit.instruments import (
     budget_of,
     contributions,
@@ -37,6 +44,10 @@ GIVES = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
 EXPERIMENT = (
     "record a drive with iq_a and theta_mech_rad that accelerates and brakes hard in both senses "
     "(torque_shaft_nm if a load is coupled), and a spin_down from full speed"
+)
+LONGER = (
+    "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
+    "with iq_a and theta_mech_rad"
 )
 MAGNET_COEFFICIENT_1_K = -0.0011
 NUISANCES = (
@@ -73,15 +84,24 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
         note = f"{missing}; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+        return _refused(note)
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
     y, driving = rows.acceleration_rad_s2, _driving_nm(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         note = f"the drive log holds no torque; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+        return _refused(note)
+    short = too_short(rows)
+    if short:
+        return _refused(f"{short}; {LONGER}")
     found = drag_of(rows, driving, nuisances, options["level"])
+    if not torque_is_parted(found.design, found.sigma):
+        return _refused(f"the drive's torque cannot be told from its friction; {EXPERIMENT}")
     estimates = _estimates(rows, torque, found)
     return Fit(estimates, _evidence(rows, y, found))
+
+
+def _refused(note: str) -> Fit:
+    return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
 
 
 def _torque(known: Constants) -> Torque | None:

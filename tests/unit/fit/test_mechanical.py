@@ -331,6 +331,66 @@ def test_inertia_carries_the_torque_gain_and_not_the_current_gain() -> None:
     assert abs(shares.get("current@sim-1", 0.0)) < 2e-5
 
 
+def with_short_drives(captures: Campaign, start_s: float, length_s: float) -> Campaign:
+    """The same campaign with a piece of each drive."""
+    inside = pl.col("t_s").is_between(start_s, start_s + length_s)
+    cut = tuple(
+        replace(c, tables=tuple(table.filter(inside) for table in c.tables))
+        if c.meta.test == "drive"
+        else c
+        for c in captures.captures
+    )
+    return Campaign(captures.motor_id, cut)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("start_s", [0.1, 0.33, 0.6, 0.8])
+def test_a_drive_of_a_few_windows_is_refused_with_the_experiment(start_s: float) -> None:
+    """30 ms hold two windows: any column of its own would fit them without a residual."""
+    known = chain(recorded(), SPIN_DOWN, TORQUE_MAP, COGGING)
+    found = fitted(INERTIA, with_short_drives(recorded(), start_s, 0.03), known).estimates
+    assert {e.name for e in found} == {"j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad"}
+    assert {e.status for e in found} == {"not_identifiable"}
+    assert all("share no sample" in e.note for e in found)
+    assert all("record a drive of at least a second and a turn" in e.note for e in found)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("length_s", [0.06, 0.1, 0.15, 0.3])
+def test_inertia_of_a_short_drive_is_right_or_refused(length_s: float) -> None:
+    motor = design("gimbal-5208")
+    known = chain(recorded(), SPIN_DOWN, TORQUE_MAP, COGGING)
+    given = 0
+    for start_s in (0.05, 0.2, 0.35, 0.5, 0.65):
+        captures = with_short_drives(recorded(), start_s, length_s)
+        estimate = fitted(INERTIA, captures, known).estimates[0]
+        if estimate.value is None:
+            assert "record a drive" in estimate.note
+            continue
+        given += 1
+        assert abs(estimate.number - motor.j_rotor_kgm2) < 3.0 * estimate.u
+        scatter = [p.u for p in estimate.budget if p.source.startswith("scatter:inertia")]
+        assert np.linalg.norm(scatter) > 1e-6 * estimate.number
+    assert given == 5 if length_s >= 0.15 else given < 5
+
+
+def test_torque_that_is_friction_in_disguise_is_not_parted() -> None:
+    from pipeline.fit.drag import torque_is_parted
+
+    sense, speed = np.ones(40), np.linspace(1.0, 3.0, 40)
+    rest = [sense, speed]
+    assert not torque_is_parted(np.column_stack([0.2 * sense + 0.1 * speed, *rest]), sense)
+    assert torque_is_parted(np.column_stack([speed**2, *rest]), sense)
+
+
+def test_what_inertia_added_is_said_in_plain_words() -> None:
+    known = chain(recorded("windage"), SPIN_DOWN, TORQUE_MAP, COGGING, INERTIA)
+    found = known.by("inertia", "j_rotor_kgm2")
+    assert found is not None
+    assert "also fitted, because the data demand it: " in found.note
+    assert "windage" in found.note
+
+
 def test_inertia_without_a_torque_constant_says_so() -> None:
     found = fitted(INERTIA, recorded()).estimates
     assert {e.status for e in found} == {"not_identifiable"}

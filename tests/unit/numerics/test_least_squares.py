@@ -11,6 +11,7 @@ from pipeline.numerics.least_squares import (
     hac_covariance,
     linear_fit,
 )
+from pipeline.numerics.selection import needed_columns
 
 
 def text(numbers):
@@ -34,6 +35,26 @@ def test_linear_fit_matches_nist_norris():
     assert [fit.u(0), fit.u(1)] == pytest.approx([0.232818234301152, 0.429796848199937e-3])
     assert np.sqrt(fit.chi2_dof) == pytest.approx(0.884796396144373)
     assert fit.dof == 34
+
+
+@pytest.mark.filterwarnings("error")
+def test_no_freedom_is_no_certainty():
+    """Two points on a line: exact coefficients, uncertainty without bound, no warning."""
+    fit = linear_fit(np.array([[1.0, 0.0], [0.0, 1.0]]), np.array([3.0, 5.0]))
+    assert fit.coefficients == pytest.approx([3.0, 5.0])
+    assert fit.dof == 0
+    assert [fit.u(0), fit.u(1)] == [np.inf, np.inf]
+
+
+def test_correlated_rows_admit_fewer_columns():
+    """60 rows that count as six have room for three columns: the base and two, at any level."""
+    rng = np.random.default_rng(4)
+    base = np.ones((60, 1))
+    candidates = {f"c{k}": rng.standard_normal(60) for k in range(8)}
+    y = np.sum(list(candidates.values()), axis=0)
+    assert len(needed_columns(base, candidates, y, np.ones(60), 8.0, None, 10.0)) == 2
+    assert len(needed_columns(base, candidates, y, np.ones(60), 8.0, 8, 10.0)) == 2
+    assert len(needed_columns(base, candidates, y, np.ones(60), 8.0)) == 8
 
 
 def test_gauss_newton_matches_nist_misra1a():
