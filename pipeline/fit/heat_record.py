@@ -164,14 +164,18 @@ def _blocks(
     turning: bool,
     shares: tuple[float, float, float] | None,
 ) -> HeatRecord | None:
-    """Means over equal blocks of the longest settled stretch of current."""
+    """Means over equal blocks of the longest settled stretch of current.
+
+    Steady is within 2 % of the largest current: one step of a coarse converter is no change.
+    """
     second, ambient = others
     needed = ("t_s", "along_va", "square_a2", "temp_winding_degc")
     good = np.all([np.isfinite(data[n]) for n in needed], axis=0)
     data = {name: values[good] for name, values in data.items()}
     current = np.sqrt(data["square_a2"])
-    plateaus = find_plateaus(current, least=50, tolerance=0.02)
-    flowing = [p for p in plateaus if current[p.rows].mean() > 0.2 * float(current.max(initial=0))]
+    most = float(current.max(initial=0.0))
+    plateaus = find_plateaus(current, least=50, tolerance=0.02, least_span=most)
+    flowing = [p for p in plateaus if current[p.rows].mean() > 0.2 * most]
     if not flowing:
         return None
     longest = max(flowing, key=lambda p: p.size)

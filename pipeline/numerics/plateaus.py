@@ -47,14 +47,18 @@ def white_noise_sigma(signal: Array) -> float:
 
 
 def find_plateaus(
-    signal: Array, least: int = 20, window: int | None = None, tolerance: float = 0.01
+    signal: Array,
+    least: int = 20,
+    window: int | None = None,
+    tolerance: float = 0.01,
+    least_span: float = 0.0,
 ) -> tuple[Plateau, ...]:
     """Settled stretches of at least `least` rows of a stepped signal [n].
 
     A row belongs to a step where the means of the `window` rows before and after it differ by
-    more than six of their standard errors, `tolerance` of the signal's span and what rounding of
-    the running sum can make up, eps n max|x|. What is left is trimmed at its start while blocks
-    still approach the level of its later half.
+    more than six of their standard errors, `tolerance` of the signal's span (taken as
+    `least_span` where that is more) and what rounding of the running sum can make up, eps n max|x|.
+    What is left is trimmed at its start while blocks still approach the level of its later half.
     """
     n = signal.size
     if n < 2 * least:
@@ -66,7 +70,7 @@ def find_plateaus(
     jump[centre] = np.abs(
         (sums[centre + window] - 2.0 * sums[centre] + sums[centre - window]) / window
     )
-    span = float(np.ptp(signal))
+    span = max(float(np.ptp(signal)), least_span)
     sigma = white_noise_sigma(signal)
     rounding = float(np.finfo(np.float64).eps) * n * float(np.max(np.abs(signal)))
     limit = max(6.0 * sigma * math.sqrt(2.0 / window), tolerance * span, rounding)

@@ -461,6 +461,9 @@ def test_a_current_that_is_exactly_constant_is_steady():
     held = with_current(run, np.full(4000, 5.16))
     found = estimates(heat_run.ESTIMATOR, held)["temp_coeff_copper_1_k"]
     assert found.number == pytest.approx(0.0039, rel=2e-3)
+    flicker = 5.16 + 0.01 * (np.arange(4000) % 90 == 7)
+    found = estimates(heat_run.ESTIMATOR, with_current(run, flicker))["temp_coeff_copper_1_k"]
+    assert found.number == pytest.approx(0.0039, rel=2e-3)
     swept = with_current(run, 5.0 * np.sin(np.arange(4000) / 30.0))
     lost = estimates(heat_run.ESTIMATOR, swept)["temp_coeff_copper_1_k"]
     assert "no steady current found" in lost.note
