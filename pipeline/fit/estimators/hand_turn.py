@@ -72,7 +72,9 @@ def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, fl
         found = _turns(spin)
         turns += [(capture, turn) for turn in found]
         if not found:
-            notes.append(f"{capture.path}: the voltage does not stand out of the noise")
+            notes.append(
+                f"{capture.path}: the voltage does not stand out of the noise, or not for a cycle"
+            )
     if not turns:
         reason = "; ".join([*notes, EXPERIMENT])
         return Fit(tuple(not_identifiable(n, UNITS[n], NAME, reason) for n in GIVES))
@@ -219,40 +221,136 @@ def _least(value: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _by_swings(spin: Spin, channel: Channel) -> Turn | None:
-    """Half cycles between the extremes of the flux, the broken ones at both ends by arc cosine.
+    """Half cycles between the extremes of one flux, and whether its end closes on its start.
 
-    Extremes are those that the flux leaves again by more than its own noise, so that noise about
-    a standstill makes none. The line through the middles of the swings is the drift.
+    Extremes are those that the flux reaches and leaves by more than its own noise. The offset is
+    known from the rest at both ends and from the extremes, which lie at +A and -A in turn.
     """
-    flux = _flux_of(spin, channel)
-    period = float(np.median(np.diff(spin.t_s)))
-    noise = white_noise_sigma(channel.v_v) * period * math.sqrt(flux.size) / channel.gain
-    reversal = max(4.0 * noise, 0.1 * float(np.ptp(flux)))
-    turning = _extremes(flux, reversal)
-    if turning.size >= 4:
-        middles = 0.5 * (flux[turning[:-1]] + flux[turning[1:]])
-        times = 0.5 * (spin.t_s[turning[:-1]] + spin.t_s[turning[1:]])
-        line = linear_fit(np.column_stack([np.ones(times.size), times]), middles).coefficients
-        flux = flux - line[0] - line[1] * spin.t_s
-        turning = _extremes(flux, reversal)
-    if turning.size < 3:
+    v = channel.v_v
+    duration = float(np.ptp(spin.t_s))
+    rate = white_noise_sigma(v) * math.sqrt(duration / spin.t_s.size) / channel.gain
+    offset, u_offset = _rest(v)
+    flux = np.concatenate([[0.0], np.cumsum((0.5 * (v[1:] + v[:-1]) - offset) * np.diff(spin.t_s))])
+    flux = flux / channel.gain
+    noise, swing = 4.0 * rate * math.sqrt(duration), float(np.ptp(flux))
+    unsure = 3.0 * u_offset * duration / channel.gain
+    reversal = max(noise, min(0.1 * swing, max(0.005 * swing, unsure)))
+    drift, ends = 0.0, None
+    for _ in range(4):
+        straight = flux - drift * (spin.t_s - spin.t_s[0])
+        turning = _extremes(straight, reversal)
+        if turning.size < 2:
+            return _one_swing(spin, channel, straight, turning, max(reversal, unsure))
+        ends = _ends(spin.t_s, flux, turning, rate, u_offset / channel.gain)
+        drift = float(ends.coefficients[0])
+        reversal = max(noise, 0.005 * float(np.ptp(straight)))
+    if ends is None or ends.coefficients[1] <= 0.0:
         return None
-    swings = np.abs(np.diff(flux[turning]))
-    amplitude = float(np.median(swings)) / 2.0
-    whole = swings[np.abs(swings / 2.0 - amplitude) < 0.2 * amplitude]
-    amplitude = float(whole.mean()) / 2.0
-    ends = 0.0
-    for end, extreme in ((0, turning[0]), (flux.size - 1, turning[-1])):
-        sense = math.copysign(1.0, flux[extreme])
-        ends += math.acos(float(np.clip(sense * flux[end] / amplitude, -1.0, 1.0)))
-    cycles = (math.pi * (turning.size - 1) + ends) / TURN
-    scatter = float(whole.std(ddof=1)) / 2.0 if whole.size > 1 else noise
-    u = max(scatter / math.sqrt(whole.size), noise / math.sqrt(whole.size))
-    return Turn(channel.name, cycles, amplitude, u, spin.t_s, flux, np.zeros(0))
+    sense = math.copysign(1.0, straight[turning[0]] - straight[turning[1]])
+    cycles = _cycles(ends, turning.size, sense, reversal)
+    u = math.sqrt(float(ends.covariance[1, 1]) * max(1.0, _excess(ends)))
+    amplitude = float(ends.coefficients[1])
+    # Trapezoids take (omega T)²/12 off a sine; the extreme falls up to T/2 beside a sample.
+    step = float(np.max(np.abs(np.diff(flux)))) / amplitude
+    u = math.hypot(u, amplitude * step**2 / 12.0)
+    return Turn(channel.name, cycles, amplitude, u, spin.t_s, straight, np.zeros(0))
+
+
+def _one_swing(
+    spin: Spin, channel: Channel, flux: Array, turning: NDArray[np.intp], hidden_wb: float
+) -> Turn | None:
+    """One pole pair turned from an extreme over the other one back to the first.
+
+    One whole turn passes at least 2 p - 1 extremes, so a single one allows p = 1 alone; what
+    noise or an unknown offset can hide, `hidden_wb`, is all by which the ends may differ, and
+    the whole swing lies between the one seen and that much more.
+    """
+    if turning.size == 0 or abs(float(flux[-1] - flux[0])) > hidden_wb:
+        return None
+    seen = abs(float(flux[turning[0]]) - 0.5 * float(flux[0] + flux[-1]))
+    amplitude, u = 0.5 * seen + 0.25 * hidden_wb, 0.25 * hidden_wb
+    return Turn(channel.name, 1.0, amplitude, u, spin.t_s, flux, np.zeros(0))
+
+
+def _rest(v: Array) -> tuple[float, float]:
+    """Offset of a voltage at rest and its uncertainty, from the outer thirds of the quiet ends.
+
+    A hand that already moves shows as a difference between those and the whole quiet ends; for
+    a voltage that leaves rest in a straight line half of it remains in the outer thirds.
+    """
+    sigma = max(white_noise_sigma(v), 1e-12)
+    level = float(np.median(np.concatenate([v[:10], v[-10:]])))
+    loud = np.flatnonzero(np.abs(v - level) > 5.0 * sigma)
+    if loud.size == 0 or loud[0] < 3 or v.size - 1 - loud[-1] < 3:
+        return float(np.mean(v)), float(np.std(v))
+    first, last = int(loud[0]), int(v.size - 1 - loud[-1])
+    outer = np.concatenate([v[: first // 3], v[v.size - last // 3 :]])
+    quiet = np.concatenate([v[:first], v[v.size - last :]])
+    offset = float(np.mean(outer))
+    moved = 0.5 * (float(np.mean(quiet)) - offset)
+    return offset, math.hypot(sigma / math.sqrt(outer.size), moved)
+
+
+def _ends(
+    t_s: Array, flux: Array, turning: NDArray[np.intp], rate: float, u_drift: float
+) -> LinearFit:
+    """Drift [Wb/s], amplitude, flux at the start and at the end [Wb], both from the centre.
+
+    Least squares of the flux steps between the start, the extremes and the end, whose variance
+    is rate² [Wb²/s] times their duration; the rest holds the drift to `u_drift`.
+    """
+    rows = np.concatenate([[0], turning, [flux.size - 1]])
+    levels = np.zeros((rows.size, 4))
+    levels[:, 0] = t_s[rows]
+    first = math.copysign(1.0, flux[turning[0]] - flux[turning[1]])
+    levels[1:-1, 1] = first * (-1.0) ** np.arange(turning.size)
+    levels[0, 2] = levels[-1, 3] = 1.0
+    sigma = max(rate, 1e-9 * float(np.ptp(flux))) * np.sqrt(np.diff(t_s[rows]))
+    held = max(u_drift, 1e-9 * float(np.ptp(flux)))
+    return linear_fit(
+        np.vstack([np.diff(levels, axis=0), [1.0, 0.0, 0.0, 0.0]]),
+        np.append(np.diff(flux[rows]), 0.0),
+        np.append(sigma, held),
+    )
+
+
+def _excess(fit: LinearFit) -> float:
+    """Chi squared per degree of freedom, 1 where none is left."""
+    return fit.chi2_dof if fit.dof > 0 else 1.0
+
+
+def _cycles(ends: LinearFit, extremes: int, sense: float, reversal: float) -> float:
+    """Electrical cycles of the record, whole where its end closes on its start.
+
+    A whole number p has 2 p extremes and the same flux at both ends within three of its own
+    uncertainties; or, both ends on an extreme that noise hides or shows, one more or less. Else
+    the broken ends count by arc cosine. A record that falls short by whole electrical cycles, or
+    by less than its uncertainty, closes as well: only an angle could tell it from one turn.
+    """
+    _, amplitude, start, end = (float(c) for c in ends.coefficients)
+    scale = 3.0 * math.sqrt(max(1.0, _excess(ends)))
+    apart = np.array([0.0, 0.0, -1.0, 1.0])
+    closes = abs(end - start) <= scale * math.sqrt(float(apart @ ends.covariance @ apart))
+    last = sense * (-1.0) ** (extremes - 1)
+    if extremes % 2 == 0 and closes:
+        return extremes / 2.0
+    hidden = []
+    for column, level in ((2, start), (3, end)):
+        slope = np.array([0.0, 1.0, 0.0, 0.0])
+        slope[column] = -math.copysign(1.0, level)
+        u = math.sqrt(float(slope @ ends.covariance @ slope))
+        hidden.append(amplitude - abs(level) <= reversal + scale * u)
+    if extremes % 2 == 1 and all(hidden) and start * end > 0.0:
+        return (extremes - math.copysign(1.0, sense * start)) / 2.0
+    pieces = [
+        math.acos(float(np.clip(side * level / amplitude, -1.0, 1.0)))
+        for side, level in ((sense, start), (last, end))
+    ]
+    return (math.pi * (extremes - 1) + sum(pieces)) / TURN
 
 
 def _extremes(flux: Array, reversal: float) -> NDArray[np.intp]:
-    """Rows of alternating maxima and minima that are left again by at least `reversal`."""
+    """Rows of alternating maxima and minima reached and left again by at least `reversal`."""
     found: list[int] = []
     low = high = 0
     rising: bool | None = None
@@ -260,11 +358,11 @@ def _extremes(flux: Array, reversal: float) -> NDArray[np.intp]:
         low = row if flux[row] < flux[low] else low
         high = row if flux[row] > flux[high] else high
         if rising is not False and flux[high] - flux[row] > reversal:
-            if rising or high > 0:
+            if rising or flux[high] - flux[0] > reversal:
                 found.append(high)
             rising, low = False, row
         elif rising is not True and flux[row] - flux[low] > reversal:
-            if rising is False or low > 0:
+            if rising is False or flux[0] - flux[low] > reversal:
                 found.append(low)
             rising, high = True, row
     return np.array(found, dtype=np.intp)
