@@ -9,6 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.contracts.gates import wrapped_angle
+from pipeline.contracts.protocol import Passed
 from pipeline.contracts.validate import validate
 from pipeline.fit import registry
 from pipeline.fit.protocol import Estimator, Fit
@@ -59,6 +61,17 @@ def test_a_wrapped_angle_is_refused_with_its_rows(test: str) -> None:
     if refused.value.code == "wrapped_angle":
         assert refused.value.rows is not None
         assert refused.value.rows[0] == first
+
+
+def test_a_turn_made_while_rows_are_missing_is_no_wrap() -> None:
+    """A second of a spin cut out, the shaft some turns further: not a wrapped angle."""
+    healthy = simulated("open_circuit")
+    table = healthy.tables[0]
+    speed = float(np.max(np.abs(table["omega_mech_rad_s"].to_numpy())))
+    rows = max(int(2.0 * np.pi / speed / float(table["t_s"][1] - table["t_s"][0])), 5)
+    cut = pl.concat([table.head(table.height - 2 * rows), table.tail(rows)])
+    gate = wrapped_angle.GATE
+    assert gate.check(replace(healthy, tables=(cut,)), gate.settings()) == Passed()
 
 
 def test_a_constant_out_of_its_range_is_not_published(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, span_of
 from pipeline.physics.glossary import TESTS
@@ -13,15 +14,18 @@ from pipeline.records.errors import CaptureError
 
 ANGLES = ("theta_mech_rad", "theta_elec_rad")
 TURN_RAD = 2.0 * np.pi
+GAP = 2.0
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Refuses an angle that steps back by about a turn while it otherwise moves in small steps."""
+    """Refuses an angle that steps back by about a turn while it otherwise moves in small steps.
+
+    A step over missing rows says nothing: the shaft may have made the turn.
+    """
     for name in ANGLES:
         if not capture.has(name):
             continue
-        steps = np.diff(capture.arrays(name, masked=False)[name])
-        steps = np.where(np.isfinite(steps), steps, 0.0)
+        steps = _steps(capture, name)
         if steps.size < 3 or float(np.median(np.abs(steps))) > options["usual_rad"]:
             continue
         turns = np.abs(np.abs(steps) - TURN_RAD) < options["near_rad"]
@@ -34,6 +38,18 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
                 rows=(first + 1, last + 1),
             )
     return Passed()
+
+
+def _steps(capture: Capture, name: str) -> NDArray[np.float64]:
+    """Steps [n-1, rad] between neighbouring rows; 0 over a gap in time or a missing value."""
+    names = (name, "t_s") if capture.has("t_s") else (name,)
+    data = capture.arrays(*names, masked=False)
+    steps: NDArray[np.float64] = np.diff(data[name])
+    whole = np.isfinite(steps)
+    if "t_s" in data and steps.size:
+        taken_s = np.diff(data["t_s"])
+        whole &= taken_s < GAP * np.median(taken_s)
+    return np.where(whole, steps, 0.0)
 
 
 GATE = Gate(
