@@ -35,7 +35,9 @@ def write_whole(path: Path, content: bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             temporary.unlink()
-        raise MachineError(f"cannot write {path}: {error.strerror}", _remedy(error)) from error
+        raise MachineError(
+            f"cannot write {path.name} in {path.parent}: {error.strerror}", _remedy(error)
+        ) from error
 
 
 def _remedy(error: OSError) -> str:
