@@ -51,13 +51,15 @@ class Machine:
 
     `scales` [unit of the name's suffix]: the largest current, speed, torque and voltage seen,
     the sample period, and what follows from them. `torque_orders` are the orders per turn that
-    stand out of a slow turn, `slots` the nameplate's.
+    stand out of a slow turn, `slots` the nameplate's. `stated_u`: the standard uncertainty of the
+    station's gains and thermometers by the name of the nuisance that stands for each.
     """
 
     pole_pairs: int
     slots: int | None
     scales: Mapping[str, float]
     torque_orders: tuple[int, ...] = ()
+    stated_u: Mapping[str, float] = field(default_factory=dict)
 
     def scale(self, parameter: Parameter) -> float:
         """Size [parameter.unit] of one relative unit of a parameter."""

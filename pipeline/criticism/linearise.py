@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
 from pipeline.criticism.model import (
     BASE,
+    GAINS,
     Model,
     Pieces,
     effect_flux,
@@ -33,6 +34,7 @@ _ALLOWANCE = 5e-5
 _MODEL_DRIVE = 1e-4
 _MODEL_BENCH = 2e-5
 _OFFSET = 0.5
+_ROUGH = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +116,14 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
     return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
+
+
+def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
+    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
+    _, _, _, groups = row_index(segment)
+    scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
+    floor: Array = _ROUGH * _gain(segment) * np.array(scales)
+    return floor
 
 
 def linearise(
@@ -259,6 +269,8 @@ class _Sampler:
         return self._hook(column, column.effect)
 
     def _base(self, column: Column) -> Array | None:
+        if column.name in GAINS:
+            return self._gain(column)
         if column.name not in _NEEDS[self.segment.kind]:
             return None
         moved = {**self.values, column.name: self.values[column.name] + column.step}
@@ -268,6 +280,25 @@ class _Sampler:
             return (there - start) / column.step
         x = replace(self.x, base=moved)
         there = predicted(self.segment, x, evaluate(self.model, x, moved), self.model, moved)
+        return -(there - self.start) / column.step
+
+    def _gain(self, column: Column) -> Array | None:
+        """Along a gain of the station: of the prediction, or what it does to current and heat."""
+        kind, moved = self.segment.kind, dict(self.values)
+        heard = {
+            "gain_torque": "torque_shaft_nm" in self.segment.channels,
+            "gain_lcr": kind == "lcr",
+            "gain_current": kind in ("dq", "terminal", "flux_map"),
+            "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
+            self.segment.meter: kind in ("dq", "open", "terminal", "flux_map"),
+        }
+        if not heard.get(column.name, False):
+            return None
+        moved[column.name] += column.step
+        if column.name in ("gain_current", "offset_temp_k"):
+            return (residual(self.segment, self.model, moved) - self.here) / column.step
+        pieces = evaluate(self.model, self.x, moved)
+        there = predicted(self.segment, self.x, pieces, self.model, moved)
         return -(there - self.start) / column.step
 
     def _anew(self, column: Column) -> Array | None:

@@ -58,7 +58,14 @@ BASE: tuple[Constant, ...] = (
     Constant("ripple_shift", "1", "T_s dω_e/dt ψ, angle against voltage", 0.15, hook="hold"),
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", 0.3, hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
+    Constant("gain_current", "1", "gain of the current sensors", 0.01, hook="gain"),
+    Constant("gain_voltage", "1", "gain of the bench's voltmeters", 0.01, hook="gain"),
+    Constant("gain_commanded", "1", "gain of a drive's own voltage", 0.01, hook="gain"),
+    Constant("gain_torque", "1", "gain of the torque transducer", 0.01, hook="gain"),
+    Constant("gain_lcr", "1", "gain of the LCR meter", 0.01, hook="gain"),
+    Constant("offset_temp_k", "K", "offset of the thermometers", 2.0, hook="gain"),
 )
+GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 
 
@@ -75,6 +82,15 @@ class Model:
             f"{effect.name}.{parameter.name}": (effect, parameter)
             for effect in self.effects
             for parameter in effect.parameters_of(self.machine)
+        }
+
+    def priors(self) -> dict[str, tuple[float, float]]:
+        """Centre and standard uncertainty of every nuisance: what the station states of its own
+        instruments, else the constant's own.
+        """
+        stated = self.machine.stated_u
+        return {
+            c.name: (c.center, stated.get(c.name, c.prior)) for c in BASE if c.prior != _FREE
         }
 
     def with_effects(self, *effects: Effect) -> Model:

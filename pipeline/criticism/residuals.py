@@ -106,8 +106,8 @@ def _operating(
         eps_rad=model.machine.pole_pairs * theta,
         theta_rad=theta,
         omega_rad_s=omega,
-        winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size),
-        magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size),
+        winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
+        magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size, values),
         travel_rad=_travel(signals, theta.size),
         inverter=segment.kind == "dq",
         ts_s=segment.ts_s,
@@ -115,10 +115,12 @@ def _operating(
     )
 
 
-def _warmth(segment: Segment, signals: Mapping[str, Array], name: str, size: int) -> Array:
+def _warmth(
+    segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
+) -> Array:
     if name not in signals:
         return np.full(size, segment.fixed["ambient_k"])
-    return signals[name] - 25.0
+    return signals[name] - 25.0 - values["offset_temp_k"]
 
 
 def _travel(signals: Mapping[str, Array], size: int) -> Array:
@@ -141,6 +143,7 @@ def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> R
 
 
 def _true_current(recorded: Recorded, model: Model, values: Values) -> Complex:
+    recorded = replace(recorded, i_a=recorded.i_a / (1.0 + values["gain_current"]))
     for effect in model.effects:
         if effect.current is not None:
             q = values_of(effect, model.machine, values)
@@ -291,6 +294,7 @@ def _shaft_torque(
         for effect in model.effects:
             if effect.shaft is not None:
                 shaft = effect.shaft(shaft, values_of(effect, model.machine, values))
+        shaft = shaft * (1.0 + values["gain_torque"])
     return shaft
 
 
@@ -371,7 +375,7 @@ def _recorded_voltage(
             voltage = effect.voltage(voltage, x, q, segment.instrument)
     if segment.kind in ("dq", "open") and any(e.angle is not None for e in model.effects):
         voltage = voltage * np.exp(-1j * _angle_error(x, model, values))
-    return voltage
+    return voltage * (1.0 + values[segment.meter])
 
 
 def _predict_lcr(segment: Segment, x: Operating, model: Model, values: Values) -> Array:
@@ -391,4 +395,5 @@ def _predict_lcr(segment: Segment, x: Operating, model: Model, values: Values) -
         "lab_h": ((sides[0].psi_wb - sides[1].psi_wb) / (2 * probe) * back).real,
         "rab_ohm": ((sides[0].drop_v - sides[1].drop_v) / (2 * probe) * back).real,
     }
-    return np.stack([rows[channel] for channel in segment.channels])
+    gain = 1.0 + values["gain_lcr"]
+    return gain * np.stack([rows[channel] for channel in segment.channels])

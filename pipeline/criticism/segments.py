@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.noise import sensor_noise
-from pipeline.criticism.traces import decimated, even_clock, smoothed, thinned, travel
+from pipeline.criticism.traces import PAD, decimated, even_clock, smoothed, thinned, travel
 from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Campaign, Capture
 
@@ -22,6 +22,7 @@ _WINDOW_S = 0.02
 _WINDOW_SAMPLES = 40
 _SMOOTHING_S = 0.05
 _STEP_WINDOW_S = 0.002
+_FEW = 12
 _SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 
 
@@ -31,7 +32,8 @@ class Segment:
 
     `recorded` holds capture columns on an even clock of period `ts_s`; `noise` the standard
     deviation of each one's sensor. `channels` are the equations: the recorded signal that each
-    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`).
+    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` the
+    nuisance that is its voltmeter's gain.
     """
 
     capture: str
@@ -45,6 +47,7 @@ class Segment:
     channels: tuple[str, ...]
     weak: Projection | None
     fixed: Mapping[str, float] = field(default_factory=dict)
+    meter: str = "gain_voltage"
 
     @property
     def size(self) -> int:
@@ -76,6 +79,23 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
             if segment is not None and (segment.weak is None or segment.weak.starts.size):
                 made.append(segment)
     return tuple(made)
+
+
+def sparse(segment: Segment) -> Segment:
+    """The same segment with a few of its windows only, for a first, rough fit."""
+    weak = segment.weak
+    if weak is None or weak.starts.size <= _FEW:
+        return segment
+    chosen = np.linspace(0, weak.starts.size - 1, _FEW).round().astype(np.int64)
+    starts = weak.starts[chosen]
+    rows = (starts[:, None] - PAD + np.arange(weak.length + 2 * PAD)[None, :])
+    rows = np.clip(rows, 0, segment.size - 1).ravel()
+    cut = {name: column[rows] for name, column in segment.recorded.items()}
+    moved = PAD + (weak.length + 2 * PAD) * np.arange(_FEW)
+    few = replace(
+        weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen]
+    )
+    return replace(segment, recorded=cut, weak=few)
 
 
 def electrical_orders(machine: Machine) -> tuple[int, ...]:
@@ -163,6 +183,7 @@ def _segment(
         channels,
         weak,
         {"ambient_k": ambient, **fixed},
+        "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage",
     )
 
 

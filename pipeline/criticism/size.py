@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
@@ -41,7 +41,40 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
         "flux_wb": psi,
     }
     orders = torque_orders(campaign.of("cogging"))
-    return Machine(pole_pairs, int(str(slots)) if slots else None, scales, orders)
+    return Machine(
+        pole_pairs, int(str(slots)) if slots else None, scales, orders, stated_u(campaign)
+    )
+
+
+def stated_u(campaign: Campaign) -> dict[str, float]:
+    """Standard uncertainty of the station's gains [1] and thermometers [K], by nuisance.
+
+    The largest that the captures state; what none of them states is not in it.
+    """
+    found: dict[str, float] = {}
+    for capture in campaign.captures:
+        meta = capture.meta
+        volts = "gain_commanded" if meta.voltage_kind == "commanded" else "gain_voltage"
+        for name, u in (
+            ("gain_current", meta.u_rel_current),
+            (volts, meta.u_rel_voltage),
+            ("gain_torque", meta.u_rel_torque),
+            ("offset_temp_k", meta.u_temp_degc),
+            ("gain_lcr", _u_lcr(meta)),
+        ):
+            if u:
+                found[name] = max(found.get(name, 0.0), u)
+    return found
+
+
+def _u_lcr(meta: CaptureMeta) -> float | None:
+    """Gain of an LCR meter: as stated, else that of the voltage and current it is made of."""
+    if meta.test != "lcr":
+        return None
+    try:
+        return float(meta.extra["u_rel_lcr"])
+    except (KeyError, ValueError):
+        return math.hypot(meta.u_rel_voltage or 0.0, meta.u_rel_current or 0.0)
 
 
 def base_scales(machine: Machine) -> dict[str, float]:

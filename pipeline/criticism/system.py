@@ -17,16 +17,18 @@ from pipeline.criticism.linearise import (
     effect_columns,
     linearise,
     noise_floor,
+    rough_floor,
     zero,
 )
 from pipeline.criticism.model import BASE, Model
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segments import Segment, sparse
 from pipeline.criticism.size import base_scales
 
 _TIE = 1e-11
 _ITERATIONS = 8
 _SEED = 20260302
 _THREADS = 2
+_MOVED = 0.05
 _STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm", "j_kgm2")
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 _CONVERGED = 1.0
@@ -196,8 +198,8 @@ def system(
 ) -> System:
     """Linearises every segment around a fit, along its own columns and those of candidates.
 
-    Columns of hooks that are linear stay as they were in `before`, a system around a fit with the
-    same noise floor and the same sensor effects.
+    Columns of hooks that are linear stay as they were in `before`, a system around a near fit with
+    the same noise floor.
     """
     model, values = fitted.model, fitted.values
     columns = [*own_columns(model), *candidates]
@@ -210,7 +212,7 @@ def system(
     for place, column in enumerate(columns):
         old = known.get(column.key)
         matrix[:, place] = made[:, fresh[column.key]] if old is None else old
-    penalty, pull = _priors(columns, values)
+    penalty, pull = _priors(model, columns, values)
     first, labels, groups = 0, [], []
     for number, one in enumerate(rows):
         labels += [(number, channel, order) for channel, order in one.groups]
@@ -232,14 +234,14 @@ def system(
 
 
 def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
-    """Columns of an earlier system that hold at a new fit too."""
+    """Columns of an earlier system that hold at a new fit too.
+
+    A stale column costs no accuracy: a fit ends where the residual, which is always computed anew,
+    has nothing left along the columns, and those of two near fits span nearly the same space.
+    """
     if before is None or before.around.sigma is not fitted.sigma:
         return {}
-    sensors = [
-        tuple(e.name for e in f.model.effects if e.hook == "sensor")
-        for f in (before.around, fitted)
-    ]
-    if sensors[0] != sensors[1] or _moved_base(before.around.values, fitted.values):
+    if _moved_base(before.around.values, fitted.values):
         return {}
     return {
         column.key: before.matrix[:, place]
@@ -249,8 +251,8 @@ def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
 
 
 def _moved_base(before: Values, now: Values) -> bool:
-    """Whether a physical constant moved by more than a hundredth since."""
-    return any(abs(now[n] - before[n]) > 1e-2 * abs(before[n]) for n in _STEADY)
+    """Whether a physical constant moved by more than a twentieth since."""
+    return any(abs(now[n] - before[n]) > _MOVED * abs(before[n]) for n in _STEADY)
 
 
 def _linear(column: Column, model: Model) -> bool:
@@ -264,14 +266,16 @@ def _linear(column: Column, model: Model) -> bool:
     return effect.hook != "sensor" and not shaped
 
 
-def _priors(columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
+def _priors(
+    model: Model, columns: Sequence[Column], values: Values
+) -> tuple[Array, Array]:
     penalty, pull = np.zeros(len(columns)), np.zeros(len(columns))
-    priors = {c.name: c for c in BASE if np.isfinite(c.prior)}
+    priors = model.priors()
     for place, column in enumerate(columns):
-        constant = priors.get(column.name)
-        if constant is not None:
-            penalty[place] = constant.prior**-2
-            pull[place] = (values[column.name] - constant.center) * constant.prior**-2
+        if column.name in priors:
+            center, u = priors[column.name]
+            penalty[place] = u**-2
+            pull[place] = (values[column.name] - center) * u**-2
     return penalty, pull
 
 
@@ -334,8 +338,14 @@ def _moved(fitted: Fitted, columns: Sequence[Column], step: Array) -> Fitted:
 
 
 def first_fit(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System]:
-    """Fits a model from orders of magnitude: three steps that renew the noise floor, then more."""
+    """Fits a model from orders of magnitude.
+
+    First every equation counts by the machine's own scale, on a few windows of each segment: by
+    its noise floor, one that misses it by far would be given up before the constants are near.
+    """
     values = start_values(model, model.machine)
-    fitted = Fitted(model, values, floors(segments, model, values))
-    fitted, around = gauss_newton(segments, fitted, renew=True, iterations=3)
-    return gauss_newton(segments, fitted, before=around)
+    few = [sparse(segment) for segment in segments]
+    rough = tuple(rough_floor(segment, model, values) for segment in few)
+    near, _ = gauss_newton(few, Fitted(model, values, rough))
+    floor = floors(segments, model, near.values)
+    return gauss_newton(segments, replace(near, sigma=floor))

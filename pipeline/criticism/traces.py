@@ -12,7 +12,7 @@ from pipeline.numerics.projection import window_starts
 from pipeline.records.capture import Capture
 
 _MOST_WINDOWS = 48
-_PAD = 24
+PAD = 24
 _SENSE_S = 0.001
 
 
@@ -86,9 +86,9 @@ def thinned(
     samples on each side of a window keep what is smoothed or differenced out of its weights.
     """
     starts = window_starts(keep, length, length, _MOST_WINDOWS)
-    if starts.size * (length + 2 * _PAD) >= keep.size:
+    if starts.size * (length + 2 * PAD) >= keep.size:
         return dict(found), window_starts(keep, length)
-    starts = starts[(starts >= _PAD) & (starts + length + _PAD <= keep.size)]
-    rows = (starts[:, None] - _PAD + np.arange(length + 2 * _PAD)[None, :]).ravel()
+    starts = starts[(starts >= PAD) & (starts + length + PAD <= keep.size)]
+    rows = (starts[:, None] - PAD + np.arange(length + 2 * PAD)[None, :]).ravel()
     cut = {name: column[rows] for name, column in found.items()}
-    return cut, _PAD + (length + 2 * _PAD) * np.arange(starts.size)
+    return cut, PAD + (length + 2 * PAD) * np.arange(starts.size)

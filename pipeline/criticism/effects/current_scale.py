@@ -17,8 +17,8 @@ EFFECT = Effect(
     experiment="the current reading against a second, calibrated meter",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
-        Parameter("gain_drive", "1", 0.02, 0.004, low=-0.5, high=0.5),
-        Parameter("gain_bench", "1", 0.02, 0.004, low=-0.5, high=0.5),
+        Parameter("gain_drive", "1", 0.02, 0.006, low=-0.5, high=0.5),
+        Parameter("gain_bench", "1", 0.02, 0.006, low=-0.5, high=0.5),
     ),
     rivals={
         "voltage_scale": "resistance known to 0.2 % from a four-wire meter",

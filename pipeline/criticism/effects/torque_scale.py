@@ -16,7 +16,7 @@ EFFECT = Effect(
     tests=("torque_map",),
     experiment="a calibrated weight on a lever arm",
     reference="IEEE 1812-2014, 5: dynamometer tests of permanent magnet machines",
-    parameters=(Parameter("gain", "1", 0.02, 0.004, low=-0.5, high=0.5),),
+    parameters=(Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),),
     signals=("torque_shaft_nm",),
     rivals={
         "current_scale": "resistance known to 0.2 % from a four-wire meter",

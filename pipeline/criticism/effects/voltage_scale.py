@@ -17,8 +17,8 @@ EFFECT = Effect(
     experiment="the voltage reading against a second, calibrated meter",
     reference="JCGM 100:2008, 4.3 (a gain is common to all samples)",
     parameters=(
-        Parameter("gain_drive", "1", 0.02, 0.004, low=-0.5, high=0.5),
-        Parameter("gain_bench", "1", 0.02, 0.004, low=-0.5, high=0.5),
+        Parameter("gain_drive", "1", 0.02, 0.006, low=-0.5, high=0.5),
+        Parameter("gain_bench", "1", 0.02, 0.006, low=-0.5, high=0.5),
     ),
     rivals={
         "current_scale": "resistance known to 0.2 % from a four-wire meter",
