@@ -120,7 +120,8 @@ class Recorded:
     """What sensor hooks may correct: complex dq current [A], shaft torque [N·m], on one clock.
 
     `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument` tells the
-    instruments of one bench apart (`drive` or `bench`).
+    instruments of one bench apart (`drive` or `bench`), `phase` (0, 1, 2) whose line current a
+    two-terminal test recorded.
     """
 
     i_a: Complex
@@ -130,6 +131,7 @@ class Recorded:
     ts_s: float
     inverter: bool
     instrument: str
+    phase: int | None = None
 
 
 Values = Mapping[str, float]

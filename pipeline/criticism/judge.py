@@ -54,7 +54,7 @@ def leave_out(around: System, own: int) -> HeldOut:
             continue
         step = -(inverse @ ((slope - weighted[mine].T @ around.residual[mine]) / scale)) / scale
         left[mine] = around.residual[mine] + matrix[mine] @ step
-    told = left[np.isfinite(left)]
+    told = (left / around.soft)[np.isfinite(left)]
     total = math.sqrt(float((told**2).mean())) if told.size else math.nan
     return HeldOut(left, total)
 
@@ -91,13 +91,13 @@ def remainder(
     error below a two-thousandth of the machine's voltage or torque is nobody's concern.
     """
     found = []
-    spreads, counts = around.spreads(residual), around.counts
+    spreads, counts = around.spreads(residual / around.soft), around.counts
     for place, (number, channel, order) in enumerate(around.labels):
         n, q = counts[place], spreads[place]
         if n == 0 or q <= 1.0 + max(_OVER, 5.0 * math.sqrt(2.0 / n)):
             continue
         mine = around.group == place
-        unit = float((around.unit[mine] ** 2).mean())
+        unit = float(((around.unit * around.soft)[mine] ** 2).mean())
         more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
         if size > material_size(segments[number], channel, around):

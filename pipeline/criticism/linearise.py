@@ -24,6 +24,7 @@ from pipeline.criticism.model import (
     mean_current,
     values_of,
 )
+from pipeline.criticism.noise import rounding_error
 from pipeline.criticism.residuals import RIPPLES, measured, operate, predicted, residual
 from pipeline.criticism.segments import Segment
 
@@ -34,7 +35,9 @@ _ALLOWANCE = 5e-5
 _MODEL_DRIVE = 1e-4
 _MODEL_BENCH = 2e-5
 _OFFSET = 0.5
+_ZERO = 2e-3
 _ROUGH = 0.05
+_FORM = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,8 @@ class Rows:
     """Weak samples of one segment: residual [R] and columns [R, P], both over the noise.
 
     `group` [R] numbers (channel, order) pairs listed in `groups`; `window` [R] the window; `unit`
-    [R] is the size of one noise unit as a window's mean, in the signal's own unit.
+    [R] is what a residual of one is as a window's mean, in the signal's own unit; `soft` [R] the
+    noise floor over what rows are divided by, below 1 where a tolerance of form is in it.
     """
 
     residual: Array
@@ -68,6 +72,7 @@ class Rows:
     group: NDArray[np.int64]
     window: NDArray[np.int64]
     unit: Array
+    soft: Array
     groups: tuple[tuple[str, int], ...]
 
 
@@ -99,8 +104,8 @@ def row_index(
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
     """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
 
-    White noise of each sensor's own level is added to the recording and the residual computed
-    again; the variance of the change is pooled over windows of one (channel, order).
+    White noise of each sensor's own level, and the rounding of an angle that is rounded, is added
+    to the recording and the residual computed again; the variance of the change is pooled over windows of one (channel, order).
     """
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
@@ -112,6 +117,10 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
             name: column + generator.normal(0.0, segment.noise.get(name, 0.0), column.size)
             for name, column in segment.recorded.items()
         }
+        if segment.angle_step_rad:
+            theta = segment.recorded["theta_mech_rad"]
+            shift = generator.uniform(-0.5, 0.5)
+            noisy["theta_mech_rad"] = theta + rounding_error(theta, segment.angle_step_rad, shift)
         change = projected(segment, residual(segment, model, values, noisy)) - plain
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
@@ -126,13 +135,39 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
     return floor
 
 
+def form_tolerance(
+    segment: Segment, model: Model, values: Values, added: Sequence[Effect]
+) -> Array:
+    """What the forms of the effects that were added may be wrong by [groups], as weak samples.
+
+    No formula of an effect is better than a fiftieth of what the effect does. Error below that,
+    where a found effect acts, tells of its form and names no further effect.
+    """
+    group, _, valid, groups = row_index(segment)
+    total = np.zeros(len(groups))
+    here = residual(segment, model, values) if added else np.zeros(0)
+    for effect in added:
+        without = residual(segment, model, {**values, **zero(effect, model)})
+        power = projected(segment, without - here)[valid] ** 2
+        count = np.bincount(group[valid], minlength=len(groups))
+        total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
+    floor: Array = _FORM * np.sqrt(total)
+    return floor
+
+
 def linearise(
-    segment: Segment, model: Model, values: Values, columns: Sequence[Column], sigma: Array
+    segment: Segment,
+    model: Model,
+    values: Values,
+    columns: Sequence[Column],
+    sigma: Array,
+    tolerance: Array,
 ) -> Rows:
     """Whitened residual and columns of one segment at `values`."""
     group, window, valid, groups = row_index(segment)
     here = residual(segment, model, values)
-    whiten = 1.0 / np.hypot(sigma[group[valid]], reading_error(segment, model, values)[valid])
+    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, values)[valid])
+    whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
     kept = np.zeros((int(valid.sum()), len(columns)))
     pending: list[tuple[int, Array]] = []
 
@@ -156,7 +191,8 @@ def linearise(
     for offset in _offsets(segment, valid, whiten):
         both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
     unit = 1.0 / (whiten * _gain(segment))
-    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, groups)
+    soft = floor * whiten
+    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, groups)
 
 
 def _gain(segment: Segment) -> float:
@@ -213,6 +249,8 @@ def _offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[
     for place, channel in enumerate(segment.channels):
         names = ("vab_v",) if segment.kind == "open" else (channel,)
         prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
+        if segment.kind == "terminal":
+            prior = math.hypot(prior, _ZERO * float(np.abs(segment.recorded[channel]).max()))
         if segment.kind == "open" or prior == 0.0:
             continue
         constant = np.zeros((len(segment.channels), segment.size))

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.criticism.effect import Array
 
 _BLOCK = 48
+_SMOOTH = 21
 _QUIET = (0.3, -0.5244)
 _STEADY = (0.6, 0.2533)
 
@@ -39,10 +40,33 @@ def sensor_noise(signal: Array, steady: bool = False) -> float:
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 
+def rounding_error(signal: Array, step: float, shift: float) -> Array:
+    """What rounding to multiples of `step` does to a signal [n] like this one [its unit].
+
+    The recorded signal, smoothed, is rounded anew, moved by `shift` steps. Of a steady motion that
+    is no white noise: it is a saw-tooth whose beat with the sampling may fall on any order.
+    """
+    kernel = np.full(_SMOOTH, 1.0 / _SMOOTH)
+    padded = np.pad(signal / step, _SMOOTH // 2, mode="reflect", reflect_type="odd")
+    smooth = np.convolve(padded, kernel, mode="valid") + shift
+    error: Array = (np.round(smooth) - smooth) * step
+    return error
+
+
+def rounding_step(signal: Array) -> float:
+    """The step of a signal whose noise is nothing but its rounding, 0 of another one."""
+    third = np.diff(signal, 3)
+    step = _rounding(third)
+    if step == 0.0:
+        return 0.0
+    return step if float(np.median(np.abs(third))) <= 4.0 * step else 0.0
+
+
 def _rounding(third: Array) -> float:
     """The step of a quantised signal: its third differences are whole multiples of it."""
     steps = np.abs(third)
-    steps = steps[steps > 0]
+    # what floating point leaves of a zero is no step
+    steps = steps[steps > 1e-6 * steps.max()] if steps.size else steps
     if steps.size < 16:
         return 0.0
     step = float(np.quantile(steps, 0.02))

@@ -172,7 +172,10 @@ def _operate_still(
             * signals["i_pair_a"]
             * np.exp(1j * (segment.fixed["pair_rad"] - math.pi / 6))
         )
-        bench = Recorded(stationary, zero, eps, zero, segment.ts_s, False, segment.instrument)
+        phase = int(segment.fixed["phase"])
+        bench = Recorded(
+            stationary, zero, eps, zero, segment.ts_s, False, segment.instrument, phase
+        )
         current = _true_current(bench, model, values) * np.exp(-1j * eps)
         freq = zero
     elif segment.kind == "lcr":

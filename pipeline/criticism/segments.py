@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.noise import sensor_noise
+from pipeline.criticism.noise import rounding_step, sensor_noise
 from pipeline.criticism.traces import PAD, decimated, even_clock, smoothed, thinned, travel
 from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Campaign, Capture
@@ -33,7 +33,8 @@ class Segment:
     `recorded` holds capture columns on an even clock of period `ts_s`; `noise` the standard
     deviation of each one's sensor. `channels` are the equations: the recorded signal that each
     predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` the
-    nuisance that is its voltmeter's gain.
+    nuisance that is its voltmeter's gain; `angle_step_rad` is the resolution of an angle whose
+    noise is its rounding.
     """
 
     capture: str
@@ -48,6 +49,7 @@ class Segment:
     weak: Projection | None
     fixed: Mapping[str, float] = field(default_factory=dict)
     meter: str = "gain_voltage"
+    angle_step_rad: float = 0.0
 
     @property
     def size(self) -> int:
@@ -184,6 +186,7 @@ def _segment(
         weak,
         {"ambient_k": ambient, **fixed},
         "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage",
+        rounding_step(found["theta_mech_rad"]) if "theta_mech_rad" in found else 0.0,
     )
 
 
@@ -288,7 +291,7 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
     noise = _prepared(found, period)
-    fixed = {"pair_rad": _PAIR_RAD[pair]}
+    fixed = {"pair_rad": _PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:
             return None

@@ -19,17 +19,21 @@ from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.linearise import Column, effect_columns, zero
 from pipeline.criticism.segments import Segment
 from pipeline.criticism.system import (
+    Descent,
     Fitted,
     System,
+    clipped,
     gauss_newton,
     own_columns,
     system,
+    tolerances,
 )
 
 LEAST_SHARE = 0.1
 TIE = 12.0
 _MOST = 8
 _REFITS = 3
+_ROUNDS = 2
 _CLOSE = 0.7
 _WORTH = 30.0
 _GLANCE = ((1.0,), 3)
@@ -50,15 +54,16 @@ class Candidate:
 class Score:
     """What a candidate would do, to first order.
 
-    `fall` is the fall of χ², `price` what its parameters and the search cost, `step` its own
-    parameters, `share` the part of the removable excess of the channel it helps most, `size` the
-    largest of its amplitudes over its negligible size.
+    `fall` is the fall of misfit, `price` what its parameters and the search cost, `step` its own
+    parameters, `moves` how the model's own move with it, `share` the part of the removable excess
+    of the channel it helps most, `size` the largest of its amplitudes over its negligible size.
     """
 
     candidate: Candidate
     fall: float
     price: float
     step: Mapping[str, float]
+    moves: Mapping[str, float]
     share: float
     size: float
 
@@ -76,6 +81,21 @@ class Rung:
     fitted: Fitted
     around: System
     scores: tuple[Score, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How well a fit stands: misfit, χ²/n [G] of every group, cost of the priors."""
+
+    misfit: float
+    spreads: Array
+    prior_cost: float
+
+    @classmethod
+    def of(cls, around: System, places: NDArray[np.int64], end: Descent) -> Standing:
+        """Where a descent along `places` left the system."""
+        cost = float(around.prior_costs(places, end.step).sum())
+        return cls(end.misfit, around.spreads(end.residual), cost)
 
 
 def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate, ...]:
@@ -109,7 +129,7 @@ def widened(
 def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> tuple[Score, ...]:
     """Every candidate's score, the best fall first; of one effect the best shape only."""
     own = np.arange(len(own_columns(fitted.model)))
-    before = around.spreads(around.best(own)[1])
+    before = Standing.of(around, own, around.best(own))
     price = math.log(float(around.size))
     search_price = 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
     best: dict[str, Score] = {}
@@ -134,7 +154,7 @@ def _score(
     own: NDArray[np.int64],
     places: NDArray[np.int64],
     candidate: Candidate,
-    before: Array,
+    before: Standing,
     effort: tuple[tuple[float, ...], int],
 ) -> Score | None:
     """Score of one candidate with parameters on the wrong side of a bound left at zero."""
@@ -145,8 +165,8 @@ def _score(
     }
     live = places
     while live.size:
-        step, left = around.best(np.concatenate([own, live]), *effort)
-        mine = dict(zip((around.columns[n].name for n in live), step[own.size :], strict=True))
+        end = around.best(np.concatenate([own, live]), *effort)
+        mine = dict(zip((around.columns[n].name for n in live), end.step[own.size :], strict=True))
         wrong = [
             n
             for n in live
@@ -162,31 +182,30 @@ def _score(
         for name, value in mine.items()
         if known[name][0].negligible > 0
     ]
-    after = around.spreads(left)
-    fall = around.misfit_of(before) - around.misfit_of(after)
+    after = Standing.of(around, np.concatenate([own, live]), end)
+    fall = before.misfit - after.misfit
     share = _share(around, candidate.effect, before, after)
-    return Score(candidate, fall, 0.0, mine, share, max(sizes, default=math.inf))
+    names = (around.columns[n].name for n in own)
+    moves = dict(zip(names, end.step[: own.size].tolist(), strict=True))
+    return Score(candidate, fall, 0.0, mine, moves, share, max(sizes, default=math.inf))
 
 
 def _outside(value: float, parameter: Parameter) -> bool:
     return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
 
 
-def _share(around: System, effect: Effect, before: Array, after: Array) -> float:
-    """Largest share of the removable misfit that went away: of one recorded signal, or of the
-    captures of the tests that excite the effect.
+def _share(around: System, effect: Effect, before: Standing, after: Standing) -> float:
+    """Largest share of the removable misfit that went away: of one recorded signal, of the
+    captures of the tests that excite the effect, or of what the priors of the station cost.
     """
-    excess = around.counts * np.log(np.maximum(before, 1.0))
-    left = around.counts * np.log(np.maximum(after, 1.0))
+    excess = around.counts * np.log(np.maximum(before.spreads, 1.0))
+    left = around.counts * np.log(np.maximum(after.spreads, 1.0))
     channel = np.array([name for _, name, _ in around.labels])
     places = [channel == name for name in dict.fromkeys(channel.tolist())]
     places.append(np.array([around.tests[n] in effect.tests for n, _, _ in around.labels]))
-    shares = []
-    for inside in places:
-        had = float(excess[inside].sum())
-        if had > _WORTH:
-            shares.append(1.0 - float(left[inside].sum()) / had)
-    return max(shares, default=0.0)
+    pairs = [(float(excess[inside].sum()), float(left[inside].sum())) for inside in places]
+    pairs.append((before.prior_cost, after.prior_cost))
+    return max((1.0 - still / had for had, still in pairs if had > _WORTH), default=0.0)
 
 
 def search(
@@ -195,41 +214,55 @@ def search(
     """The ladder: adds the best effect, refits, checks backwards, until nothing passes."""
     rungs: list[Rung] = []
     base = len(fitted.model.effects)
-    refused: set[str] = set()
     for _ in range(_MOST):
         offered = candidates(library, fitted)
         wide = widened(segments, fitted, offered, rungs[-1].around if rungs else None)
         scores = score_all(wide, fitted, offered)
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
-        passing = [s for s in scores if s.passes and s.candidate.effect.name not in refused]
-        if not passing:
-            break
-        chosen = _refit_best(segments, fitted, passing, wide)
+        chosen = _chosen(segments, fitted, [s for s in scores if s.passes], wide)
         if chosen is None:
-            refused |= {s.candidate.effect.name for s in passing[:_REFITS]}
-            continue
+            break
         fitted, _ = _backward(segments, *chosen, base)
-        now = tuple(e.name for e in fitted.model.effects[base:])
-        if now in {r.added for r in rungs}:
+        found = fitted.model.effects[base:]
+        fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))
+        if tuple(e.name for e in found) in {r.added for r in rungs}:
             break
     return tuple(rungs)
+
+
+def _chosen(
+    segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score], wide: System
+) -> tuple[Fitted, System] | None:
+    """The first few candidates refitted, the next few where none of these keeps its promise.
+
+    The fit that stays is finished with columns of its own.
+    """
+    for first in range(0, min(len(passing), _ROUNDS * _REFITS), _REFITS):
+        best = _refit_best(segments, fitted, passing[first : first + _REFITS], wide)
+        if best is not None:
+            return gauss_newton(segments, best[0])
+    return None
 
 
 def _refit_best(
     segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score], wide: System
 ) -> tuple[Fitted, System] | None:
-    """Refits with the best candidates, those close to the best fall, and takes the best."""
-    close = [s for s in passing[:_REFITS] if s.fall >= _CLOSE * passing[0].fall]
+    """Refits with the best candidates, those close to the best fall, and takes the best.
+
+    A candidate must keep the promise of its score: the misfit falls by more than its price.
+    """
+    close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
     least = math.inf
     for score in close:
         effect = score.candidate.effect
         model = fitted.model.with_effects(effect)
-        values = {**fitted.values, **score.candidate.values, **score.step}
+        moved = {name: fitted.values[name] + change for name, change in score.moves.items()}
+        values = clipped(model, {**moved, **score.candidate.values, **score.step})
         tried = gauss_newton(segments, replace(fitted, model=model, values=values), before=wide)
         cost = tried[1].misfit + score.price
-        if material(tried[0], effect) and cost < least:
+        if material(tried[0], effect) and cost < min(least, wide.misfit):
             best, least = tried, cost
     return best
 
@@ -291,5 +324,4 @@ def loss_without(
     names_out = [around.columns[n].name for n in out]
     move = np.array([-fitted.values[n] if amplitude[n] else 0.0 for n in names_out])
     moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
-    here = around.misfit_of(around.spreads(around.residual))
-    return moved.misfit_of(moved.spreads(moved.best(stay, *_THOROUGH)[1])) - here
+    return moved.best(stay, *_THOROUGH).misfit - around.misfit

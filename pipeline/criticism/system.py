@@ -15,6 +15,7 @@ from pipeline.criticism.linearise import (
     Column,
     base_columns,
     effect_columns,
+    form_tolerance,
     linearise,
     noise_floor,
     rough_floor,
@@ -39,11 +40,27 @@ _SETTLED = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A model with the values that fit best; `sigma` is each segment's noise floor by group."""
+    """A model with the values that fit best.
+
+    `sigma` is each segment's noise floor by group, `tolerance` what the forms of effects found
+    may be wrong by, none where it is empty.
+    """
 
     model: Model
     values: dict[str, float]
     sigma: tuple[Array, ...]
+    tolerance: tuple[Array, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """Where a fit along some columns ends: step [k], residual [R] after it, and its misfit, the
+    cost of the priors included.
+    """
+
+    step: Array
+    residual: Array
+    misfit: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +68,8 @@ class System:
     """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
 
     `group` [R] numbers the groups of (segment, channel, order), `labels` names them; `unit` [R] is
-    the size of one noise unit as a window's mean, in the signal's own unit. Rows of a
+    what a residual of one is as a window's mean, in the signal's own unit, `soft` [R] the noise
+    floor over what rows are divided by (below 1 by a tolerance of form). Rows of a
     group that misses its noise floor, χ²/n = q > 1, count 1/q: the likelihood of a group whose
     scatter is at least the floor but otherwise unknown. An equation with an effect missing so
     keeps no hold on constants that sound equations know. `penalty` [P] is the inverse prior
@@ -64,6 +82,7 @@ class System:
     group: NDArray[np.int64]
     window: NDArray[np.int64]
     unit: Array
+    soft: Array
     labels: tuple[tuple[int, str, int], ...]
     penalty: Array
     pull: Array
@@ -88,9 +107,20 @@ class System:
     @property
     def misfit(self) -> float:
         """−2 log likelihood, less constants, and the cost of the priors."""
-        live = self.penalty > 0
-        cost = float((self.pull[live] ** 2 / self.penalty[live]).sum())
+        cost = float(self.prior_costs().sum())
         return self.misfit_of(self.spreads(self.residual)) + cost
+
+    def prior_costs(
+        self, places: NDArray[np.int64] | None = None, step: Array | None = None
+    ) -> Array:
+        """Squared distance [P] of every parameter from its prior's centre, in its standard
+        uncertainties, after a step along `places`; 0 where there is no prior.
+        """
+        pull = self.pull.copy()
+        if places is not None and step is not None:
+            pull[places] += self.penalty[places] * step
+        costs: Array = pull**2 / np.where(self.penalty > 0, self.penalty, np.inf)
+        return costs
 
     def spreads(self, residual: Array) -> Array:
         """χ²/n [G] of each group, 1 where empty."""
@@ -113,8 +143,8 @@ class System:
         places: NDArray[np.int64],
         starts: Sequence[float] = (1.0, 0.5, 0.0),
         rounds: int = _ROUNDS,
-    ) -> tuple[Array, Array]:
-        """Step [k] along columns at `places` of least misfit, and the residual [R] after it.
+    ) -> Descent:
+        """The step along columns at `places` of least misfit.
 
         Weighted least squares, the weights renewed until the misfit stays. That has more than one
         end: a group may be given up that another start would have saved, so it is begun with the
@@ -123,12 +153,9 @@ class System:
         """
         now = np.maximum(self.spreads(self.residual), 1.0)
         ends = [self._descended(places, now**power, rounds) for power in starts]
-        step, left, _ = min(ends, key=lambda end: end[2])
-        return step, left
+        return min(ends, key=lambda end: end.misfit)
 
-    def _descended(
-        self, places: NDArray[np.int64], spreads: Array, rounds: int
-    ) -> tuple[Array, Array, float]:
+    def _descended(self, places: NDArray[np.int64], spreads: Array, rounds: int) -> Descent:
         matrix, penalty = self.matrix[:, places], np.diag(self.penalty[places])
         left, step, before = self.residual, np.zeros(places.size), np.inf
         for _ in range(rounds):
@@ -138,11 +165,11 @@ class System:
             step = -_pseudo_inverse(weighted.T @ matrix + penalty) @ slope
             left = self.residual + matrix @ step
             spreads = self.spreads(left)
-            now = self.misfit_of(spreads)
+            now = self.misfit_of(spreads) + float(self.prior_costs(places, step).sum())
             if abs(before - now) < _SETTLED:
                 break
             before = now
-        return step, left, now
+        return Descent(step, left, now)
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance [k, k] of the parameters at `places` when they are fitted together."""
@@ -182,6 +209,15 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
     return _each(lambda s, seed: noise_floor(s, model, values, seed), segments, seeds)
 
 
+def tolerances(
+    segments: Sequence[Segment], fitted: Fitted, added: Sequence[Effect]
+) -> tuple[Array, ...]:
+    """What the forms of the effects found may be wrong by, of every segment."""
+    model, values = fitted.model, fitted.values
+    nothing = range(len(segments))
+    return _each(lambda s, _: form_tolerance(s, model, values, added), segments, nothing)
+
+
 def _each(
     work: Callable[[Segment, Any], Any], segments: Sequence[Segment], along: Iterable[Any]
 ) -> tuple[Any, ...]:
@@ -205,13 +241,17 @@ def system(
     columns = [*own_columns(model), *candidates]
     known = _kept(before, fitted)
     new = [column for column in columns if column.key not in known]
-    rows = _each(lambda s, sigma: linearise(s, model, values, new, sigma), segments, fitted.sigma)
+    none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
+    floor = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
+    rows = _each(lambda s, both: linearise(s, model, values, new, *both), segments, floor)
+    soft = np.concatenate([r.soft for r in rows])
+    rescaled = 1.0 if before is None or not known else soft / before.soft
     fresh = {column.key: n for n, column in enumerate(new)}
     made = np.concatenate([r.columns for r in rows])
     matrix = np.empty((made.shape[0], len(columns)))
     for place, column in enumerate(columns):
         old = known.get(column.key)
-        matrix[:, place] = made[:, fresh[column.key]] if old is None else old
+        matrix[:, place] = made[:, fresh[column.key]] if old is None else old * rescaled
     penalty, pull = _priors(model, columns, values)
     first, labels, groups = 0, [], []
     for number, one in enumerate(rows):
@@ -225,6 +265,7 @@ def system(
         group=np.concatenate(groups),
         window=np.concatenate([r.window for r in rows]),
         unit=np.concatenate([r.unit for r in rows]),
+        soft=soft,
         labels=tuple(labels),
         penalty=penalty,
         pull=pull,
@@ -259,7 +300,7 @@ def _linear(column: Column, model: Model) -> bool:
     """Whether the residual is linear along a column, whatever the other parameters are."""
     effect = column.effect
     if effect is None:
-        return True
+        return column.name not in ("gain_current", "offset_temp_k")
     if effect not in model.effects:
         return True
     shaped = any(not p.amplitude for p in effect.parameters_of(model.machine))
@@ -311,7 +352,7 @@ def gauss_newton(
     """
     around = system(segments, fitted, before=before)
     for _ in range(iterations):
-        step, _ = around.best(np.arange(len(around.columns)))
+        step = around.best(np.arange(len(around.columns))).step
         for _ in range(_HALVINGS):
             moved = _moved(fitted, around.columns, step)
             if renew:

@@ -39,7 +39,7 @@ def unknown_structure(
     columns = [effect_columns(port.effect, fitted.model) for port in offered]
     wide = system(segments, fitted, [c for some in columns for c in some])
     own = np.arange(len(own_columns(fitted.model)))
-    before = wide.misfit_of(wide.spreads(wide.best(own)[1]))
+    before = wide.best(own).misfit
     price = math.log(wide.size)
     found: list[Found] = []
     first = own.size
@@ -50,11 +50,11 @@ def unknown_structure(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        step, left = wide.best(chosen)
-        gain = before - wide.misfit_of(wide.spreads(left)) - live.size * price
+        end = wide.best(chosen)
+        gain = before - end.misfit - live.size * price
         spread = np.sqrt(np.maximum(np.diag(wide.covariance(chosen))[own.size :], 0.0))
         names = [wide.columns[n].name for n in live]
-        values = dict(zip(names, step[own.size :].tolist(), strict=True))
+        values = dict(zip(names, end.step[own.size :].tolist(), strict=True))
         found.append(Found(port, gain, values, spread))
     best = max(found, key=lambda f: f.gain, default=None)
     if best is None or best.gain <= 0.0:

@@ -9,7 +9,7 @@ from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Valu
 
 def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
-        return r.i_a
+        return r.i_a if r.phase is None else r.i_a / (1.0 + q["bench"] * _of_phase(r.phase, q))
     gamma = (q["cosine"] + 1j * q["sine"]) * np.exp(-2j * r.eps_rad)
     mean = 1.0 + q["mean"]
     # recorded = mean i + gamma conj(i), solved for i
@@ -17,9 +17,16 @@ def _current(r: Recorded, q: Values) -> Complex:
     return true
 
 
+def _of_phase(phase: int, q: Values) -> float:
+    """Gain of phase k's sensor: mean + 2 Re(γ a^{−2k}), a = e^{j120°}."""
+    turned = (q["cosine"] + 1j * q["sine"]) * np.exp(-4j * np.pi * phase / 3.0)
+    return float(q["mean"] + 2.0 * turned.real)
+
+
 EFFECT = Effect(
     name="current_gain",
-    words="recorded i = (1 + mean) i + γ i* e^{−j2ε}; one phase k off by g: |γ| = mean = g/3",
+    words="recorded i = (1 + mean) i + γ i* e^{−j2ε}; one phase k off by g: |γ| = mean = g/3; "
+    "bench: how far the bench's line currents come from the same sensors",
     signature="second electrical order in current, voltage and torque, proportional to current",
     tests=("torque_map",),
     experiment="a torque map at two speeds",
@@ -28,6 +35,7 @@ EFFECT = Effect(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("mean", "1", 0.01, 0.004, low=-0.3, high=0.3),
+        Parameter("bench", "1", 1.0, 0.0, low=0.0, high=1.0, scan=(0.0, 1.0)),
     ),
     signals=("id_a", "iq_a"),
     rivals={"phase_imbalance": "resistance through all three terminal pairs"},

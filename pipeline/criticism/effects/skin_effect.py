@@ -7,18 +7,22 @@ from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Val
 
 def _drop(x: Operating, q: Values) -> Complex:
     relative = x.freq_hz / x.machine.scales["freq_hz"]
-    drop: Complex = x.base["r_ohm"] * q["rise"] * relative**2 * x.i_a
+    rise = q["rise"] * relative**2 / (1.0 + (relative / q["knee"]) ** 2)
+    drop: Complex = x.base["r_ohm"] * rise * x.i_a
     return drop
 
 
 EFFECT = Effect(
     name="skin_effect",
-    words="resistance R (1 + rise (f/f_max)²), f the electrical frequency",
+    words="resistance R (1 + rise s²/(1 + (s/knee)²)), s = f/f_max, f the electrical frequency",
     signature="resistance that grows with electrical speed, whatever the temperature",
     tests=("torque_map", "drive", "lcr"),
     experiment="current steps at the highest speed and at a tenth of it",
     reference="Dowell, Proc. IEE 113 (1966), effects of eddy currents in windings",
-    parameters=(Parameter("rise", "1", 0.2, 0.01, low=0.0, high=5.0),),
+    parameters=(
+        Parameter("rise", "1", 0.2, 0.01, low=0.0, high=5.0),
+        Parameter("knee", "1", 3.0, 0.0, low=0.3, high=1000.0, scan=(1000.0, 3.0)),
+    ),
     signals=("vd_v", "vq_v"),
     rivals={"current_delay": "current steps at standstill and at speed"},
     drop=_drop,
