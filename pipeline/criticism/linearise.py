@@ -38,6 +38,7 @@ _OFFSET = 0.5
 _ZERO = 2e-3
 _ROUGH = 0.05
 _FORM = 0.02
+_LINE = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,7 +228,29 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
     part = _MODEL_DRIVE if segment.kind == "dq" else _MODEL_BENCH
     scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
     own = part * _gain(segment) * np.array(scales)[:, None, None]
-    return np.hypot(reading, own)
+    both: Array = np.hypot(reading, own)
+    if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
+        place = segment.channels.index("torque_shaft_nm")
+        both[place] = np.hypot(both[place], _encoder_lines(segment, values))
+    return both
+
+
+def _encoder_lines(segment: Segment, values: Values) -> Array:
+    """Torque [W, M] that a line of the encoder's own error makes on an order k, as weak samples.
+
+    Rounding at steady speed is periodic in the angle; of its harmonics, some beat with the sampling
+    on to any order. J (k ω)² times 0.03 steps is the 10th of them [Widrow & Kollar (2008), ch. 20].
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros((segment.size, 1))
+    theta = segment.recorded["theta_mech_rad"]
+    span = (weak.length - 1) * segment.ts_s
+    omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
+    step = math.sqrt(12.0) * segment.noise["theta_mech_rad"]
+    wave = _gain(segment) / math.sqrt(2.0) * _LINE * step * values["j_kgm2"]
+    lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
+    return lines
 
 
 def channel_scale(segment: Segment, channel: str, model: Model, values: Values) -> float:

@@ -10,6 +10,11 @@ from pipeline.criticism.effect import Array
 
 _BLOCK = 48
 _SMOOTH = 21
+_BURST = 12.0
+_LOOKED_AT = 2000
+_STEPS = 600
+_TOGETHER = 0.5
+_SNAP = 0.06
 _QUIET = (0.3, -0.5244)
 _STEADY = (0.6, 0.2533)
 
@@ -54,12 +59,28 @@ def rounding_error(signal: Array, step: float, shift: float) -> Array:
 
 
 def rounding_step(signal: Array) -> float:
-    """The step of a signal whose noise is nothing but its rounding, 0 of another one."""
+    """The step of a signal whose noise is mostly its rounding, 0 of another one [its unit].
+
+    Third differences of a rounded signal are whole steps, so that their phase e^{j2π d/q} stays
+    together at the right q, even where a number format has rounded it once more.
+    """
     third = np.diff(signal, 3)
-    step = _rounding(third)
-    if step == 0.0:
+    third = third[np.abs(third) < _BURST * np.median(np.abs(third)) + 1e-300]
+    spread = float(np.sqrt((third**2).mean())) if third.size >= _BLOCK else 0.0
+    if spread == 0.0:
         return 0.0
-    return step if float(np.median(np.abs(third))) <= 4.0 * step else 0.0
+    sample = third[:: max(third.size // _LOOKED_AT, 1)]
+    steps = np.geomspace(0.25 * spread, 2.0 * spread, _STEPS)
+    together = np.array([abs(np.exp(2j * np.pi / q * sample).mean()) for q in steps])
+    inner = together[1:-1]
+    peaks = 1 + np.flatnonzero((inner >= together[:-2]) & (inner >= together[2:]))
+    high = [n for n in peaks if together[n] >= max(0.8 * together[peaks].max(), _TOGETHER)]
+    if not high:
+        return 0.0
+    step = float(steps[high[-1]])
+    # an encoder has 2^n steps a turn, or 4 times its lines
+    bits = math.log2(2.0 * math.pi / step)
+    return 2.0 * math.pi / 2.0 ** round(bits) if abs(bits - round(bits)) < _SNAP else step
 
 
 def _rounding(third: Array) -> float:
