@@ -67,7 +67,8 @@ def _parameters(fitted: Fitted, around: System, model: Model) -> dict[str, Model
         scale, value = model.machine.scale(p), fitted.values[name]
         edge = 1e-9 * max(abs(p.typical), 1e-30) * scale
         bound = min(abs(value - p.low * scale), abs(value - p.high * scale)) <= edge
-        told[name] = ModelParameter(value, u[name], p.unit, bound)
+        bound = bound and not p.choice
+        told[name] = ModelParameter(value, u.get(name, 0.0), p.unit, bound)
     return told
 
 

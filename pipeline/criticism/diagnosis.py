@@ -167,7 +167,7 @@ def _ranking(
         effect = library[name]
         confused = rivals_of(name, last.fitted, last.around, offered, captured)
         loss = loss_without(last.around, last.fitted, (name,))
-        dof = len(effect.parameters_of(last.fitted.model.machine))
+        dof = effect.dof(last.fitted.model.machine)
         found.append(
             RankedEffect(
                 name,
@@ -218,7 +218,7 @@ def _parameters(rung: Rung, effect: Effect) -> dict[str, tuple[float, float, str
     return {
         p.name: (
             float(rung.fitted.values[f"{effect.name}.{p.name}"]),
-            u[f"{effect.name}.{p.name}"],
+            u.get(f"{effect.name}.{p.name}", 0.0),
             p.unit,
         )
         for p in effect.parameters_of(rung.fitted.model.machine)

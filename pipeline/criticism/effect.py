@@ -26,7 +26,8 @@ class Parameter:
     `scale` names an entry of `Machine.scales` (`torque_nm`, `voltage_v`, ...) or is `1`.
     `typical` is a size seen on real benches, `negligible` one that nobody would act on; both are
     magnitudes. `scan`: trial values of a shape parameter, which has no influence while the
-    amplitudes of its effect are zero; empty for an amplitude.
+    amplitudes of its effect are zero; empty for an amplitude. A `choice` takes one of these values
+    and is never fitted.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Parameter:
     high: float = math.inf
     words: str = ""
     scan: tuple[float, ...] = ()
+    choice: bool = False
 
     @property
     def amplitude(self) -> bool:
@@ -197,3 +199,7 @@ class Effect:
     def parameters_of(self, machine: Machine) -> tuple[Parameter, ...]:
         """The parameters for one machine, `expand`ed where their number depends on it."""
         return self.expand(machine) if self.expand is not None else self.parameters
+
+    def dof(self, machine: Machine) -> int:
+        """How many parameters are fitted."""
+        return sum(not p.choice for p in self.parameters_of(machine))

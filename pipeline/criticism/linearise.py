@@ -307,6 +307,10 @@ _NEEDS: dict[str, tuple[str, ...]] = {
 }
 
 
+_BETWEEN = ("j_kgm2", *RIPPLES)
+"""Constants that change no flux, drop or drag."""
+
+
 class _Sampler:
     """Sampled change of a segment's residual along columns; hooks are linear, sensors are not."""
 
@@ -315,7 +319,7 @@ class _Sampler:
     ) -> None:
         self.segment, self.model, self.values, self.here = segment, model, values, here
         self.x = operate(segment, segment.recorded, model, values)
-        pieces = evaluate(model, self.x, values)
+        pieces = self.pieces = evaluate(model, self.x, values)
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         # a hook's own column does without the small terms between samples
@@ -340,7 +344,10 @@ class _Sampler:
             start = measured(self.segment, self.segment.recorded, self.model, self.values)
             return (there - start) / column.step
         x = replace(self.x, base=moved)
-        there = predicted(self.segment, x, evaluate(self.model, x, moved), self.model, moved)
+        pieces = self.pieces
+        if column.name not in _BETWEEN:
+            pieces = evaluate(self.model, x, moved)
+        there = predicted(self.segment, x, pieces, self.model, moved)
         return -(there - self.start) / column.step
 
     def _gain(self, column: Column) -> Array | None:
@@ -358,8 +365,7 @@ class _Sampler:
         moved[column.name] += column.step
         if column.name in ("gain_current", "offset_temp_k"):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
-        pieces = evaluate(self.model, self.x, moved)
-        there = predicted(self.segment, self.x, pieces, self.model, moved)
+        there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step
 
     def _anew(self, column: Column) -> Array | None:
@@ -467,7 +473,7 @@ def effect_columns(
     inside = effect in model.effects
     made = []
     for p in effect.parameters_of(model.machine):
-        if p.amplitude or inside:
+        if p.amplitude or (inside and not p.choice):
             step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
             made.append(Column(f"{effect.name}.{p.name}", step, effect, at))
     return made

@@ -21,7 +21,7 @@ from pipeline.criticism.traces import smoothed
 _SPEED_S = 0.002
 _TURN_RAD = 0.7
 _FINEST = 48
-_ANGLE_ROUNDS = 3
+_ANGLE_ROUNDS = 2
 RIPPLES = ("ripple_edge", "ripple_shift", "ripple_torque")
 
 
@@ -312,9 +312,13 @@ def _averaged(fine: Array, finer: int) -> Array:
 
     The second difference of the angle over T² is the mean acceleration under that triangle.
     """
-    ramp = np.arange(1, finer + 1) / finer**2
-    triangle = np.concatenate([ramp, ramp[-2::-1]])
-    return np.convolve(fine, triangle, mode="same")[::finer]
+    ramp = np.arange(finer) / finer**2
+    cells = fine.reshape(-1, finer)
+    # the part of each cell that counts for its own sample, and for the next one
+    own, after = cells @ (1.0 / finer - ramp), cells @ ramp
+    mean: Array = own.copy()
+    mean[1:] += after[:-1]
+    return mean
 
 
 def _central(signal: Any, period: float) -> Any:

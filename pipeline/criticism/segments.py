@@ -23,6 +23,8 @@ _WINDOW_SAMPLES = 40
 _SMOOTHING_S = 0.05
 _STEP_WINDOW_S = 0.002
 _FEW = 12
+_WINDOWS = 48
+_WINDOWS_LOG = 32
 _SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 
 
@@ -154,7 +156,8 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     window = _window(period, size)
     orders = electrical_orders(machine) if turned > 0.1 else ()
     noise = _prepared(found, period)
-    found, starts = thinned(found, keep, window)
+    most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
+    found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     return _segment(capture, "dq", "drive", period, found, noise, channels, weak)
 
@@ -272,7 +275,7 @@ def _open(capture: Capture, machine: Machine) -> Segment | None:
     _shaft_angle(found, period, machine)
     window = _window(period, keep.size)
     noise = _prepared(found, period)
-    found, starts = thinned(found, keep, window)
+    found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, found["theta_mech_rad"]))
     return _segment(capture, "open", "bench", period, found, noise, ("vd_v", "vq_v"), weak)

@@ -137,7 +137,7 @@ def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> t
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        dof = len(candidate.effect.parameters_of(fitted.model.machine))
+        dof = candidate.effect.dof(fitted.model.machine)
         cost = dof * price + search_price
         score = _score(around, fitted, own, places, candidate, before, _GLANCE)
         if score is not None and score.fall > _PROMISING * cost:
@@ -288,7 +288,7 @@ def _backward(
 ) -> tuple[Fitted, System]:
     """Takes out effects that later ones have made superfluous."""
     for effect in fitted.model.effects[base:-1]:
-        price = len(effect.parameters_of(fitted.model.machine)) * math.log(around.size)
+        price = effect.dof(fitted.model.machine) * math.log(around.size)
         if material(fitted, effect) and loss_without(around, fitted, (effect.name,)) > 4 * price:
             continue
         kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{effect.name}.")}

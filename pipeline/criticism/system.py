@@ -303,7 +303,7 @@ def _linear(column: Column, model: Model) -> bool:
         return column.name not in ("gain_current", "offset_temp_k")
     if effect not in model.effects:
         return True
-    shaped = any(not p.amplitude for p in effect.parameters_of(model.machine))
+    shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))
     return effect.hook != "sensor" and not shaped
 
 

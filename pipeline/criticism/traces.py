@@ -11,7 +11,6 @@ from pipeline.criticism.effect import Array
 from pipeline.numerics.projection import window_starts
 from pipeline.records.capture import Capture
 
-_MOST_WINDOWS = 48
 PAD = 24
 _SENSE_S = 0.001
 
@@ -78,14 +77,14 @@ def travel(theta: Array, period: float) -> Array:
 
 
 def thinned(
-    found: Mapping[str, Array], keep: NDArray[np.bool_], length: int
+    found: Mapping[str, Array], keep: NDArray[np.bool_], length: int, most: int
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    """Signals cut to an even selection of windows, and the windows' first samples in them.
+    """Signals cut to an even selection of `most` windows, and their first samples in them.
 
     A bench log holds far more windows than the effects need, and cost goes with samples. A few
     samples on each side of a window keep what is smoothed or differenced out of its weights.
     """
-    starts = window_starts(keep, length, length, _MOST_WINDOWS)
+    starts = window_starts(keep, length, length, most)
     if starts.size * (length + 2 * PAD) >= keep.size:
         return dict(found), window_starts(keep, length)
     starts = starts[(starts >= PAD) & (starts + length + PAD <= keep.size)]

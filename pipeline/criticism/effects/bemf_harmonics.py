@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
 def _coenergy(x: Operating, q: Values) -> Any:
@@ -20,9 +20,21 @@ def _coenergy(x: Operating, q: Values) -> Any:
     return x.base["psi_wb"] * total
 
 
+def _torque(x: Operating, q: Values) -> Array:
+    slope = np.zeros(x.omega_rad_s.shape)
+    for order in (6, 12):
+        cosine, sine = np.cos(order * x.eps_rad), np.sin(order * x.eps_rad)
+        for current, axis in ((x.id_a, "d"), (x.iq_a, "q")):
+            wave = q[f"{axis}{order}_sin"] * cosine - q[f"{axis}{order}_cos"] * sine
+            slope = slope + order * current * wave
+    ripple: Array = 1.5 * x.machine.pole_pairs * x.base["psi_wb"] * slope
+    return (1.0 - q["ripple_share"]) * ripple
+
+
 EFFECT = Effect(
     name="bemf_harmonics",
-    words="ψ_d and ψ_q gain waves of nε, n = 6, 12; symmetric: d cos and q sin alone",
+    words="ψ_d and ψ_q gain waves of nε, n = 6, 12; symmetric: d cos and q sin alone; ripple_share "
+    "of the torque from their slope reaches the shaft's sensor",
     signature="orders 6ε and 12ε: proportional to speed in voltage, to current in torque",
     tests=("open_circuit", "torque_map"),
     experiment="an open-circuit spin",
@@ -32,7 +44,8 @@ EFFECT = Effect(
         for order in (6, 12)
         for axis in "dq"
         for wave in ("cos", "sin")
-    ),
+    )
+    + (Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),),
     rivals={"cogging": "a slow turn without current"},
     coenergy=_coenergy,
 )

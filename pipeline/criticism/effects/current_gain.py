@@ -35,7 +35,7 @@ EFFECT = Effect(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("sine", "1", 0.01, 0.001, low=-0.3, high=0.3),
         Parameter("mean", "1", 0.01, 0.004, low=-0.3, high=0.3),
-        Parameter("bench", "1", 1.0, 0.0, low=0.0, high=1.0, scan=(0.0, 1.0)),
+        Parameter("bench", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
     signals=("id_a", "iq_a"),
     rivals={"phase_imbalance": "resistance through all three terminal pairs"},

@@ -6,19 +6,20 @@ from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Valu
 
 
 def _current(r: Recorded, q: Values) -> Complex:
-    return r.i_a / (1.0 + q[f"gain_{r.instrument}"])
+    return r.i_a / (1.0 + q["gain"] * q[f"of_{r.instrument}"])
 
 
 EFFECT = Effect(
     name="current_scale",
-    words="recorded current = (1 + gain) true current; a drive and a bench have their own gain",
+    words="recorded current = (1 + gain) true current, of the drive, of the bench, or of both",
     signature="every current of one instrument off by one factor",
     tests=("torque_map", "resistance"),
     experiment="the current reading against a second, calibrated meter",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
-        Parameter("gain_drive", "1", 0.02, 0.006, low=-0.5, high=0.5),
-        Parameter("gain_bench", "1", 0.02, 0.006, low=-0.5, high=0.5),
+        Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),
+        Parameter("of_drive", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+        Parameter("of_bench", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
     ),
     rivals={
         "voltage_scale": "resistance known to 0.2 % from a four-wire meter",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
 def _coenergy(x: Operating, q: Values) -> Any:
@@ -23,9 +23,26 @@ def _coenergy(x: Operating, q: Values) -> Any:
     )
 
 
+def _torque(x: Operating, q: Values) -> Array:
+    ld, lq = x.base["ld_h"], x.base["lq_h"]
+    cosine, sine = np.cos(6 * x.eps_rad), np.sin(6 * x.eps_rad)
+    products = {
+        "d6": 0.5 * ld * x.id_a**2,
+        "q6": 0.5 * lq * x.iq_a**2,
+        "cross6": (ld * lq) ** 0.5 * x.id_a * x.iq_a,
+    }
+    slope = sum(
+        6.0 * product * (q[f"{name}_sin"] * cosine - q[f"{name}_cos"] * sine)
+        for name, product in products.items()
+    )
+    ripple: Array = 1.5 * x.machine.pole_pairs * slope
+    return (1.0 - q["ripple_share"]) * ripple
+
+
 EFFECT = Effect(
     name="inductance_harmonics",
-    words="L_q, L_d and a mutual inductance of size √(L_d L_q) vary with waves of 6ε",
+    words="L_q, L_d and a mutual inductance of size √(L_d L_q) vary with waves of 6ε; ripple_share "
+    "of the torque from their slope reaches the shaft's sensor",
     signature="orders 6ε proportional to current in voltage and to its square in torque",
     tests=("torque_map",),
     experiment="a torque map, or a slow turn under current",
@@ -34,8 +51,10 @@ EFFECT = Effect(
         Parameter(f"{name}_{wave}", "1", 0.03, 0.003, low=-0.5, high=0.5)
         for name in ("q6", "d6", "cross6")
         for wave in ("cos", "sin")
-    ),
+    )
+    + (Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),),
     signals=("id_a", "iq_a"),
     rivals={"bemf_harmonics": "an open-circuit spin", "dead_time": "two speeds"},
     coenergy=_coenergy,
+    torque=_torque,
 )

@@ -6,19 +6,20 @@ from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Val
 
 
 def _voltage(v_v: Complex, _: Operating, q: Values, instrument: str) -> Complex:
-    return v_v * (1.0 + q[f"gain_{instrument}"])
+    return v_v * (1.0 + q["gain"] * q[f"of_{instrument}"])
 
 
 EFFECT = Effect(
     name="voltage_scale",
-    words="recorded voltage = (1 + gain) true voltage; a drive and a bench have their own gain",
+    words="recorded voltage = (1 + gain) true voltage, of the drive, of the bench, or of both",
     signature="every voltage of one instrument off by one factor",
     tests=("open_circuit", "torque_map"),
     experiment="the voltage reading against a second, calibrated meter",
     reference="JCGM 100:2008, 4.3 (a gain is common to all samples)",
     parameters=(
-        Parameter("gain_drive", "1", 0.02, 0.006, low=-0.5, high=0.5),
-        Parameter("gain_bench", "1", 0.02, 0.006, low=-0.5, high=0.5),
+        Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),
+        Parameter("of_drive", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+        Parameter("of_bench", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
     ),
     rivals={
         "current_scale": "resistance known to 0.2 % from a four-wire meter",

@@ -42,8 +42,8 @@ def _same(size: float, _: Instruments) -> float:
 
 PARAMETERS: Mapping[str, tuple[tuple[str, ...], float, Truth]] = {
     "torque_scale": (("gain",), 1.0, lambda s, i: (1.0 + s) * i.torque - 1.0),
-    "voltage_scale": (("gain_drive",), 1.0, lambda s, i: (1.0 + s) * i.voltage_commanded - 1.0),
-    "current_scale": (("gain_drive",), 1.0, lambda s, i: (1.0 + s) * i.current - 1.0),
+    "voltage_scale": (("gain",), 1.0, lambda s, i: (1.0 + s) * i.voltage_commanded - 1.0),
+    "current_scale": (("gain",), 1.0, lambda s, i: (1.0 + s) * i.current - 1.0),
     "torque_offset": (("offset_nm",), 1.0, _same),
     "torque_lag": (("lag_s",), 1.0, _same),
     "sample_delay": (("delay_s",), 1.0, _same),
