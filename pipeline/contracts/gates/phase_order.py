@@ -1,4 +1,4 @@
-"""Swapped phases: the back-EMF turns against the shaft."""
+"""Swapped phases: back-EMF or line currents turn against the shaft."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed
-from pipeline.contracts.rotation import Array, turning
+from pipeline.contracts.rotation import Array, line_current_vector, turning
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
@@ -20,7 +20,7 @@ CONDITION = 1e3
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Refuses where line voltages, or v_q under current, oppose the shaft's sense of rotation."""
+    """Refuses where line voltages, line currents or v_q oppose the shaft's sense of rotation."""
     if capture.meta.test in FREE_TURNING:
         seen = turning(capture)
         opposed = (
@@ -44,7 +44,27 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             "where the magnet's voltage must rise with it",
             REMEDY,
         )
+    _refuse_opposed_currents(capture, options)
     return Passed()
+
+
+def _refuse_opposed_currents(capture: Capture, options: Mapping[str, float]) -> None:
+    """Refuses line currents that turn minus pole pairs times a turn.
+
+    The nameplate's count is needed: sampled too slowly, currents seem to turn backward, but then
+    at another rate.
+    """
+    stated = capture.meta.pole_pairs
+    seen = None if stated is None else turning(capture, line_current_vector)
+    if seen is None or stated is None or seen.cycles < options["cycles"]:
+        return
+    if abs(seen.cycles_per_turn + stated) < options["off_count"] * stated:
+        raise CaptureError(
+            CODE,
+            f"the line currents turn c-b-a where the shaft turns forward "
+            f"({seen.cycles_per_turn:.2f} cycles a turn)",
+            REMEDY,
+        )
 
 
 def back_emf_slope(capture: Capture) -> tuple[float, float]:
@@ -103,5 +123,7 @@ GATE = Gate(
         "cycles": 1.0,
         # Over the blocks' own scatter, which neighbours share: never by chance.
         "sigmas": 5.0,
+        # A load that pulses turns the currents' vector a little; aliasing hits this by chance only.
+        "off_count": 0.1,
     },
 )

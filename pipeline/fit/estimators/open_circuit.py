@@ -372,8 +372,9 @@ def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:
     alpha = 0.0
     temps = np.array([g.temp_degc for g in groups])
     psis = np.array([g.flux.psi_wb for g in groups])
-    if np.ptp(temps) > 0.0:
-        alpha = float(np.polyfit(temps - 25.0, psis / psi.number, 1)[0])
+    if psi.at["temp_measured_low_degc"] != psi.at["temp_measured_high_degc"]:
+        line = np.column_stack([np.ones(temps.size), temps - 25.0])
+        alpha = float(linear_fit(line, psis / psi.number).coefficients[1])
     amplitude, flux = [], []
     for path in dict.fromkeys(g.capture.path for g in groups):
         own = [g for g in groups if g.capture.path == path]
