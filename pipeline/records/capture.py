@@ -153,7 +153,7 @@ class Campaign:
         return tuple(c for c in self.captures if c.meta.test in tests)
 
     def nameplate(self, key: str) -> object | None:
-        """The most frequent value of a metadata key (`pole_pairs`, `lot`, ...), the first of equals.
+        """The most frequent value of a metadata key (`pole_pairs`, ...), the first of equals.
 
         None where no capture states the key.
         """

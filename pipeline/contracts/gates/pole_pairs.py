@@ -48,7 +48,7 @@ def _unit(count: float, u: float, from_whole: float, stated: int | None) -> str:
         cycles = count * factor
         whole = round(cycles)
         near = abs(cycles - whole) <= from_whole + 2.0 * u * factor
-        if near and u * factor < 0.1 and 0 < whole and (whole == stated or count < 0.5):
+        if near and u * factor < 0.1 and whole > 0 and (whole == stated or count < 0.5):
             return f"{words}, which makes {cycles:.3f}"
     return ""
 
