@@ -26,9 +26,15 @@ ROOMS = ("pipeline", "tests")
 LIBRARIES = ("numpy", "scipy", "polars", "numba")
 
 
-def draws_of(case: Case, seeds: range, folder: Path) -> list[Draw]:
-    """The draws of a block of seeds, from the folder where they are kept, else made and kept."""
-    path = folder / f"{case.name}-{digest(case, seeds)[:20]}.json"
+def draws_of(case: Case, seeds: range, folder: Path, expected: str) -> list[Draw]:
+    """The draws of a block of seeds, from the folder where they are kept, else made and kept.
+
+    `expected` is the digest when the run began; raises RuntimeError where the sources have changed
+    since, for the modules in memory may then be either.
+    """
+    if digest(case, seeds) != expected:
+        raise RuntimeError("the sources changed during the run; start it again, it goes on")
+    path = folder / f"{case.name}-{expected[:20]}.json"
     if path.exists():
         return [Draw(**entry) for entry in json.loads(path.read_text(encoding="utf-8"))]
     draws = draw(case, seeds)

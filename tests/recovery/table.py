@@ -24,7 +24,7 @@ from tests.recovery.harness import (
     Verdict,
     judge,
 )
-from tests.recovery.kept import draws_of
+from tests.recovery.kept import digest, draws_of
 
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parents[1] / "docs" / "recovery.md"
@@ -74,16 +74,16 @@ def document(verdicts: Sequence[Verdict], seeds: int) -> str:
     )
 
 
-def block(index: int, seeds: range, folder: Path) -> list[Draw]:
+def block(index: int, seeds: range, folder: Path, expected: str) -> list[Draw]:
     """The draws of a block of seeds of one case by its number, for a worker process."""
-    return draws_of(cases()[index], seeds, folder)
+    return draws_of(cases()[index], seeds, folder, expected)
 
 
 def verdicts_of(seeds: int, workers: int, folder: Path, names: Sequence[str]) -> list[Verdict]:
     """The verdicts of the cases, each printed when its last block of seeds is done."""
     chosen = [k for k, case in enumerate(cases()) if not names or case.name in names]
     blocks = [range(first, min(first + BLOCK, seeds)) for first in range(0, seeds, BLOCK)]
-    jobs = [(k, seeds_of_block, folder) for k in chosen for seeds_of_block in blocks]
+    jobs = [(k, own, folder, digest(cases()[k], own)) for k in chosen for own in blocks]
     verdicts = []
     with ExitStack() as stack:
         if workers == 1:

@@ -28,8 +28,9 @@ def test_a_block_that_is_done_is_not_drawn_again(tmp_path):
         return CASES["lcr"].simulate(seed)
 
     case = replace(CASES["lcr"], simulate=counting)
-    first = kept.draws_of(case, range(3), tmp_path)
-    again = kept.draws_of(case, range(3), tmp_path)
+    expected = kept.digest(case, range(3))
+    first = kept.draws_of(case, range(3), tmp_path, expected)
+    again = kept.draws_of(case, range(3), tmp_path, expected)
     assert seeds == [0, 1, 2]
     assert first == again == draw(CASES["lcr"], range(3))
 
@@ -44,7 +45,14 @@ def test_a_block_cut_short_leaves_nothing_behind(tmp_path):
 
     case = replace(CASES["lcr"], simulate=stopping)
     with pytest.raises(KeyboardInterrupt):
-        kept.draws_of(case, range(3), tmp_path)
+        kept.draws_of(case, range(3), tmp_path, kept.digest(case, range(3)))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_sources_that_change_during_a_run_end_it(tmp_path):
+    """Nothing is kept under a digest that is not that of the code in memory."""
+    with pytest.raises(RuntimeError, match="sources changed"):
+        kept.draws_of(CASES["lcr"], range(3), tmp_path, "0" * 64)
     assert list(tmp_path.iterdir()) == []
 
 
