@@ -254,7 +254,9 @@ def _too_uncertain(name: str, estimate: Estimate, aims: Aims) -> tuple[DoubtKind
         unit = " %"
     if reached <= target:
         return None
-    words = f"known to {significant(reached, 2)}{unit} (k=1), wanted to {significant(target, 2)}{unit}"
+    words = (
+        f"known to {significant(reached, 2)}{unit} (k=1), wanted to {significant(target, 2)}{unit}"
+    )
     if _mostly_instrument(estimate):
         source = _largest_instrument(estimate)
         cure = "" if source.startswith(ASSUMED) else ": calibrate that"
