@@ -13,7 +13,7 @@ help:
 	@echo "make lint      style, types, import direction"
 	@echo "make demo-data simulate data/demo anew"
 	@echo "make screenshots  docs/images from the demo's report (needs chromium)"
-	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md"
+	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md; goes on after a stop"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
 

@@ -64,7 +64,11 @@ def _show(outcome: Outcome) -> int:
 
 
 def _print(text: str, stream: TextIO) -> None:
-    print(text.rstrip("\n"), file=stream, flush=True)
+    """Prints a text; a reader that has seen enough (`| head`) is no failure."""
+    try:
+        print(text.rstrip("\n"), file=stream, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 if __name__ == "__main__":

@@ -39,20 +39,30 @@ def _contradictions(campaign: Campaign, key: str) -> list[Finding]:
     first: dict[object, str] = {}
     for path, value in stated:
         first.setdefault(value, path)
-    usual = min(counts, key=lambda value: (-counts[value], first[value]))
+    usual = campaign.nameplate(key)
     consequence = CONSEQUENCE.get(key, "the most frequent one counts")
     return [
         Finding(
             first[value],
             "warning",
             f"{key}_contradiction",
-            f"{key} is {value} here and in {counts[value] - 1} more files of {campaign.motor_id}, "
-            f"but {usual} in {first[usual]} and {counts[usual] - 1} more",
+            f"{key} is {value} {_here(counts[value])} of {campaign.motor_id}, but {usual} in "
+            f"{first[usual]}{_beside(counts[usual])}",
             f"correct the metadata of one of them; {consequence}",
         )
         for value in first
         if value != usual
     ]
+
+
+def _here(count: int) -> str:
+    if count == 1:
+        return "here alone of the captures"
+    return f"here and in {count - 1} more captures"
+
+
+def _beside(count: int) -> str:
+    return "" if count == 1 else f" and {count - 1} more"
 
 
 def _one_test_only(campaign: Campaign) -> list[Finding]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.contracts.requirements import LINE_VOLTAGES
+from pipeline.contracts.requirements import LINE_CURRENTS, LINE_VOLTAGES
 from pipeline.physics.frames import space_vector
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
 BLOCKS = 200
 TURN_RAD = 2.0 * np.pi
+VectorOf = Callable[[Capture], tuple[Array, NDArray[np.complex128]] | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,26 +62,37 @@ def line_voltage_vector(capture: Capture) -> tuple[Array, NDArray[np.complex128]
     x = (2/3)(ab + bc e^{j2pi/3} + ca e^{-j2pi/3}) turns forward where a leads b leads c; a third
     voltage that is not there is minus the sum of the others.
     """
+    return _vector_of(capture, LINE_VOLTAGES)
+
+
+def line_current_vector(capture: Capture) -> tuple[Array, NDArray[np.complex128]] | None:
+    """Clock [n, s] and space vector [n, A] of the line currents; None with fewer than two."""
+    return _vector_of(capture, LINE_CURRENTS)
+
+
+def _vector_of(
+    capture: Capture, names: tuple[str, ...]
+) -> tuple[Array, NDArray[np.complex128]] | None:
     for table in capture.tables:
-        there = {n: table[n].to_numpy() for n in LINE_VOLTAGES if n in table.columns}
+        there = {n: table[n].to_numpy() for n in names if n in table.columns}
         there = {n: v for n, v in there.items() if np.isfinite(v).any()}
         if len(there) < 2 or "t_s" not in table.columns:
             continue
         if len(there) == 2:
-            absent = next(name for name in LINE_VOLTAGES if name not in there)
+            absent = next(name for name in names if name not in there)
             there[absent] = -sum(there.values(), np.zeros(table.height))
-        ab, bc, ca = (there[name] for name in LINE_VOLTAGES)
-        return table["t_s"].to_numpy(), space_vector(ab, bc, ca)
+        a, b, c = (there[name] for name in names)
+        return table["t_s"].to_numpy(), space_vector(a, b, c)
     return None
 
 
-def turning(capture: Capture) -> Turning | None:
+def turning(capture: Capture, vector_of: VectorOf = line_voltage_vector) -> Turning | None:
     """Electrical cycles a mechanical turn, signed, from line voltages and angle or speed.
 
     Block increments of the space vector's angle are regressed through zero on the shaft's, over
     the blocks in which the vector stands clear of noise. None where there is too little of it.
     """
-    vector = line_voltage_vector(capture)
+    vector = vector_of(capture)
     if vector is None:
         return None
     t_s, x = vector

@@ -16,7 +16,7 @@ import polars as pl
 from pipeline.contracts.requirements import TABLES_WITHOUT_TIME, requirements
 from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, Term
 from pipeline.records.capture import Capture, CaptureMeta
-from pipeline.records.errors import CaptureError
+from pipeline.records.errors import CaptureError, merged
 
 if TYPE_CHECKING:
     import pandera.polars as pa
@@ -150,13 +150,6 @@ def _fault(table: pl.DataFrame, column: str, code: str) -> CaptureError:
     }[code]
     message = f"{what} in {rows.size} of {table.height} rows ({examples})"
     return CaptureError(code, message, REMEDIES[code], (int(rows[0]), int(rows[-1])))
-
-
-def merged(faults: list[CaptureError]) -> CaptureError:
-    """One error that says every fault; the code, rows and remedy are the first one's."""
-    first, rest = faults[0], faults[1:]
-    others = "".join(f"; also [{fault.code}] {fault.message}" for fault in rest)
-    return CaptureError(first.code, first.message + others, first.remedy, first.rows)
 
 
 def check_columns(capture: Capture) -> None:

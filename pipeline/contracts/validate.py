@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
+import numpy as np
+
+from pipeline.contracts.protocol import warning
 from pipeline.contracts.registry import gates
-from pipeline.contracts.schemas import check_columns, check_metadata, check_tables, merged
+from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
 from pipeline.records.capture import Capture, Mask
-from pipeline.records.errors import CaptureError
+from pipeline.records.errors import CaptureError, merged
 from pipeline.records.finding import Finding
+
+BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
 
 
 def validate(
@@ -18,14 +24,16 @@ def validate(
 
     `options` are the configuration's `gates`. Gates look at the capture as recorded, none at
     another's masks, so that their order does not matter. Raises CaptureError that says every
-    reason for the refusal at once.
+    reason for the refusal at once. A gate that breaks on what it was not made for refuses the
+    capture too, for it has not been judged; it goes unsaid where another gate knows the reason.
     """
     check_metadata(capture.meta)
     check_columns(capture)
     check_tables(capture)
     masks: list[Mask] = []
-    findings: list[Finding] = []
+    capture, findings = _without_blanks(capture)
     refusals: list[CaptureError] = []
+    broken: list[CaptureError] = []
     for gate in gates():
         chosen = {**gate.settings(), **options.get(gate.name, {})}
         if capture.meta.test not in gate.tests or not chosen["enabled"]:
@@ -34,9 +42,35 @@ def validate(
             passed = gate.check(capture, chosen)
         except CaptureError as refusal:
             refusals.append(refusal)
+        except BROKEN as error:
+            broken.append(_broken(gate.name, error))
         else:
             masks.extend(passed.masks)
             findings.extend(passed.findings)
-    if refusals:
-        raise merged(refusals)
+    if refusals or broken:
+        raise merged(refusals or broken)
     return capture.with_masks(*masks), tuple(findings)
+
+
+def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The capture without columns that hold no value, which are as good as not there."""
+    tables, blanks = [], []
+    for table in capture.tables:
+        kept = [n for n in table.columns if table[n].is_finite().any() or not table.height]
+        blanks += [name for name in table.columns if name not in kept]
+        if set(kept) - {"t_s"}:
+            tables.append(table.select(kept))
+    if not blanks:
+        return capture, []
+    words = f"{', '.join(sorted(blanks))}: no row holds a value, so the column counts as missing"
+    remedy = "find out why the channel gave nothing, or leave it out of the file"
+    found = warning(capture, "empty_column", words, remedy)
+    return replace(capture, tables=tuple(tables)), [found]
+
+
+def _broken(name: str, error: Exception) -> CaptureError:
+    return CaptureError(
+        "gate_failed",
+        f"the gate {name} broke on this capture: {type(error).__name__}: {error}",
+        f"report the capture with this line; gates.{name}.enabled=0 leaves the gate out",
+    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pipeline.physics.glossary import CONSTANTS, TESTS
+from pipeline.physics.notation import significant
 from pipeline.records.datasheet import Check
 from pipeline.records.estimate import Estimate
 
@@ -114,11 +115,16 @@ def _reasons(step: Step) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Aims:
-    """What a datasheet is to reach: constants it must hold, relative u [1] it must not exceed."""
+    """What a datasheet is to reach: constants it must hold, uncertainties it must not exceed.
+
+    `u_rel` and `u_rel_of` [1] are relative; `u_of` [the constant's unit] is for those that are zero
+    in a sound motor.
+    """
 
     required: frozenset[str] = frozenset()
     u_rel: float = 0.02
     u_rel_of: Mapping[str, float] = field(default_factory=dict)
+    u_of: Mapping[str, float] = field(default_factory=dict)
 
 
 def make_plan(
@@ -233,23 +239,33 @@ def _doubt_of(name: str, estimate: Estimate | None, aims: Aims) -> tuple[DoubtKi
         return "assumed", f"assumed, not measured ({estimate.note or estimate.method})"
     if estimate.at_bound:
         return "at_bound", f"its fit ended at a bound of its search, {estimate.number:.4g}"
-    return _too_uncertain(name, estimate, aims.u_rel_of.get(name, aims.u_rel))
+    return _too_uncertain(name, estimate, aims)
 
 
-def _too_uncertain(name: str, estimate: Estimate, target: float) -> tuple[DoubtKind, str] | None:
+def _too_uncertain(name: str, estimate: Estimate, aims: Aims) -> tuple[DoubtKind, str] | None:
     """Counts and zeros have no relative uncertainty; the rest is held against its target."""
     term = CONSTANTS.get(name)
     if (term is not None and term.integer) or estimate.number == 0.0:
         return None
-    relative = estimate.u / abs(estimate.number)
-    if relative <= target:
+    reached, target = estimate.u, aims.u_of.get(name)
+    unit = f" {estimate.unit}".replace(" 1", "")
+    if target is None:
+        reached, target = 100.0 * reached / abs(estimate.number), 100.0 * _u_rel(name, aims)
+        unit = " %"
+    if reached <= target:
         return None
-    words = f"known to {100.0 * relative:.2g} % (k=1), wanted to {100.0 * target:.2g} %"
+    words = (
+        f"known to {significant(reached, 2)}{unit} (k=1), wanted to {significant(target, 2)}{unit}"
+    )
     if _mostly_instrument(estimate):
         source = _largest_instrument(estimate)
         cure = "" if source.startswith(ASSUMED) else ": calibrate that"
         words += f"; most of it is {source}, which repeating does not reduce{cure}"
     return "uncertain", words
+
+
+def _u_rel(name: str, aims: Aims) -> float:
+    return aims.u_rel_of.get(name, aims.u_rel)
 
 
 def _largest_instrument(estimate: Estimate) -> str:

@@ -8,10 +8,13 @@ from collections.abc import Mapping
 from functools import cache
 
 from pipeline.crosscheck import rules as rules_room
+from pipeline.crosscheck.judge import not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
+
+BROKEN = (ValueError, ArithmeticError, LookupError, TypeError)
 
 
 @cache
@@ -25,8 +28,16 @@ def rules() -> tuple[Rule, ...]:
 def check_all(
     constants: Constants, campaign: Campaign, options: Mapping[str, Mapping[str, float]]
 ) -> tuple[Check, ...]:
-    """Every check of one motor, in the order of their names."""
-    return tuple(
-        rule.check(constants, campaign, {**rule.options, **options.get(rule.name, {})})
-        for rule in rules()
-    )
+    """Every check of one motor, in the order of their names.
+
+    A rule that breaks on this data has judged nothing: its check is not evaluated and says so.
+    """
+    checks = []
+    for rule in rules():
+        chosen = {**rule.options, **options.get(rule.name, {})}
+        try:
+            checks.append(rule.check(constants, campaign, chosen))
+        except BROKEN as error:
+            words = f"broke on this data: {type(error).__name__}: {error}; report it with this line"
+            checks.append(not_evaluated(rule.name, words))
+    return tuple(checks)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +14,10 @@ from pipeline.fit.terminals import PAIRS, first_temperature, pair_of, pair_signa
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import find_plateaus
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
-from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
 
+TEST = "resistance"
+POINT_OPTIONS = {"zero_crossing": 0.03, "temp_assumed_degc": 25.0}
 COPPER_SOURCE = "assumed:temp_coeff_copper_1_k"
 Array = NDArray[np.float64]
 
@@ -35,17 +37,18 @@ class Point:
 
 
 def direct_current_points(
-    captures: Sequence[Capture], temp_assumed_degc: float, crossing: float
+    campaign: Campaign, options: Mapping[str, float]
 ) -> tuple[list[Point], list[str]]:
-    """The plateaus of all captures, and what had to be assumed about them.
+    """The plateaus of all resistance captures, and what had to be assumed about them.
 
-    Plateaus below `crossing` times the largest current of all are left out: the sign of their
+    Plateaus below `zero_crossing` times the largest current of all are left out: the sign of their
     current, and what an inverter adds there, is in doubt. Temperature is the plateau's own, else
     the capture's ambient, else `temp_assumed_degc`.
     """
     points: list[Point] = []
     notes: list[str] = []
-    for index, capture in enumerate(captures):
+    temp_assumed_degc = options["temp_assumed_degc"]
+    for index, capture in enumerate(campaign.of(TEST)):
         pair = pair_of(capture)
         if pair is None:
             notes.append(f"{capture.path}: which terminal pair is not stated")
@@ -60,7 +63,13 @@ def direct_current_points(
         except KeyError:
             notes.append(f"{capture.path}: no voltage and current of pair {pair}")
     largest = max((abs(p.i_a) for p in points), default=0.0)
-    return [p for p in points if abs(p.i_a) > crossing * largest], notes
+    return [p for p in points if abs(p.i_a) > options["zero_crossing"] * largest], notes
+
+
+def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, ...]:
+    """The captures that the points came from, in path order."""
+    captures = campaign.of(TEST)
+    return tuple(captures[k] for k in sorted({p.capture for p in points}))
 
 
 def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> list[Point]:

@@ -168,10 +168,12 @@ def _blocks(
 
     Steady is within 2 % of the largest current: one step of a coarse converter is no change.
     """
-    second, ambient = others
     needed = ("t_s", "along_va", "square_a2", "temp_winding_degc")
     good = np.all([np.isfinite(data[n]) for n in needed], axis=0)
     data = {name: values[good] for name, values in data.items()}
+    second, ambient = (
+        name if name is not None and _bridged(data, name) else None for name in others
+    )
     current = np.sqrt(data["square_a2"])
     most = float(current.max(initial=0.0))
     plateaus = find_plateaus(current, least=50, tolerance=0.02, least_span=most)
@@ -193,6 +195,15 @@ def _blocks(
         turning,
         shares,
     )
+
+
+def _bridged(data: dict[str, Array], name: str) -> bool:
+    """Draws a slow channel's gaps as straight lines in place; False where it holds no value."""
+    there = np.isfinite(data[name])
+    if not there.any():
+        return False
+    data[name] = np.interp(data["t_s"], data["t_s"][there], data[name][there])
+    return True
 
 
 def ambient_degc(record: HeatRecord) -> float | None:

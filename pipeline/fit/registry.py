@@ -99,9 +99,10 @@ def _possible(estimator: Estimator, result: Fit) -> Fit:
 def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
     if not estimate.known or term is None or _in_range(estimate.number, term):
         return estimate
+    low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
     note = (
-        f"came out as {estimate.number:.4g} {estimate.unit}, outside {term.low:g} to "
-        f"{term.high:g}: look at signs and units of {', '.join(estimate.captures[:3])}"
+        f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}: look at "
+        f"signs and units of {', '.join(estimate.captures[:3])}"
     )
     return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
 

@@ -84,7 +84,7 @@ def read_step(capture: Capture) -> StepRecord | None:
     if pair is None or angle is None:
         raise KeyError(f"{capture.path}: pair or theta_elec_deg is not stated")
     data = pair_signals(capture, pair)
-    t, v, i = data["t_s"], data["v_v"], data["i_a"]
+    t, v, i = data["t_s"] - data["t_s"][:1], data["v_v"], data["i_a"]
     sigma_i = white_noise_sigma(i)
     if t.size < 50 or float(np.ptp(i)) < 10.0 * max(sigma_i, 1e-12):
         return None

@@ -20,6 +20,7 @@ from pipeline.records.errors import CaptureError
 
 MAX_HEAD_BYTES = 2**18
 _MAX_COLUMNS = 4096
+SEPARATORS = (";", "\t", ",", "|")
 _COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
 _LONG_INTEGER = re.compile(r"^-?\d{16,}$")
 _PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh")
@@ -99,6 +100,7 @@ def read_csv(
     if stated is None and dialect.whole_last_line:
         _check_last_line(body, rows)
     names, units = _header(head, dialect)
+    _check_separator(names, dialect)
     rows = _even_out(rows, dialect)
     names = _check_shape(rows, names, dialect)
     fields = _parse(rows, names, dialect, wanted)
@@ -203,6 +205,19 @@ def _header(
         row = _cells(head[at + 1], dialect)
         units = tuple((name, unit) for name, unit in zip(names, row, strict=False) if name)
     return names, units
+
+
+def _check_separator(names: Sequence[str], dialect: CsvDialect) -> None:
+    """Refuses a header that is one field by the dialect's separator and many by another."""
+    used = [mark for mark in SEPARATORS if mark != dialect.separator and mark in names[0]]
+    if len(names) > 1 or not used:
+        return
+    raise _refuse(
+        "separator",
+        f"the fields are separated by {used[0]!r}, where {dialect.separator!r} is expected",
+        "save it with commas between fields and points as decimal signs, or write a source map "
+        f"in conf/source with layout: {{separator: {used[0]!r}}}; `inspect` starts one",
+    )
 
 
 def _cells(line: bytes, dialect: CsvDialect) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -16,10 +16,12 @@ from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_co
 from pipeline.io.files import read_whole
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
+from pipeline.io.metadata import capture_meta
 from pipeline.io.raw_table import RawTable
-from pipeline.io.sniff import numeric_columns, sniff
+from pipeline.io.sniff import encoding_of, numeric_columns, sniff
 from pipeline.io.source_map import SourceMap
 from pipeline.io.starter_map import FieldSeen, StreamSeen, starter_map
+from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError
 
 
@@ -69,9 +71,13 @@ def _mcap(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectRe
         topics = [channel.topic for channel in layout.definitions.channels.values()]
     except CaptureError as fault:
         faults.append(str(fault))
+    if "contract" in metadata:
+        faults += _metadata_faults(metadata)
     matched = _matched(name, None, topics, sources)
     streams = tuple(_stream(table, "messages") for table in tables)
-    starter = "" if "contract" in metadata else starter_map(streams, CONTRACT_DIALECT, None, topics)
+    starter = ""
+    if streams and "contract" not in metadata:
+        starter = starter_map(streams, CONTRACT_DIALECT, None, topics)
     return _report(name, "mcap", data, checksums, metadata, matched, streams, faults, starter)
 
 
@@ -94,23 +100,48 @@ def _text(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectRe
         check_text(data)
         metadata, begin = split_comments(data)
         head = data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
-        found = sniff(data[begin : begin + MAX_HEAD_BYTES].decode("utf-8", "replace"))
+        start = data[begin : begin + MAX_HEAD_BYTES]
+        encoding = encoding_of(start)
+        found = sniff(start.decode(encoding, "replace"))
         if found is None:
             faults.append("no table of numbers is found in it")
         else:
-            dialect, header = found
+            dialect, header = replace(found[0], encoding=encoding), found[1]
             parsed = read_csv(data, dialect, numeric_columns(data[begin:], dialect))
             table = parsed.table
             checksums = "sha256_rows covers the rows, and holds" if parsed.verified else "none"
     except CaptureError as fault:
         faults.append(str(fault))
+    contract = "contract" in metadata and "source" not in metadata
+    foreign = not faults and contract and _contract_faults(data, faults)
+    if contract:
+        faults += _metadata_faults(metadata)
     matched = _matched(name, head, [], sources)
     streams = () if table is None else (_stream(table, "text"),)
     starter = ""
-    if table is not None and "contract" not in metadata:
-        starter = starter_map(streams, dialect, header, [])
+    if table is not None and (foreign or "contract" not in metadata):
+        starter = starter_map(streams, dialect, header, [], by_name=foreign)
     form: Literal["text", "unknown"] = "text" if head else "unknown"
     return _report(name, form, data, checksums, metadata, matched, streams, faults, starter)
+
+
+def _contract_faults(data: bytes, faults: list[str]) -> bool:
+    """Whether `run` cannot read the table as the contract's own; the reason joins the faults."""
+    try:
+        read_csv(data, CONTRACT_DIALECT, COLUMNS.__contains__)
+    except CaptureError as fault:
+        faults.append(str(fault))
+        return True
+    return False
+
+
+def _metadata_faults(metadata: Mapping[str, str]) -> list[str]:
+    """What `run` would say of the metadata alone; a sidecar or manifest may still fill it in."""
+    try:
+        capture_meta(metadata)
+    except CaptureError as fault:
+        return [str(fault)]
+    return []
 
 
 def _report(

@@ -11,7 +11,7 @@ from typing import Any
 from pipeline.io.plain_yaml import load_plain
 from pipeline.physics.glossary import METADATA, TESTS
 from pipeline.records.capture import CaptureMeta
-from pipeline.records.errors import CaptureError
+from pipeline.records.errors import CaptureError, merged
 from pipeline.records.finding import Finding
 
 MANIFEST = "manifest.csv"
@@ -33,25 +33,25 @@ def merge(
 
     `sources` are pairs of a name for messages and key-value texts, the strongest first.
     """
-    merged: dict[str, str] = {}
+    said: dict[str, str] = {}
     origin: dict[str, str] = {}
     findings: list[Finding] = []
     for name, values in sources:
         for key, value in values.items():
-            if key not in merged:
-                merged[key], origin[key] = value, name
-            elif not _same(merged[key], value):
+            if key not in said:
+                said[key], origin[key] = value, name
+            elif not _same(said[key], value):
                 findings.append(
                     Finding(
                         path,
                         "warning",
                         "metadata_contradiction",
-                        f"{name} says {key} is {value!r}, {origin[key]} says {merged[key]!r}, "
+                        f"{name} says {key} is {value!r}, {origin[key]} says {said[key]!r}, "
                         f"which counts",
                         "correct one of the two",
                     )
                 )
-    return merged, findings
+    return said, findings
 
 
 def _same(one: str, other: str) -> bool:
@@ -113,53 +113,66 @@ def _bad_manifest(what: str, rows: tuple[int, int] | None = None) -> CaptureErro
 
 
 def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
-    """The metadata record; raises CaptureError for what is missing, unknown or no number."""
+    """The metadata record; raises CaptureError for all that is missing, unknown or no number."""
     if values.get("contract") != CONTRACT_VERSION:
         raise CaptureError(
             "contract_version",
             f"the capture follows contract {values.get('contract')!r}",
             f"this pipeline reads contract {CONTRACT_VERSION}",
         )
-    for key in ("motor_id", "test"):
-        if not values.get(key, "").strip():
-            raise CaptureError(
-                "missing_metadata",
-                f"nothing states {key}",
-                f"write {key} into the file's metadata, NAME{SIDECAR_SUFFIX} or {MANIFEST}",
-            )
-    if values["test"] not in TESTS:
-        raise CaptureError(
-            "unknown_test", f"the test {values['test']!r} is unknown", f"use {', '.join(TESTS)}"
-        )
+    faults = _missing(values)
     known: dict[str, Any] = {}
     extra: dict[str, str] = {}
     for key, value in values.items():
         if key in METADATA and key != "contract":
             if value.strip():
-                known[key] = _typed(key, value.strip())
+                try:
+                    known[key] = _typed(key, value.strip())
+                except CaptureError as fault:
+                    faults.append(fault)
         elif key != "contract":
             extra[key] = value
+    if faults:
+        raise merged(faults)
     return CaptureMeta(**known, extra=dict(sorted(extra.items())))
+
+
+def _missing(values: Mapping[str, str]) -> list[CaptureError]:
+    """One fault for each of the keys that every capture needs and this one lacks."""
+    return [
+        CaptureError(
+            "missing_metadata",
+            f"nothing states {key}",
+            f"write {key} into the file's metadata, NAME{SIDECAR_SUFFIX} or {MANIFEST}",
+        )
+        for key in ("motor_id", "test")
+        if not values.get(key, "").strip()
+    ]
 
 
 def _typed(key: str, value: str) -> str | int | float:
     """A metadata value in its type, within the glossary's range."""
     term = METADATA[key]
+    if key == "test" and value not in TESTS:
+        raise CaptureError(
+            "unknown_test", f"the test {value[:60]!r} is unknown", f"use {', '.join(TESTS)}"
+        )
     if term.unit == "text":
         if value not in _CHOICES.get(key, (value,)):
             raise _bad_value(key, value, f"use one of {', '.join(_CHOICES[key])}")
         return value
+    low, high = term.low, term.high
+    kind = "a whole number" if term.integer else "a number"
+    remedy = f"write {kind} from {low:g} to {high:g} [{term.unit}]"
     try:
         number = float(value)
     except ValueError:
-        raise _bad_value(key, value, f"write a number [{term.unit}]") from None
-    low, high = term.low, term.high
-    if not (low is None or number >= low) or not (high is None or number <= high):
-        raise _bad_value(key, value, f"write a number from {low:g} to {high:g} [{term.unit}]")
-    if term.integer and number != int(number):
-        raise _bad_value(key, value, "write a whole number")
+        raise _bad_value(key, value, remedy) from None
+    inside = (low is None or number >= low) and (high is None or number <= high)
+    if not inside or (term.integer and number != int(number)):
+        raise _bad_value(key, value, remedy)
     return int(number) if term.integer else number
 
 
 def _bad_value(key: str, value: str, remedy: str) -> CaptureError:
-    return CaptureError("bad_metadata", f"{key} is {value[:60]!r}", remedy)
+    return CaptureError("bad_metadata", f"{key} is {value[:60]!r}", f"for {key} {remedy}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from codecs import getincrementaldecoder
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -19,23 +20,29 @@ _LOOK_AT_LINES = 200
 def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
     """The dialect of a text table and its header line, or None where no rows of numbers are found.
 
-    The separator is the one that parts the most rows into equally many numbers; the header is the
-    last line of as many texts before the first such row, a second one taken for the units row.
+    The separator is the one that parts the rows into the most numbers and fewest texts; the header
+    is the last line of as many texts before the first such row, a second one taken for the units
+    row. Three lines of one number each are a table of one column.
     """
     lines = text.split("\n")[:_LOOK_AT_LINES]
     best: tuple[int, str, int, int] | None = None
     for separator in _SEPARATORS:
-        counts = [_numbers(line, separator) for line in lines]
+        looks = [_numbers(line, separator) for line in lines]
+        counts = [count for count, _ in looks]
         widths = [count for count in counts if count > 1]
         if widths:
             width = max(set(widths), key=lambda w: (widths.count(w), w))
-            found = (widths.count(width) * width, separator, counts.index(width), width)
+            worth = sum(surplus for count, surplus in looks if count == width)
+            found = (worth, separator, counts.index(width), width)
             best = max(best, found) if best else found
+    if best is None:
+        best = _one_column(lines)
     if best is None:
         return None
     _, separator, first, width = best
     heads = [n for n in range(first) if _is_header(lines[n], separator, width)]
-    decimal = "," if separator != "," and re.search(r"\d,\d", lines[first]) else "."
+    comma = separator != "," and any(re.search(r"\d,\d", line) for line in lines[first:])
+    decimal = "," if comma else "."
     dialect = CsvDialect(separator=separator, decimal=decimal, fewer_columns=True)
     if not heads:
         names = tuple(f"column_{n + 1}" for n in range(width))
@@ -52,6 +59,16 @@ def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
     )
 
 
+def _one_column(lines: list[str]) -> tuple[int, str, int, int] | None:
+    """The table of one column that most lines are, with a separator that is no decimal sign."""
+    filled = [n for n, line in enumerate(lines) if line.strip()]
+    numbers = [n for n in filled if _NUMBER.match(lines[n].strip())]
+    if len(numbers) < 3 or 2 * len(numbers) < len(filled):
+        return None
+    decimal_comma = any("," in lines[n] for n in numbers)
+    return len(numbers), ";" if decimal_comma else ",", numbers[0], 1
+
+
 def _cells(line: str, separator: str) -> list[str]:
     row = next(csv.reader(io.StringIO(line), delimiter=separator), [])
     cells = [cell.strip() for cell in row]
@@ -60,11 +77,16 @@ def _cells(line: str, separator: str) -> list[str]:
     return cells
 
 
-def _numbers(line: str, separator: str) -> int:
-    """Fields of a row that consists of numbers (some may be empty or text), or 0."""
+def _numbers(line: str, separator: str) -> tuple[int, int]:
+    """Fields of a row that consists of numbers (some may be empty or text), or 0.
+
+    Beside it by how many the numbers outnumber the texts.
+    """
     cells = _cells(line, separator)
     numeric = sum(bool(_NUMBER.match(cell)) for cell in cells)
-    return len(cells) if numeric and numeric * 2 >= len(cells) else 0
+    if not numeric or 2 * numeric < len(cells):
+        return 0, 0
+    return len(cells), numeric - sum(bool(cell) and not _NUMBER.match(cell) for cell in cells)
 
 
 def _is_header(line: str, separator: str, width: int) -> bool:
@@ -72,9 +94,20 @@ def _is_header(line: str, separator: str, width: int) -> bool:
     return len(cells) >= width and not any(_NUMBER.match(cell) for cell in cells[:1])
 
 
+def encoding_of(head: bytes) -> str:
+    """UTF-8 where the bytes are, else Latin-1, in which every byte is a letter."""
+    try:
+        getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8"
+
+
 def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
     """A filter for the columns whose first rows hold numbers."""
-    lines = body[:MAX_HEAD_BYTES].decode("utf-8", "replace").replace("\r\n", "\n").split("\n")
+    lines = (
+        body[:MAX_HEAD_BYTES].decode(dialect.encoding, "replace").replace("\r\n", "\n").split("\n")
+    )
     header = dialect.skip_lines
     first = header + (0 if dialect.names else 1 + dialect.skip_after_header)
     names = list(dialect.names or _cells(lines[header], dialect.separator))

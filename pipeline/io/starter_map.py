@@ -31,13 +31,21 @@ class StreamSeen:
 
 
 def starter_map(
-    streams: tuple[StreamSeen, ...], dialect: CsvDialect, header: str | None, topics: list[str]
+    streams: tuple[StreamSeen, ...],
+    dialect: CsvDialect,
+    header: str | None,
+    topics: list[str],
+    *,
+    by_name: bool = False,
 ) -> str:
-    """A source map in YAML: guesses filled in, the rest as comments to finish."""
-    lines = [
-        "# Save as conf/source/NAME.yaml, correct what is guessed, and run again.",
-        "recognise:",
-    ]
+    """A source map in YAML: guesses filled in, the rest as comments to finish.
+
+    `by_name`: the file says `contract` and so has to name the map that it is to be read by.
+    """
+    lines = ["# Save as conf/source/NAME.yaml, correct what is guessed, and run again."]
+    if by_name:
+        lines.append("# The file itself must name it: `# source: NAME` among its first lines.")
+    lines.append("recognise:")
     if header is not None:
         pattern = "^" + re.escape(header.strip()[:120])
         lines.append(f"  header: {_quoted(pattern)}")
@@ -73,7 +81,7 @@ def _field_line(seen: FieldSeen, taken: set[str]) -> tuple[str, str | None]:
 
 def _layout_lines(dialect: CsvDialect) -> list[str]:
     lines: list[str] = []
-    for key in ("separator", "decimal", "skip_lines", "skip_after_header"):
+    for key in ("separator", "decimal", "encoding", "skip_lines", "skip_after_header"):
         value = getattr(dialect, key)
         if value != getattr(CONTRACT_DIALECT, key):
             text = "tab" if value == "\t" else value

@@ -76,22 +76,26 @@ def _columns() -> Iterable[Term]:
     yield column("freq_hz", "Hz", "frequency of the LCR meter", 0.0, 1e7)
 
 
+# What a motor cannot be without; an exact zero is a dead channel, not a measurement.
+TINY = 1e-12
+
+
 def _constants() -> Iterable[Term]:
     def constant(
         name: str, unit: str, words: str, low: float = 0.0, high: float = 1e6, whole: bool = False
     ) -> Term:
         return Term(name, unit, words, "constant", low, high, whole)
 
-    yield constant("r_phase_ohm", "ohm", "wye-equivalent phase resistance at 25 degC", 0.0, 1e3)
-    yield constant("r_ll_ohm", "ohm", "mean line-to-line resistance at 25 degC", 0.0, 2e3)
+    yield constant("r_phase_ohm", "ohm", "wye-equivalent phase resistance at 25 degC", TINY, 1e3)
+    yield constant("r_ll_ohm", "ohm", "mean line-to-line resistance at 25 degC", TINY, 2e3)
     yield constant("resistance_imbalance", "1", "largest less smallest phase over their mean", 0, 2)
     yield constant("temp_coeff_copper_1_k", "1/K", "of the winding resistance, at 25 degC", 0, 0.02)
-    yield constant("ld_h", "H", "incremental d inductance near zero current", 0.0, 10.0)
-    yield constant("lq_h", "H", "incremental q inductance near zero current", 0.0, 10.0)
-    yield constant("ld_rated_h", "H", "apparent d inductance at rated current", 0.0, 10.0)
-    yield constant("lq_rated_h", "H", "apparent q inductance at rated current", 0.0, 10.0)
+    yield constant("ld_h", "H", "incremental d inductance near zero current", TINY, 10.0)
+    yield constant("lq_h", "H", "incremental q inductance near zero current", TINY, 10.0)
+    yield constant("ld_rated_h", "H", "apparent d inductance at rated current", TINY, 10.0)
+    yield constant("lq_rated_h", "H", "apparent q inductance at rated current", TINY, 10.0)
     yield constant("saliency_ratio", "1", "lq_h over ld_h", 0.01, 100.0)
-    yield constant("psi_pm_wb", "Wb", "magnet flux linkage, phase peak, at 25 degC", 0.0, 100.0)
+    yield constant("psi_pm_wb", "Wb", "magnet flux linkage, phase peak, at 25 degC", TINY, 100.0)
     yield constant("temp_coeff_magnet_1_k", "1/K", "of psi_pm_wb, at 25 degC", -0.02, 0.02)
     yield constant("ke_phase_peak_v_s_rad", "V·s/rad", "back-EMF, phase peak per mechanical rad/s")
     yield constant("ke_ll_peak_v_s_rad", "V·s/rad", "back-EMF, line-line peak per rad/s")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -152,6 +153,10 @@ class Campaign:
         return tuple(c for c in self.captures if c.meta.test in tests)
 
     def nameplate(self, key: str) -> object | None:
-        """The first stated value of a metadata key (`pole_pairs`, `slots`, `lot`, ...)."""
-        stated = (getattr(c.meta, key) for c in self.captures)
-        return next((value for value in stated if value is not None), None)
+        """The most frequent value of a metadata key (`pole_pairs`, ...), the first of equals.
+
+        None where no capture states the key.
+        """
+        stated = [getattr(c.meta, key) for c in self.captures]
+        counts = Counter(value for value in stated if value is not None)
+        return max(counts, key=counts.__getitem__, default=None)

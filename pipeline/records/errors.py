@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class PipelineError(Exception):
     """Base of every error this project raises on purpose; `exit_code` is the command's."""
@@ -48,3 +50,11 @@ class CaptureError(PipelineError):
     def __reduce__(self) -> tuple[type[CaptureError], tuple[object, ...]]:
         """Cross a process border with every field (exceptions pickle their `args` only)."""
         return type(self), (self.code, self.message, self.remedy, self.rows)
+
+
+def merged(faults: Sequence[CaptureError]) -> CaptureError:
+    """One error that says every fault and every remedy; code and rows are the first one's."""
+    first, rest = faults[0], faults[1:]
+    others = "".join(f"; also [{fault.code}] {fault.message}" for fault in rest)
+    remedies = "; ".join(dict.fromkeys(fault.remedy for fault in faults))
+    return CaptureError(first.code, first.message + others, remedies, first.rows)

@@ -6,9 +6,11 @@ are CSS classes, so that a page in light, dark or print styles them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import takewhile
+from pathlib import PurePosixPath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +23,9 @@ from pipeline.report.thinning import cloud_points, line_points
 
 Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0
-MAIN, GAP, RESIDUAL, LABELS = 210.0, 34.0, 70.0, 76.0
+MAIN, GAP, RESIDUAL, LABELS = 210.0, 34.0, 70.0, 88.0
 MOST_LABELS, LABEL_PITCH, LABEL_CHARS = 8, 13.0, 12
+FILES = frozenset({".mcap", ".csv", ".txt", ".tsv", ".log"})
 LINE_LIMIT = 600
 FEW_DOTS = 150
 PALETTE = 6
@@ -237,10 +240,11 @@ def _end_labels(series: tuple[Series, ...], panel: Panel) -> list[str]:
     for place, _ in sorted(wanted):
         places.append(max(place, places[-1] + LABEL_PITCH) if places else place)
     lift = max(places[-1] - panel.y.start, 0.0) if places else 0.0
+    names = _short([one.label for one in series])
     return [
         f'<text class="end {_tone(series, index)}" '
         f'x="{panel.x.end + 6:.1f}" y="{place - lift + 4:.1f}">'
-        f"<title>{escape(series[index].label)}</title>{escape(_short(series[index].label))}</text>"
+        f"<title>{escape(series[index].label)}</title>{escape(names[index])}</text>"
         for place, (_, index) in zip(places, sorted(wanted), strict=True)
     ]
 
@@ -250,12 +254,15 @@ def _tone(series: tuple[Series, ...], index: int) -> str:
     return "plain" if any(one.fitted.size for one in series) else f"t{index % PALETTE}"
 
 
-def _short(label: str) -> str:
-    """A label that fits the margin; files differ at their ends, so the middle is left out."""
-    if len(label) <= LABEL_CHARS:
-        return label
-    head = LABEL_CHARS // 3
-    return f"{label[:head]}…{label[head + 1 - LABEL_CHARS :]}"
+def _short(labels: Sequence[str]) -> list[str]:
+    """Labels that fit the margin: of files their names less what all begin with, else the end."""
+    paths = [PurePosixPath(label) for label in labels]
+    if all(path.suffix in FILES for path in paths):
+        words = [path.stem.split("_") for path in paths]
+        same = takewhile(lambda column: len(set(column)) == 1, zip(*words, strict=False))
+        kept = sum(1 for _ in same)
+        labels = ["_".join(own[kept:] or own) for own in words]
+    return [x if len(x) <= LABEL_CHARS else f"…{x[1 - LABEL_CHARS :]}" for x in labels]
 
 
 def _frame(panel: Panel) -> str:

@@ -95,11 +95,11 @@ def render_motor(
     )
 
 
-def check_number(value: float | None, unit: str) -> str:
+def check_number(value: float | None, unit: str, digits: int = 5) -> str:
     """A number of a check with its unit; a dash where it was not evaluated."""
     if value is None:
         return "–"
-    return plain(value, 5) if unit == "1" else quantity(value, unit)
+    return plain(value, digits) if unit == "1" else quantity(value, unit)
 
 
 def _row(name: str, words: str, datasheet: Datasheet) -> Row:

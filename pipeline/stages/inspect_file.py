@@ -34,6 +34,8 @@ def render(report: InspectReport) -> str:
     said = dict(report.metadata)
     if report.source:
         lines.append(f"recognised by the source map: {report.source}")
+    elif "contract" in said and report.faults:
+        lines.append("it says `contract`, but `run` refuses it as it stands")
     elif "contract" in said:
         lines.append("in the form of the contract: no source map is needed")
     lines += [f"  {key}: {value}" for key, value in report.metadata]

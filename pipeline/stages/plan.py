@@ -25,13 +25,14 @@ U_REL_OF = {
     "j_rotor_kgm2": 0.02,
     "torque_coulomb_nm": 0.05,
     "b_visc_nm_s_rad": 0.1,
-    "resistance_imbalance": 1.0,
     "cogging_peak_nm": 0.1,
     "cogging_amplitude_nm": 0.1,
     "rth_winding_k_w": 0.1,
     "temp_coeff_copper_1_k": 0.05,
     "temp_coeff_magnet_1_k": 0.2,
 }
+# A quarter of what the check `resistance_balance` allows.
+U_OF = {"resistance_imbalance": 0.005}
 
 
 def main(settings: PlanSettings) -> Outcome:
@@ -53,4 +54,4 @@ def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:
     by_rank = sorted(estimators(), key=lambda estimator: (estimator.rank, estimator.name))
     ways = [Way(e.gives, e.tests, e.experiment, e.uses) for e in by_rank]
     check_tests = {rule.name: rule.tests for rule in rules()}
-    return make_plan(known, ways, check_tests, Aims(required, U_REL, U_REL_OF))
+    return make_plan(known, ways, check_tests, Aims(required, U_REL, U_REL_OF, U_OF))

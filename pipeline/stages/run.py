@@ -57,7 +57,7 @@ def main(settings: RunSettings) -> Outcome:
         found = survey(folder, _source_maps(conf / "source", settings.source))
     jobs = _jobs(settings, found, limits)
     with watch.stage("motors"):
-        results = _process(jobs, settings.workers)
+        results, died = _process(jobs, settings.workers)
     findings = tuple(
         sorted({*found.findings, *(f for r in results for f in r.findings)}, key=_order)
     )
@@ -70,9 +70,9 @@ def main(settings: RunSettings) -> Outcome:
             watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
     outcome = _outcome(settings, results, findings, found, watch)
     return Outcome(
-        first_that_applies(outcome.exit_code, registered.code),
+        first_that_applies(outcome.exit_code, registered.code, *(e.exit_code for e in died)),
         "\n".join(filter(None, [outcome.text, registered.text])),
-        (*outcome.errors, *registered.errors),
+        (*outcome.errors, *registered.errors, *(f"error: {e}" for e in died)),
         outcome.timings,
     )
 
@@ -168,22 +168,27 @@ def _digest(work: bytes, entries: Sequence[Entry]) -> str:
     return hashlib.sha256("\n".join([work.decode(), *maps]).encode()).hexdigest()
 
 
-def _process(jobs: Sequence[MotorJob], workers: int) -> list[MotorResult]:
-    """The results in the order of the jobs; a job that dies leaves the others' results whole."""
+def _process(
+    jobs: Sequence[MotorJob], workers: int
+) -> tuple[list[MotorResult], tuple[MachineError, ...]]:
+    """The results in the order of the jobs, and an error for each job whose worker died.
+
+    What was raised on purpose (a full disk) ends the run: it would meet the next motor too.
+    """
     if not jobs:
-        return []
+        return [], ()
     with _executor(min(workers or os.cpu_count() or 1, len(jobs))) as executor:
         futures = [executor.submit(process_motor, job) for job in jobs]
         errors = [future.exception() for future in futures]
+    died = []
     for job, error in zip(jobs, errors, strict=True):
         if isinstance(error, PipelineError):
             raise error
         if error is not None:
-            raise MachineError(
-                f"motor {job.motor_id} could not be finished: {type(error).__name__}: {error}",
-                "the motors before it are written; rerun to go on",
-            ) from error
-    return [future.result() for future in futures]
+            what = f"motor {job.motor_id} could not be finished: {type(error).__name__}: {error}"
+            remedy = "report it with this line; the other motors are done"
+            died.append(MachineError(what, remedy))
+    return [f.result() for f, e in zip(futures, errors, strict=True) if e is None], tuple(died)
 
 
 def _executor(workers: int) -> Executor:

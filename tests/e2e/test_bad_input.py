@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
+import pipeline.stages.run as run_stage
 from pipeline.__main__ import main
+from pipeline.stages.motor import MotorJob, MotorResult
 
 HEAD = "# contract: 1\n# motor_id: stray\n# test: {test}\n"
 
@@ -51,6 +53,7 @@ def refused(findings: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 STEP = HEAD.format(test="current_step") + "# pair: ab\n# theta_elec_deg: 330\n"
+SPIN = HEAD.format(test="open_circuit")
 ROWS = "".join(f"{k * 1e-5},{1.0},{0.01 * k}\n" for k in range(400))
 
 
@@ -62,6 +65,12 @@ ROWS = "".join(f"{k * 1e-5},{1.0},{0.01 * k}\n" for k in range(400))
         ("nan.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "nan,1.0,0.0\n", "time_not_finite"),
         ("test.csv", HEAD.format(test="dance") + "t_s,vab_v,ia_a\n" + ROWS, "unknown_test"),
         ("back.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "0.0,1.0,0.0\n", "time_not_increasing"),
+        ("one.csv", SPIN + "t_s,vab_v,vbc_v,theta_mech_rad\n0.0,1.0,0.5,0.1\n", "angle_coverage"),
+        ("header.csv", STEP + "t_s,vab_v,ia_a\n", "no_rows"),
+        ("excel.csv", STEP + "t_s;vab_v;ia_a\n" + "0,0;1,0;0,1\n0,1;1,0;0,2\n", "separator"),
+        ("units.csv", STEP + "t_s,vab_v,ia_a\ns,V,A\n" + ROWS, "bad_number"),
+        ("cut.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS[:-4], "truncated"),
+        ("future.csv", "# contract: 2\n# motor_id: x\n# test: drive\nt_s\n0\n", "contract_version"),
     ],
 )
 def test_a_bad_file_is_refused_by_name_and_the_rest_is_done(
@@ -84,6 +93,55 @@ def test_rows_of_the_fault_are_named(batch: Batch) -> None:
     """Time is NaN in row 400 of 401, counted from 0."""
     batch.add("nan.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "nan,1.0,0.0\n")
     assert refused(batch.run()[1])["rows"] == [400, 400]
+
+
+def test_every_bad_key_is_named_in_one_line(batch: Batch) -> None:
+    keys = "# pole_pairs: seven\n# slots: -3\n# winding: star\n# vdc_v: 24\n"
+    batch.add("keys.csv", STEP.replace("# test", f"{keys}# test") + "t_s,vab_v,ia_a\n" + ROWS)
+    code, findings = batch.run()
+    only = refused(findings)
+    assert (code, only["code"]) == (3, "bad_metadata")
+    for said in ("pole_pairs is 'seven'", "slots is '-3'", "winding is 'star'"):
+        assert said in only["message"]
+    for remedy in ("from 1 to 200", "from 1 to 1000", "wye, delta"):
+        assert remedy in only["remedy"]
+    assert "vdc_v" not in only["message"]
+
+
+def test_a_motor_that_breaks_leaves_the_others(
+    batch: Batch, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fault: work on one of two motors raises what nobody foresaw. The other's results stand."""
+    batch.add("other.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS)
+    whole = run_stage.process_motor
+
+    def breaking(job: MotorJob) -> MotorResult:
+        if job.motor_id == "stray":
+            raise RecursionError("too deep")
+        return whole(job)
+
+    monkeypatch.setattr(run_stage, "process_motor", breaking)
+    code, _ = batch.run()
+    assert code == 5
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "stray" in line]
+    assert line.startswith("error: motor stray could not be finished: RecursionError: too deep")
+    listed = json.loads((batch.output / "outputs.json").read_bytes())["files"]
+    assert listed == ["datasheets/gimbal~2fone.json", "findings.json"]
+
+
+def test_an_output_whose_place_a_file_has_taken(
+    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit 5 where `datasheets` cannot be made because it is a file."""
+    output = tmp_path / "out"
+    output.mkdir()
+    (output / "datasheets").write_text("in the way")
+    words = [f"input={bench / 'one'}", f"output={output}", "workers=1"]
+    assert main(["run", *words, "report=false", "recordings=false"]) == 5
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: cannot write gimbal~2fone.json in ")
+    assert str(output / "datasheets") in line
+    assert "name an output folder that can be written" in line
 
 
 def test_a_truncated_recording(batch: Batch) -> None:

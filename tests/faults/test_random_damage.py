@@ -83,7 +83,7 @@ def test_damaged_recordings_never_escape(kind: str) -> None:
 
 
 TEXTS = (
-    RIGOL.format(unit="Amp"),
+    RIGOL,
     SIGLENT,
     MDO,
     TDS,

@@ -36,14 +36,12 @@ KT = 1.5 * MOTOR.pole_pairs * MOTOR.psi_pm_wb
 RELUCTANCE = 1.5 * MOTOR.pole_pairs * (MOTOR.ld_h - MOTOR.lq_h)
 ALPHA = MOTOR.temp_coeff_magnet_1_k
 SPEEDS = (0.3, -0.3, 0.6)
-DWELL_S = 0.12
+DWELL_S = 0.06
 MAP: Plan = tuple(
     (f"torque_map_{k}", "torque_map", {"speed": speed, "dwell_s": DWELL_S})
     for k, speed in enumerate(SPEEDS)
 )
-HELD_MAP: Plan = tuple(
-    (stem, test, {**how, "dwell_s": 0.05, "voltage_timing": "held"}) for stem, test, how in MAP
-)
+HELD_MAP: Plan = tuple((stem, test, {**how, "voltage_timing": "held"}) for stem, test, how in MAP)
 COGGING_MOTOR = MOTOR.having(cogging={"size": 4e-3})
 TURNS: Plan = (
     ("cogging_cw", "cogging", {"direction": 1, "turns": 2.1}),

@@ -13,7 +13,7 @@ of the statistic lies wholly beyond it, so a small sample is lenient and a large
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -87,36 +87,56 @@ class Verdict:
         return tuple(found)
 
 
+@dataclass(frozen=True)
+class Draw:
+    """What one seed gave for one constant; `estimate` is None where it was not identified."""
+
+    constant: str
+    truth: float
+    seen: float
+    estimate: float | None
+    u: float
+    covered: bool
+
+
 def run(case: Case, seeds: range) -> tuple[Verdict, ...]:
     """Judges every constant that the case states a truth for, over the seeds."""
+    return judge(case, draw(case, seeds))
+
+
+def draw(case: Case, seeds: Iterable[int]) -> list[Draw]:
+    """Simulates and estimates seed by seed."""
     options = {**case.estimator.options, **case.options}
-    rows: dict[str, list[tuple[float, float, bool, float, float]]] = {}
-    missing: dict[str, int] = {}
+    draws = []
     for seed in seeds:
         trial = case.simulate(seed)
         fit = case.estimator.fit(trial.campaign, trial.known, options)
         found = {e.name: e for e in reversed(fit.estimates)}
         for name, truth in trial.truth.items():
-            estimate = found[name]
+            estimate, seen = found[name], trial.seen[name]
             if not estimate.known:
-                missing[name] = missing.get(name, 0) + 1
+                draws.append(Draw(name, truth, seen, None, 0.0, False))
                 continue
             low, high = estimate.interval(0.95)
-            rows.setdefault(name, []).append(
-                (
-                    estimate.number - truth,
-                    estimate.number - trial.seen[name],
-                    low <= truth <= high,
-                    estimate.u,
-                    truth,
-                )
-            )
+            covered = bool(low <= truth <= high)
+            draws.append(Draw(name, truth, seen, estimate.number, estimate.u, covered))
+    return draws
+
+
+def judge(case: Case, draws: Sequence[Draw]) -> tuple[Verdict, ...]:
+    """The verdict of each constant, by name."""
     bound = case.bound()
-    names = sorted({*rows, *missing})
-    return tuple(
-        _judge(case.name, name, np.array(rows.get(name, [])), missing.get(name, 0), bound.get(name))
-        for name in names
-    )
+    verdicts = []
+    for name in sorted({d.constant for d in draws}):
+        own = [d for d in draws if d.constant == name]
+        rows = [
+            (d.estimate - d.truth, d.estimate - d.seen, d.covered, d.u, d.truth)
+            for d in own
+            if d.estimate is not None
+        ]
+        missing = len(own) - len(rows)
+        verdicts.append(_judge(case.name, name, np.array(rows), missing, bound.get(name)))
+    return tuple(verdicts)
 
 
 def _judge(

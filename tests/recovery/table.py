@@ -1,4 +1,8 @@
-"""Every case of every `cases_*.py`, and the table of `docs/recovery.md`."""
+"""Every case of every `cases_*.py`, and the table of `docs/recovery.md`.
+
+Blocks of seeds that are done are kept under `reports/recovery`, so that a stopped run goes on where
+it was, and after a change of one estimator only that one's cases are drawn anew.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,25 @@ import importlib
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from multiprocessing import get_context
 from pathlib import Path
 
-from tests.recovery.harness import BIAS_LIMIT_U, COVERAGE_LIMITS, SCATTER_LIMIT, Case, Verdict, run
+from tests.recovery.harness import (
+    BIAS_LIMIT_U,
+    COVERAGE_LIMITS,
+    SCATTER_LIMIT,
+    Case,
+    Draw,
+    Verdict,
+    judge,
+)
+from tests.recovery.kept import digest, draws_of
 
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parents[1] / "docs" / "recovery.md"
+KEPT = HERE.parents[1] / "reports" / "recovery"
+BLOCK = 100
 HEAD = (
     "| estimator | constant | seeds | bias / u | coverage of 95 % | scatter / bound | u, relative "
     "| verdict |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n"
@@ -58,9 +74,30 @@ def document(verdicts: Sequence[Verdict], seeds: int) -> str:
     )
 
 
-def judged(index: int, seeds: int) -> tuple[Verdict, ...]:
-    """The verdicts of one case by its number, for a worker process."""
-    return run(cases()[index], range(seeds))
+def block(index: int, seeds: range, folder: Path, expected: str) -> list[Draw]:
+    """The draws of a block of seeds of one case by its number, for a worker process."""
+    return draws_of(cases()[index], seeds, folder, expected)
+
+
+def verdicts_of(seeds: int, workers: int, folder: Path, names: Sequence[str]) -> list[Verdict]:
+    """The verdicts of the cases, each printed when its last block of seeds is done."""
+    chosen = [k for k, case in enumerate(cases()) if not names or case.name in names]
+    blocks = [range(first, min(first + BLOCK, seeds)) for first in range(0, seeds, BLOCK)]
+    jobs = [(k, own, folder, digest(cases()[k], own)) for k in chosen for own in blocks]
+    verdicts = []
+    with ExitStack() as stack:
+        if workers == 1:
+            done = (block(*job) for job in jobs)
+        else:
+            pool = ProcessPoolExecutor(workers, get_context("spawn"))
+            done = stack.enter_context(pool).map(block, *zip(*jobs, strict=True))
+        for k in chosen:
+            draws = [d for _ in blocks for d in next(done)]
+            for verdict in judge(cases()[k], draws):
+                verdicts.append(verdict)
+                sys.stdout.write(row(verdict))
+            sys.stdout.flush()
+    return verdicts
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -69,16 +106,13 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--seeds", type=int, default=1000)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--output", type=Path, default=DOCUMENT)
+    parser.add_argument("--kept", type=Path, default=KEPT, help="where finished blocks are kept")
+    parser.add_argument("--cases", nargs="*", default=[], help="only these; no page is written")
     chosen = parser.parse_args(arguments)
-    count = len(cases())
-    if chosen.workers == 1:
-        found = [judged(index, chosen.seeds) for index in range(count)]
-    else:
-        with ProcessPoolExecutor(chosen.workers, get_context("spawn")) as pool:
-            found = list(pool.map(judged, range(count), [chosen.seeds] * count))
-    verdicts = [verdict for group in found for verdict in group]
-    chosen.output.parent.mkdir(parents=True, exist_ok=True)
-    chosen.output.write_text(document(verdicts, chosen.seeds), encoding="utf-8")
+    verdicts = verdicts_of(chosen.seeds, chosen.workers, chosen.kept, chosen.cases)
+    if not chosen.cases:
+        chosen.output.parent.mkdir(parents=True, exist_ok=True)
+        chosen.output.write_text(document(verdicts, chosen.seeds), encoding="utf-8")
     return 1 if any(verdict.faults for verdict in verdicts) else 0
 
 

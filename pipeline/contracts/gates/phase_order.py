@@ -1,4 +1,4 @@
-"""Swapped phases: the back-EMF turns against the shaft."""
+"""Swapped phases: back-EMF or line currents turn against the shaft."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed
-from pipeline.contracts.rotation import Array, turning
+from pipeline.contracts.requirements import LINE_CURRENTS
+from pipeline.contracts.rotation import Array, line_current_vector, turning
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "swapped_phases"
 REMEDY = "swap two phases, or turn the sign of the angle and the speed, in conf/source"
+CURRENTS_REMEDY = "swap two of the line currents, or look for one of the wrong sign, in conf/source"
 FREE_TURNING = ("open_circuit", "hand_turn")
 BLOCKS = 100
 SMALL = 0.05
@@ -20,7 +22,7 @@ CONDITION = 1e3
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Refuses where line voltages, or v_q under current, oppose the shaft's sense of rotation."""
+    """Refuses where line voltages, line currents or v_q oppose the shaft's sense of rotation."""
     if capture.meta.test in FREE_TURNING:
         seen = turning(capture)
         opposed = (
@@ -44,7 +46,43 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             "where the magnet's voltage must rise with it",
             REMEDY,
         )
+    _refuse_opposed_currents(capture, options)
     return Passed()
+
+
+def _refuse_opposed_currents(capture: Capture, options: Mapping[str, float]) -> None:
+    """Refuses line currents that turn minus pole pairs times a turn.
+
+    The nameplate's count is needed: sampled too slowly, currents seem to turn backward, but then
+    at another rate. Three that do not sum to zero hold another fault, which the gate `phase_sum`
+    names.
+    """
+    stated = capture.meta.pole_pairs
+    if stated is None or _common_share(capture) > options["common"]:
+        return
+    seen = turning(capture, line_current_vector)
+    if seen is None or seen.cycles < options["cycles"]:
+        return
+    if abs(seen.cycles_per_turn + stated) < options["off_count"] * stated:
+        raise CaptureError(
+            CODE,
+            f"the line currents turn c-b-a where the shaft turns forward "
+            f"({seen.cycles_per_turn:.2f} cycles a turn)",
+            CURRENTS_REMEDY,
+        )
+
+
+def _common_share(capture: Capture) -> float:
+    """Mean of the three line currents over one of them (rms); 0 where not all three are there."""
+    if not capture.has(*LINE_CURRENTS):
+        return 0.0
+    data = capture.arrays(*LINE_CURRENTS)
+    currents = np.column_stack([data[name] for name in LINE_CURRENTS])
+    currents = currents[np.isfinite(currents).all(axis=1)]
+    size = float(np.sqrt(np.mean(currents**2))) if currents.size else 0.0
+    if size == 0.0:
+        return 0.0
+    return float(np.sqrt(np.mean(currents.mean(axis=1) ** 2))) / size
 
 
 def back_emf_slope(capture: Capture) -> tuple[float, float]:
@@ -103,5 +141,9 @@ GATE = Gate(
         "cycles": 1.0,
         # Over the blocks' own scatter, which neighbours share: never by chance.
         "sigmas": 5.0,
+        # A sensor of the wrong sign makes two thirds; gains and offsets make a few per cent.
+        "common": 0.2,
+        # A load that pulses turns the currents' vector a little; aliasing hits this by chance only.
+        "off_count": 0.1,
     },
 )

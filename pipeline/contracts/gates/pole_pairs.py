@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.rotation import turning
 from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
 
+CODE = "pole_pairs_not_whole"
+UNITS = {180.0 / math.pi: "the angle is in degrees", 30.0 / math.pi: "the speed is in rpm"}
 REMEDY = "correct `pole_pairs`; until then the count from the data is used"
 
 
@@ -21,14 +25,32 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     off = abs(count - whole)
     if whole == 0 or off > options["from_whole"] + 2.0 * seen.u:
         words = f"the back-EMF makes {count:.3f} cycles a turn of the shaft, no whole number"
+        told = _unit(count, seen.u, options["from_whole"], stated)
+        if told:
+            raise CaptureError(CODE, f"{words}: {told}", "map the unit in conf/source")
         remedy = "check the angle's unit, for slip of its coupling, and for a gear"
-        return Passed(findings=(warning(capture, "pole_pairs_not_whole", words, remedy),))
+        return Passed(findings=(warning(capture, CODE, words, remedy),))
     if stated is not None and stated != whole:
         words = f"the back-EMF makes {count:.3f} cycles a turn; the nameplate says {stated}"
         if stated == 2 * whole:
             words = f"{words}, which is the number of poles"
         return Passed(findings=(warning(capture, "pole_pairs_nameplate", words, REMEDY),))
     return Passed()
+
+
+def _unit(count: float, u: float, from_whole: float, stated: int | None) -> str:
+    """The foreign unit in which the count would be a whole number, in words, or an empty text.
+
+    That number has to be the nameplate's, or the count below one half, which no motor has: a slip
+    or a gear may meet a unit's factor by chance.
+    """
+    for factor, words in UNITS.items():
+        cycles = count * factor
+        whole = round(cycles)
+        near = abs(cycles - whole) <= from_whole + 2.0 * u * factor
+        if near and u * factor < 0.1 and whole > 0 and (whole == stated or count < 0.5):
+            return f"{words}, which makes {cycles:.3f}"
+    return ""
 
 
 GATE = Gate(

@@ -78,7 +78,7 @@ GATE = Gate(
         # Below a turn, eccentricity of the angle sensor is a large part of the angle.
         "turns": 1.0,
         # Lag and smoothing of a speed average out over blocks; a scale error does not.
-        "warn": 0.05,
+        "warn": 0.03,
         # Nearer to 1 than this lies no unit, gear or pole count.
         "refuse": 0.2,
     },

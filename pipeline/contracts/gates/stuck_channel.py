@@ -28,7 +28,7 @@ MUST_MOVE: dict[str, tuple[str, ...]] = {
     "open_circuit": (*LINE_VOLTAGES, "theta_mech_rad"),
     "hand_turn": (*LINE_VOLTAGES, "theta_mech_rad"),
     "cogging": ("theta_mech_rad", "torque_shaft_nm"),
-    "torque_map": ("iq_a", "vq_v", "torque_shaft_nm", "theta_mech_rad"),
+    "torque_map": ("iq_a", "vd_v", "vq_v", "torque_shaft_nm", "theta_mech_rad"),
     "spin_down": ("omega_mech_rad_s", "theta_mech_rad"),
     "heat_run": (),
     "holding_current": ("theta_mech_rad", "iq_a"),

@@ -25,6 +25,7 @@ from pipeline.numerics.orders import (
     whole_turns,
 )
 from pipeline.physics.glossary import CONSTANTS
+from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -127,7 +128,7 @@ def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign
     words = []
     for line in lines[:8]:
         k = line.order
-        if isinstance(slots, int) and isinstance(p, int) and k % np.lcm(slots, 2 * p) == 0:
+        if isinstance(slots, int) and isinstance(p, int) and k % cogging_order(slots, p) == 0:
             why = " (LCM of slots and poles)"
         elif isinstance(slots, int) and k % slots == 0:
             why = " (slots)"

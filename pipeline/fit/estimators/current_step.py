@@ -44,6 +44,7 @@ AXES = {
 }
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Offer = tuple[float, int, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +87,14 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     solution = _solve(model, axes)
     used = tuple(r.capture for r in records)
     notes.append(unstated_note(used, ("voltage", "current")))
+    offers = _offers(solution, axes, solution.sigmas)
     estimates = []
     for name in GIVES:
         if name not in axes:
             missing = f"no step with enough current on the {name[1]} axis; {EXPERIMENT}"
             estimates.append(not_identifiable(name, "H", NAME, missing))
             continue
-        estimates.append(_estimate(name, solution, notes))
+        estimates.append(_estimate(name, solution, offers[name], notes))
     return Fit(tuple(estimates), tuple(_evidence(solution, axes)))
 
 
@@ -166,7 +168,7 @@ def _worth(solution: Solution, term: int) -> float:
 
 def _offers(
     solution: Solution, axes: Sequence[str], sigmas: Sequence[float]
-) -> dict[str, list[tuple[float, int, float]]]:
+) -> dict[str, list[Offer]]:
     """For each axis and each term not in use: gain in weighted squares, term, change of L.
 
     One Gauss-Newton step of the present fit with that term added (Rao's score test).
@@ -180,7 +182,7 @@ def _offers(
     scaled = jacobian / scale
     normal, gradient = scaled.T @ scaled, scaled.T @ residuals
     places = np.flatnonzero(everything)
-    offers: dict[str, list[tuple[float, int, float]]] = {}
+    offers: dict[str, list[Offer]] = {}
     for name in axes:
         offers[name] = []
         for term in AXES[name][1]:
@@ -231,24 +233,25 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -
     return Solution(model, parameters, free, honest, tuple(sigmas), tuple(found))
 
 
-def _between_models(solution: Solution, name: str) -> float:
+def _between_models(solution: Solution, offers: Sequence[Offer]) -> float:
     """Standard deviation of L between the chosen model and those with one term more.
 
     Each is weighted by exp(-BIC/2), the chosen one by 1.
     """
     price = math.log(sum(float(r.count.sum()) for r in solution.model.records))
-    offers = _offers(solution, (name,), solution.sigmas)[name]
     weights = [math.exp(-0.5 * max(price - gain, 0.0)) for gain, _, _ in offers]
     spread = sum(w * change**2 for w, (_, _, change) in zip(weights, offers, strict=True))
     return math.sqrt(spread / (1.0 + sum(weights)))
 
 
-def _estimate(name: str, solution: Solution, notes: Sequence[str]) -> Estimate:
+def _estimate(
+    name: str, solution: Solution, offers: Sequence[Offer], notes: Sequence[str]
+) -> Estimate:
     place, terms = AXES[name]
     value = float(solution.parameters[place])
     scatter = math.sqrt(max(float(solution.covariance()[place, place]), 0.0))
     parts = [Contribution(f"scatter:{NAME}:{name}", scatter, "A")]
-    between = _between_models(solution, name)
+    between = _between_models(solution, offers)
     parts.append(Contribution(f"scatter:{NAME}:saturation:{name}", between, "A"))
     parts += _gains(name, solution)
     largest = max(SPACE * r.largest_a * abs(_share(r, name)) for r in solution.model.records)

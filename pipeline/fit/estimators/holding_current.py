@@ -27,6 +27,7 @@ from pipeline.numerics.orders import (
     whole_turns,
 )
 from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -176,7 +177,7 @@ def _true_order(
     poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
     if positions is None or not isinstance(slots, int) or not isinstance(poles, int):
         return seen, ""
-    own = int(np.lcm(slots, 2 * poles))
+    own = cogging_order(slots, poles)
     alike = [seen, *(m * positions + s * seen for m in (1, 2, 3) for s in (-1, 1))]
     made = [k for k in alike if k % own == 0]
     if seen % own == 0 or len(made) != 1:

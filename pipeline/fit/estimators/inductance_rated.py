@@ -198,7 +198,9 @@ def _other_side(fluxes: Sequence[Flux], magnet: float, found: Result) -> str:
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
     near = [f for f in fluxes if abs(f.id_a) < SAME * reach and f not in across]
     other = _direct([*across, *near], magnet)
-    return "" if other is None else f"; {other.value_h:.4g} H at {other.id_a:.3g} A of d current"
+    if other is None:
+        return ""
+    return f"; {1e6 * other.value_h:.4g} µH at {other.id_a:.3g} A of d current"
 
 
 def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:
@@ -241,7 +243,8 @@ def _evidence(
             mine.sort(key=lambda f: (getattr(f, current), f.group))
             x = np.array([getattr(f, current) for f in mine])
             y = np.array([getattr(f, flux) for f in mine])
-            label = f"{other} {float(np.mean([getattr(f, other) for f in mine])):.3g} A"
+            amps = float(np.mean([getattr(f, other) for f in mine])) if level else 0.0
+            label = f"{other} {amps:.3g} A"
             line = np.array([])
             if found is not None:
                 still = x[np.abs(x) < SAME * reach], y[np.abs(x) < SAME * reach]

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.back_emf import (
     LEAST_CYCLES,
-    Spin,
-    Stretch,
-    StretchFlux,
-    electrical_per_mechanical,
     flux_of,
     read_spin,
     steady_stretches,
@@ -27,9 +22,10 @@ from pipeline.fit.instruments import (
     voltage_source,
 )
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.spin_angle import METHOD, Group, angle_offset, count_pole_pairs
 from pipeline.fit.terminals import first_temperature
 from pipeline.numerics.least_squares import LinearFit, linear_fit
-from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as, pole_pairs_from
+from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -37,7 +33,7 @@ from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
-NAME = "open_circuit"
+NAME = METHOD
 EXPERIMENT = (
     "record an open_circuit capture: shaft driven at three or more speeds, two line voltages, "
     "theta_mech_rad, temp_magnet_degc"
@@ -96,17 +92,6 @@ UNITS = {"psi_pm_wb": "Wb", "temp_coeff_magnet_1_k": "1/K", "angle_offset_elec_r
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """One steady speed of one capture."""
-
-    capture: Capture
-    spin: Spin
-    stretch: Stretch
-    flux: StretchFlux
-    temp_degc: float
-
-
 def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Psi = |v|/omega_e of every steady speed of every capture, brought to 25 degC together.
 
@@ -123,12 +108,12 @@ def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str,
     used = tuple(c for c in captures if any(g.capture is c for g in groups))
     notes.append(unstated_note(used, ("voltage", "temperature")))
     found = _flux_estimates(groups, used, notes, options)
-    pairs, order = _pole_pairs(groups)
+    pairs, order = count_pole_pairs(groups)
     found["pole_pairs"] = pairs
     found["phase_order"] = order
     found |= _couplings(found["psi_pm_wb"], pairs)
     found |= _harmonics(groups, used)
-    found["angle_offset_elec_rad"] = _angle_offset(groups, pairs, order, used)
+    found["angle_offset_elec_rad"] = angle_offset(groups, pairs, order, used)
     return Fit(tuple(found[name] for name in GIVES), tuple(_evidence(groups, found["psi_pm_wb"])))
 
 
@@ -179,8 +164,8 @@ def _flux_estimates(
         "temp_magnet_degc": 25.0,
         "temp_measured_low_degc": round(float(excess.min()) + 25.0, 3),
         "temp_measured_high_degc": round(float(excess.max()) + 25.0, 3),
-        "speed_low_rad_s": min(abs(g.flux.speed_elec_rad_s) for g in groups),
-        "speed_high_rad_s": max(abs(g.flux.speed_elec_rad_s) for g in groups),
+        "speed_elec_low_rad_s": min(abs(g.flux.speed_elec_rad_s) for g in groups),
+        "speed_elec_high_rad_s": max(abs(g.flux.speed_elec_rad_s) for g in groups),
     }
     paths = tuple(c.path for c in used)
     extra: list[Contribution] = []
@@ -246,48 +231,6 @@ def _instrument_shares(
     return shares
 
 
-def _pole_pairs(groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
-    """P and the phase order from electrical over mechanical speed of each capture."""
-    ratios: list[float] = []
-    words = ""
-    paths = []
-    for capture in dict.fromkeys(g.capture.path for g in groups):
-        own = [g for g in groups if g.capture.path == capture]
-        ratio, by_angle = electrical_per_mechanical(own[0].spin, [g.stretch for g in own])
-        if math.isfinite(ratio):
-            ratios.append(ratio)
-            paths.append(capture)
-            words = "theta_mech_rad" if by_angle else "omega_mech_rad_s"
-    missing = (
-        "record theta_mech_rad or omega_mech_rad_s in the open_circuit capture, or a hand_turn"
-    )
-    if not ratios:
-        absent = [not_identifiable(n, "1", NAME, missing) for n in ("pole_pairs", "phase_order")]
-        return absent[0], absent[1]
-    counts = [pole_pairs_from(abs(r), 1.0).number for r in ratios]
-    found = ", ".join(f"{abs(r):.5f}" for r in ratios)
-    if counts[0] is None or len(set(counts)) > 1:
-        note = (
-            f"electrical cycles a turn of {words} are {found}: no whole number within 0.02; check "
-            "for a gear or slip between motor and angle sensor, then repeat the open_circuit"
-        )
-        pairs = not_identifiable("pole_pairs", "1", NAME, note)
-    else:
-        worst = max(abs(abs(r) - counts[0]) for r in ratios)
-        note = f"electrical cycles a turn of {words}: {found}; {worst:.1g} from the whole number"
-        pairs = Estimate(
-            "pole_pairs", counts[0], "1", "measured", NAME, captures=tuple(paths), note=note
-        )
-    senses = {1 if r > 0.0 else -1 for r in ratios}
-    if len(senses) > 1:
-        note = "captures disagree on the phase order; check which leads were exchanged"
-        return pairs, not_identifiable("phase_order", "1", NAME, note)
-    order = Estimate(
-        "phase_order", senses.pop(), "1", "measured", NAME, captures=tuple(paths), note=words
-    )
-    return pairs, order
-
-
 def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:
     found: dict[str, Estimate] = {}
     for name in KE_NAMES:
@@ -328,52 +271,13 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
     return found
 
 
-def _angle_offset(
-    groups: Sequence[Group], pairs: Estimate, order: Estimate, used: Sequence[Capture]
-) -> Estimate:
-    """Circular mean over all speeds of the d axis less s p theta, both senses of rotation alike.
-
-    v leads the d axis by a quarter turn in the sense of rotation. The spread between speeds is
-    the standard error: a delay shows as a drift with speed, and is not averaged away by chance.
-    """
-    name = "angle_offset_elec_rad"
-    own = [g for g in groups if g.spin.theta_rad is not None]
-    if not own or not pairs.known or not order.known:
-        note = "record theta_mech_rad in the open_circuit capture"
-        return not_identifiable(name, "rad", NAME, note)
-    vectors = []
-    for group in own:
-        theta = group.spin.theta_rad
-        if theta is None:
-            continue
-        sense = math.copysign(1.0, group.flux.speed_elec_rad_s)
-        axis = group.stretch.phase_rad - sense * math.pi / 2.0
-        offset = axis - order.number * pairs.number * theta[group.stretch.rows]
-        vectors.append(complex(np.nanmean(np.exp(1j * offset))))
-    mean = complex(np.mean(vectors))
-    apart = np.angle(np.array(vectors) / mean)
-    count = len(vectors)
-    u = float(np.std(apart, ddof=1)) / math.sqrt(count) if count > 1 else float(math.pi / 100)
-    kind = Contribution(f"scatter:{NAME}:{name}", u, "A", float(max(count - 1, 1)))
-    return Estimate(
-        name,
-        float(np.angle(mean)),
-        "rad",
-        "measured",
-        NAME,
-        budget_of([kind]),
-        {},
-        tuple(c.path for c in used),
-        "of the angle sensor as mounted on this bench, not of the motor",
-    )
-
-
 def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:
     alpha = 0.0
     temps = np.array([g.temp_degc for g in groups])
     psis = np.array([g.flux.psi_wb for g in groups])
-    if np.ptp(temps) > 0.0:
-        alpha = float(np.polyfit(temps - 25.0, psis / psi.number, 1)[0])
+    if psi.at["temp_measured_low_degc"] != psi.at["temp_measured_high_degc"]:
+        line = np.column_stack([np.ones(temps.size), temps - 25.0])
+        alpha = float(linear_fit(line, psis / psi.number).coefficients[1])
     amplitude, flux = [], []
     for path in dict.fromkeys(g.capture.path for g in groups):
         own = [g for g in groups if g.capture.path == path]

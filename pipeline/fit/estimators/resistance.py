@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from pipeline.fit.direct_current import (
     COPPER_SOURCE,
+    POINT_OPTIONS,
+    TEST,
     Columns,
     Point,
+    captures_of,
     columns_of,
     direct_current_points,
     fit_direct_current,
@@ -83,17 +86,14 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
     pairs' (conventions.phase_resistances_ohm), and so is their scatter.
     """
     del known
-    captures = campaign.of("resistance")
-    points, notes = direct_current_points(
-        captures, options["temp_assumed_degc"], options["zero_crossing"]
-    )
+    points, notes = direct_current_points(campaign, options)
     if not points:
         return Fit(_missing(f"no settled plateau with current; {EXPERIMENT}"))
     columns = columns_of(points)
     fit = fit_direct_current(points, columns, options["u_rel_copper"])
     if not fit.full_rank:
         return Fit(_missing(f"the plateaus do not part R from the offset; {EXPERIMENT}"))
-    used = tuple(captures[k] for k in sorted({p.capture for p in points}))
+    used = captures_of(campaign, points)
     size = len(columns.pairs)
     names = tuple(_results(columns, fit.coefficients[:size]))
 
@@ -244,16 +244,15 @@ def _evidence(points: Sequence[Point], residuals: Array) -> Evidence:
 ESTIMATOR = Estimator(
     NAME,
     GIVES,
-    ("resistance",),
+    (TEST,),
     EXPERIMENT,
     fit_resistance,
     terms=TERMS,
     options={
-        "zero_crossing": 0.03,
+        **POINT_OPTIONS,
         "u_rel_copper": 0.01,
         "u_rel_imbalance": 0.005,
         "drop_measured_v": 0.0005,
         "drop_commanded_v": 0.3,
-        "temp_assumed_degc": 25.0,
     },
 )

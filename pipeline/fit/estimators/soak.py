@@ -7,6 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.fit.direct_current import (
+    POINT_OPTIONS,
+    TEST,
+    captures_of,
     columns_of,
     direct_current_points,
     fit_direct_current,
@@ -40,10 +43,7 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
     and a thermometer's offset enters only through R25.
     """
     del known
-    captures = campaign.of("resistance")
-    points, notes = direct_current_points(
-        captures, options["temp_assumed_degc"], options["zero_crossing"]
-    )
+    points, notes = direct_current_points(campaign, options)
     spans = {
         pair: float(np.ptp([p.temp_degc for p in points if p.pair == pair]))
         for pair in sorted({p.pair for p in points})
@@ -59,7 +59,7 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
     def evaluate(shift: Shift) -> np.ndarray:
         return np.array([fit_direct_current(shifted(points, shift), columns, np.inf).alpha_1_k])
 
-    used = tuple(captures[k] for k in sorted({p.capture for p in points}))
+    used = captures_of(campaign, points)
     shared = contributions(evaluate, instrument_uncertainties(used))[0]
     scatter = Contribution(f"scatter:{NAME}:{GIVEN}", fit.u_alpha_1_k, "A")
     temps = [p.temp_degc for p in points]
@@ -80,13 +80,12 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
 ESTIMATOR = Estimator(
     NAME,
     (GIVEN,),
-    ("resistance",),
+    (TEST,),
     EXPERIMENT,
     fit_soak,
     rank=1,
     options={
-        "zero_crossing": 0.03,
-        "temp_assumed_degc": 25.0,
+        **POINT_OPTIONS,
         "least_span_k": 10.0,
         "worst_u_rel": 0.2,
     },

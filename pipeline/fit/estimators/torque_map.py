@@ -370,5 +370,5 @@ ESTIMATOR = Estimator(
     uses=("pole_pairs", "temp_coeff_magnet_1_k"),
     rank=5,
     terms=(RELUCTANCE,),
-    options={"level": 1e-4},
+    options={"level": 0.01},
 )

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from pipeline.__main__ import main
@@ -40,6 +44,16 @@ def test_wrong_usage_is_one_line_and_exit_2(
     error = capsys.readouterr().err
     assert error.startswith("error: ")
     assert error.count("\n") == 1
+
+
+def test_a_reader_that_leaves_early_is_no_failure() -> None:
+    """`pipeline ... | head -1`: no traceback, and the command's own exit code."""
+    words = [sys.executable, "-c", "from pipeline.__main__ import main; raise SystemExit(main())"]
+    ours, theirs = os.pipe()
+    os.close(ours)
+    done = subprocess.run([*words, "--help"], stdout=theirs, stderr=subprocess.PIPE, check=False)
+    os.close(theirs)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 def test_text_keys_are_taken_as_typed() -> None:

@@ -107,9 +107,21 @@ def test_uncertain(u_a: float, u_b: float, steps: int, beyond: int) -> None:
     plan = make_plan(state, WAYS, CHECKS, Aims(u_rel_of={"r_phase_ohm": 0.01}))
     assert (len(plan.steps), len(plan.beyond)) == (steps, beyond)
     if steps:
-        assert "known to 6.7 % (k=1), wanted to 1 %" in plan.text()
+        assert "known to 6.7 % (k=1), wanted to 1.0 %" in plan.text()
     if beyond:
         assert "most of it is current@rig-1" in plan.beyond[0].words
+
+
+@pytest.mark.parametrize(("u", "steps"), [(0.004, 0), (0.02, 1)])
+def test_what_is_zero_in_a_sound_motor_has_an_absolute_target(u: float, steps: int) -> None:
+    """An imbalance of 0.1 % known to 0.4 % is no doubt; known to 2 % it is."""
+    known_all = {**ALL_KNOWN, "resistance_imbalance": measured("resistance_imbalance", 0.001, u)}
+    ways = (*WAYS, Way(("resistance_imbalance",), ("resistance",), "all three pairs", ()))
+    aims = Aims(frozenset({"resistance_imbalance"}), u_of={"resistance_imbalance": 0.005})
+    plan = make_plan(known(known_all, *TESTS), ways, CHECKS, aims)
+    assert len(plan.steps) == steps
+    if steps:
+        assert "known to 0.020 (k=1), wanted to 0.0050" in plan.text()
 
 
 def test_a_whole_number_has_no_relative_uncertainty() -> None:

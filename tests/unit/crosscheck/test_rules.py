@@ -9,6 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.crosscheck import registry
+from pipeline.crosscheck.protocol import Rule
 from pipeline.crosscheck.registry import rules
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
@@ -134,6 +136,50 @@ def test_nameplate(stated: int, status: str, words: str) -> None:
     check = judge("pole_pairs_nameplate", constants(), nameplate(pole_pairs=stated))
     assert check.status == status
     assert words in (check.suspect or "")
+
+
+def plates(*stated: int) -> Campaign:
+    """Captures a.csv, b.csv, ... that each state pole pairs."""
+    captures = [
+        Capture(f"{chr(97 + n)}.csv", "0", "verified", CaptureMeta("m", "drive", pole_pairs=p), ())
+        for n, p in enumerate(stated)
+    ]
+    return Campaign("m", tuple(captures))
+
+
+@pytest.mark.parametrize(
+    ("stated", "named"),
+    [
+        ((7, 14, 7), ("b.csv", "1 of 3 captures")),
+        ((7, 6, 7, 7, 8), ("b.csv, e.csv", "2 of 5 captures")),
+        ((7, 14), ("poles, not pole pairs",)),
+        ((14, 14, 7), ("poles, not pole pairs",)),
+        ((6, 6), ("another motor's nameplate",)),
+    ],
+)
+def test_the_odd_nameplate_is_named_where_most_are_right(
+    stated: tuple[int, ...], named: tuple[str, ...]
+) -> None:
+    check = judge("pole_pairs_nameplate", constants(), plates(*stated))
+    assert check.status == "fail"
+    for words in named:
+        assert words in (check.suspect or "")
+    if "captures" not in named[-1]:
+        assert ".csv" not in (check.suspect or "")
+
+
+def test_a_rule_that_breaks_has_judged_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other checks stand; the broken one is not evaluated and says why."""
+
+    def breaks(known: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
+        raise ZeroDivisionError(f"{len(known.estimates)} {campaign.motor_id} {len(options)}")
+
+    odd = Rule("odd", breaks)
+    monkeypatch.setattr(registry, "rules", lambda: (odd, *rules()))
+    first, *others = registry.check_all(constants(), nameplate(pole_pairs=7), {})
+    assert (first.name, first.status) == ("odd", "not_evaluated")
+    assert "broke on this data: ZeroDivisionError" in first.meaning
+    assert {check.name: check.status for check in others}["pole_pairs_nameplate"] == "pass"
 
 
 @pytest.mark.parametrize(

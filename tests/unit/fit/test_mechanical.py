@@ -469,7 +469,7 @@ def test_both_sides_of_d_current_are_stated_and_the_negative_published() -> None
     assert found is not None
     assert found.at["id_a"] == pytest.approx(-0.6 * design_motor.current_rated_a, rel=0.01)
     assert found.number > 1.02 * design_motor.ld_h
-    other = float(found.note.rsplit("; ", 1)[1].split(" H at ")[0])
+    other = 1e-6 * float(found.note.rsplit("; ", 1)[1].split(" µH at ")[0])
     assert other < 0.98 * design_motor.ld_h
 
 

@@ -10,6 +10,7 @@ import pytest
 from pipeline.io.ingest import read_capture, survey
 from pipeline.io.inspect_file import describe
 from pipeline.io.source_map import parse_source_map
+from pipeline.records.errors import CaptureError
 from pipeline.stages.inspect_file import render
 from tests.unit.io.recordings import META, json_messages, mcap_file, small_capture
 
@@ -80,6 +81,76 @@ def test_a_capture_of_the_contract_needs_no_map(tmp_path: Path) -> None:
     assert report.starter == ""
     assert "no source map is needed" in render(report)
     assert report.columns == {"t_s", "iq_a", "theta_mech_rad"}
+
+
+SPIN = "# contract: 1\n# motor_id: 000123\n# test: spin_down\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (SPIN + "t_s;omega_mech_rad_s\n0,0;100,5\n0,1;99,5\n", "separated by ';'"),
+        (SPIN + "t_s,omega_mech_rad_s\ns,rad/s\n0.0,100.5\n0.1,99.5\n", "holds 's'"),
+    ],
+)
+def test_a_capture_that_run_would_refuse_is_not_called_sound(
+    tmp_path: Path, text: str, says: str
+) -> None:
+    """The fault is that of `run`, and the map to start from reads the file once it is named."""
+    path = tmp_path / "x.csv"
+    path.write_text(text)
+    entry = survey(tmp_path, {}).entries[0]
+    with pytest.raises(CaptureError) as refused:
+        read_capture(tmp_path, entry)
+    report = describe(path, {})
+    assert str(refused.value) in report.faults
+    assert says in render(report)
+    assert "run` refuses it as it stands" in render(report)
+    assert "# source: NAME" in report.starter
+    path.write_text("# source: bench\n" + text)
+    sources = {"bench": parse_source_map(report.starter.encode(), "bench")}
+    (table,) = read_capture(tmp_path, survey(tmp_path, sources).entries[0]).tables
+    assert table["omega_mech_rad_s"].to_list() == [100.5, 99.5]
+    assert table["t_s"].to_list() == [0.0, 0.1]
+
+
+def test_metadata_that_run_would_refuse_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(SPIN.replace("spin_down", "dance") + "t_s,omega_mech_rad_s\n0,1\n1,2\n")
+    assert "the test 'dance' is unknown" in render(describe(path, {}))
+
+
+def test_a_table_in_latin_1_is_read_and_its_map_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_bytes("Zeit (s);temp_winding (\xb0C)\n0;20\n1;21,5\n".encode("latin-1"))
+    report = describe(path, {})
+    assert report.faults == ()
+    assert "encoding: 'latin-1'" in report.starter
+    assert [seen.first for seen in report.streams[0].fields] == [0.0, 20.0]
+    finished = report.starter.replace("# 'Zeit (s)': {column: , unit: }", "'Zeit (s)': t_s")
+    finished = finished.replace("# motor_id: the serial number", "motor_id: m1")
+    finished = finished.replace("# test: one of the contract's", "test: drive")
+    finished = finished.replace("time:\n  from: increment\n  increment_s: 1.0e-3", "#")
+    sources = {"bench": parse_source_map(finished.encode(), "bench")}
+    (table,) = read_capture(tmp_path, survey(tmp_path, sources).entries[0]).tables
+    assert table["t_s"].to_list() == [0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [("0.5\n1.5\n2.5\n", [0.5, 1.5, 2.5]), ("I\n0.5\n1.5\n2.5\n", [0.5, 1.5, 2.5])],
+)
+def test_one_column_of_numbers_is_a_table(tmp_path: Path, text: str, values: list[float]) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(text)
+    (stream,) = describe(path, {}).streams
+    assert (stream.rows, stream.fields[0].first) == (3, values[0])
+
+
+def test_a_cut_recording_gets_no_empty_map(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(small_capture()[:700])
+    assert describe(path, {}).starter == ""
 
 
 @pytest.mark.parametrize(

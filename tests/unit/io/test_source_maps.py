@@ -18,68 +18,25 @@ CONF = Path(pipeline.__file__).parents[1] / "conf" / "source"
 SAID = "motor_id: 000123\ntest: drive\npole_pairs: 7\n"
 RPM = 2 * np.pi / 60
 
-RIGOL = "X,CH1,CH2,Start,Increment,\nSequence,Volt,{unit},-2.000000e-03,5.000000e-06,\n"
-RIGOL += "0,1.20e+00,1.00e-01,\n1,1.40e+00,2.00e-01,\n2,1.60e+00,3.00e-01,\n"
-RIGOL_SHORT = "CH1,Start,Increment,\nVolt,-1.0e-03,1.0e-06\n1.20e+00,,\n1.40e+00,,\n1.60e+00,,\n"
-RIGOL_TIME = "Time,X(CH1),X(CH2),\nSecond,Volt,Ampere,\n-0.002,1.2,0.1,\n-0.001,1.4,0.2,\n"
-SIGLENT = """Record Length,Analog:3,
-Sample Interval,Analog:1.000000E-03,
-Vertical Units,CH1:V,CH2:A,,
-Vertical Scale,CH1:5.0E-01,CH2:1.0E-01,,
-Vertical Offset,CH1:0.0E+00,CH2:0.0E+00,,
-Horizontal Units,s,
-Horizontal Scale,1.00E-03,
-Model Number,SDS2104X,
-Serial Number,SDS00001,
-Software Version,1.3.7R5,
-Source,CH1,CH2
-Second,Volt,Amp
- -0.001, 1.2, 0.1
-  0.000, 1.4, 0.2
-  0.001, 1.6, 0.3
-"""
-SIGLENT_SHORT = """Record Length,Analog:3
-Sample Rate,1000.0
-Vertical Scale,CH1: 0.05
-Vertical Offset,CH1:0.00000
-Horizontal Scale, 0.000010000
-Second,Volt
--0.00100000000, 1.20000
- 0.00000000000, 1.40000
- 0.00100000000, 1.60000
-"""
-MDO = """Model,MDO3014
-Firmware Version,1.20
+SAMPLES = Path(__file__).parent / "samples"
 
-Waveform Type,ANALOG,,
-Point Format,Y,,
-Horizontal Units,s,,
-Sample Interval,1e-03,,
-Record Length,3,,
-Probe Attenuation,10,,
-Vertical Units,V,A,
-,,,
-Label,,,
-TIME,CH1,CH2
--1.0000e-03,1.2,0.1
-0.0000e+00,1.4,0.2
-1.0000e-03,1.6,0.3
-"""
-TDS = """Record Length,3.000000e+00,,-0.001000000000,1.20000,
-Sample Interval,1.000000e-03,,0.000000000000,1.40000,
-Trigger Point,1.000000e+00,,0.001000000000,1.60000,
-"""
-PICO = "Time,Channel A,Channel B\n(ms),(mV),(mA)\n\n-1.0,1200,100\n0.0,1400,200\n1.0,1600,300\n"
-VESC = "ms_today;input_voltage;temp_motor;current_in;d_axis_current;q_axis_current;erpm;fault_code;"
-VESC += """
-86399980;48.5;31.5;1.5;-0.25;10;7000;FAULT_CODE_NONE;
-0;48.4;31.6;1.6;0;11;7070;FAULT_CODE_NONE;
-20;48.3;31.7;1.7;0.25;12;7140;FAULT_CODE_NONE;
-"""
-MOTEUS = "time,MODE,POSITION,VELOCITY,TORQUE,Q_CURRENT,D_CURRENT,VOLTAGE,TEMPERATURE,FAULT\n"
-MOTEUS += "0.01,10,0.25,-2.0,0.1,1.5,0.0,24.5,30.0,0\n0.03,10,0.5,2.0,0.1,1.25,0.5,24.0,31.0,0\n"
-MOTEUS += "0.04,10,0.75,2.0,0.1,1.0,0.5,24.0,31.0,0\n"
-KEYSIGHT = "x-axis,1,2\nsecond,Volt,Ampere\n"
+
+def sample(name: str) -> str:
+    """The text of a small file in the dialect of one instrument."""
+    return (SAMPLES / f"{name}.csv").read_bytes().decode()
+
+
+RIGOL = sample("rigol")
+RIGOL_SHORT = sample("rigol_short")
+RIGOL_TIME = sample("rigol_time")
+SIGLENT = sample("siglent")
+SIGLENT_SHORT = sample("siglent_short")
+MDO = sample("tektronix_mdo")
+TDS = sample("tektronix_tds")
+PICO = sample("picoscope")
+VESC = sample("vesc_tool")
+MOTEUS = sample("moteus")
+KEYSIGHT = "".join(sample("keysight").splitlines(keepends=True)[:2])
 
 
 def one(folder: Path, text: str, name: str = "scope.csv", said: str = SAID) -> Capture:
@@ -100,7 +57,7 @@ VOLTS, AMPERES = [1.2, 1.4, 1.6], [0.1, 0.2, 0.3]
     ("text", "expected"),
     [
         (
-            RIGOL.format(unit="Amp"),
+            RIGOL,
             {"t_s": [-2e-3, -1.995e-3, -1.99e-3], "vab_v": VOLTS, "ia_a": AMPERES},
         ),
         (RIGOL_SHORT, {"t_s": [-1e-3, -0.999e-3, -0.998e-3], "vab_v": VOLTS}),
@@ -174,6 +131,25 @@ def test_keysight_times_of_three_digits_are_put_back_on_their_line(tmp_path: Pat
     assert np.abs(time - true).max() < 4e-6
 
 
+def test_keysight_as_it_comes(tmp_path: Path) -> None:
+    """Twelve samples 4 us apart whose printed times are 10 us apart or equal."""
+    (table,) = one(tmp_path, sample("keysight")).tables
+    assert table.columns == ["t_s", "vab_v", "ia_a"]
+    np.testing.assert_allclose(np.diff(table["t_s"]), 4e-6, rtol=0.1)
+    assert table["vab_v"].to_list() == [float(n % 7) for n in range(12)]
+
+
+def test_every_map_of_an_instrument_has_a_sample_that_it_alone_recognises(tmp_path: Path) -> None:
+    """Each committed sample is claimed by one map, and each map but that of LAAS by a sample."""
+    maps = load_source_maps(CONF)
+    claimed = set()
+    for path in sorted(SAMPLES.glob("*.csv")):
+        head = path.read_bytes().decode("latin-1")
+        (own,) = [m.name for m in maps.values() if m.recognises(path.name, head, [])]
+        claimed.add(own)
+    assert claimed == set(maps) - {"laas_solo"}
+
+
 def test_keysight_times_with_a_gap_are_refused(tmp_path: Path) -> None:
     true = np.concatenate([np.arange(500) * 1e-6, 2e-3 + np.arange(500) * 1e-6])
     rows = "".join(f"{t:.2E},1,0.5\n" for t in true)
@@ -184,7 +160,7 @@ def test_keysight_times_with_a_gap_are_refused(tmp_path: Path) -> None:
 
 def test_a_current_shown_in_volts_is_refused_with_what_to_write(tmp_path: Path) -> None:
     with pytest.raises(CaptureError) as refused:
-        one(tmp_path, RIGOL.format(unit="Volt"))
+        one(tmp_path, RIGOL.replace(",Amp,", ",Volt,"))
     assert refused.value.code == "unknown_unit"
 
 

@@ -1,0 +1,82 @@
+"""Resistance and its temperature coefficient on plateaus written out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.fit.estimators import (
+    resistance,
+    soak,
+)
+from tests.unit.fit.signals import capture, estimates, near
+
+
+def dc_capture(
+    pair, r_ohm, *, v0=0.0, offset=0.0, levels=(1.0, 2.0, -1.0, -2.0), temp=25.0, seed=0
+):
+    rng = np.random.default_rng(seed)
+    current = np.repeat((0.0, *levels), 200)
+    v = r_ohm * current + v0 * np.sign(current) + offset
+    columns = {
+        "t_s": np.arange(current.size) * 1e-3,
+        f"v{pair}_v": v + 1e-3 * rng.standard_normal(current.size),
+        f"i{pair[0]}_a": current + 1e-3 * rng.standard_normal(current.size),
+        "temp_winding_degc": np.full(current.size, temp),
+    }
+    return capture("resistance", f"r_{pair}_{temp:g}_{seed}", pair=pair, **columns)
+
+
+def test_unbalanced_phases_and_the_drop_at_the_zero_crossing():
+    """R_a 0.50, R_b 0.52, R_c 0.55 ohm; V0 0.05 V and an offset of 20 mV do not enter."""
+    pairs = {"ab": 1.02, "bc": 1.07, "ca": 1.05}
+    found = estimates(
+        resistance.ESTIMATOR,
+        *(dc_capture(p, r, v0=0.05, offset=0.02, seed=k) for k, (p, r) in enumerate(pairs.items())),
+    )
+    for phase, r in zip("abc", (0.50, 0.52, 0.55), strict=True):
+        assert near(found[f"r_{phase}_ohm"], r)
+    assert near(found["r_phase_ohm"], 3.14 / 6.0)
+    assert near(found["voltage_offset_v"], 0.05)
+    assert near(found["resistance_imbalance"], 0.05 * 6.0 / 3.14)
+    assert found["r_ll_ohm"].number == pytest.approx(2.0 * found["r_phase_ohm"].number)
+
+
+def test_resistance_is_brought_to_25_degc():
+    """0.598 ohm at 70 degC is 0.500 at 20 degC, 0.5098 at 25 (IEEE 112: 234.5 + T)."""
+    r70 = 1.0 * (234.5 + 70.0) / (234.5 + 20.0)
+    found = estimates(resistance.ESTIMATOR, dc_capture("ab", r70, temp=70.0))
+    assert found["r_ab_ohm"].number == pytest.approx(259.5 / 254.5, rel=3e-4)
+    assert found["resistance_imbalance"].status == "not_identifiable"
+    sources = {part.source: part.u for part in found["r_ab_ohm"].budget}
+    # Copper of 1 % other slope: 45 K x 0.003854 x 1 % at 70 degC.
+    assert abs(sources["assumed:temp_coeff_copper_1_k"]) == pytest.approx(
+        1.0196 * 0.01 * 45 / 259.5 / (1 + 45 / 259.5), rel=0.02
+    )
+    assert sources["voltage@s"] > 0.0 > sources["current@s"]
+
+
+def test_one_level_leaves_the_drop_as_an_allowance():
+    found = estimates(resistance.ESTIMATOR, dc_capture("ab", 1.0, levels=(2.0, -2.0)))
+    assert found["voltage_offset_v"].status == "not_identifiable"
+    parts = {part.source: part for part in found["r_ab_ohm"].budget}
+    assert parts["assumed:voltage_offset_v"].u == pytest.approx(0.0005 / 2.0, rel=1e-3)
+    assert parts["assumed:voltage_offset_v"].kind == "B"
+
+
+def test_no_plateau_names_the_experiment():
+    ramp = np.linspace(0.0, 1.0, 400)
+    bad = capture("resistance", pair="ab", t_s=np.arange(400.0), vab_v=ramp * 0.0, ia_a=ramp * 0.0)
+    found = estimates(resistance.ESTIMATOR, bad)
+    assert all(e.status == "not_identifiable" for e in found.values())
+    assert "plateaus of both" in found["r_phase_ohm"].note
+
+
+def test_soaked_winding_gives_the_coefficient_at_25_degc():
+    captures = [
+        dc_capture("ab", 1.0 * (1 + 0.0042 * (t - 25.0)), temp=t, seed=k, v0=0.1)
+        for k, t in enumerate((20.0, 65.0))
+    ]
+    found = estimates(soak.ESTIMATOR, *captures)["temp_coeff_copper_1_k"]
+    assert near(found, 0.0042)
+    assert estimates(soak.ESTIMATOR, captures[0])[found.name].status == "not_identifiable"
