@@ -155,6 +155,7 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     orders = electrical_orders(machine) if turned > 0.1 else ()
     noise = _prepared(found, period)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
+    found["t_s"] = period * np.arange(size, dtype=np.float64)
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     return _segment(capture, "dq", "drive", period, found, noise, channels, weak)

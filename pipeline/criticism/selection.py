@@ -259,7 +259,8 @@ def _refit_best(
         effect = score.candidate.effect
         model = fitted.model.with_effects(effect)
         moved = {name: fitted.values[name] + change for name, change in score.moves.items()}
-        values = clipped(model, {**moved, **score.candidate.values, **score.step})
+        start = {**fitted.values, **moved, **score.candidate.values, **score.step}
+        values = clipped(model, start)
         tried = gauss_newton(segments, replace(fitted, model=model, values=values), before=wide)
         cost = tried[1].misfit + score.price
         if material(tried[0], effect) and cost < min(least, wide.misfit):
