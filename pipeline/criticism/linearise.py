@@ -175,7 +175,10 @@ def linearise(
     def flush() -> None:
         if pending:
             stacked = np.concatenate([change for _, change in pending])
-            weak = projected(segment, stacked).reshape(len(pending), *valid.shape)
+            moving = stacked.any(axis=1)
+            weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
+            weak[moving] = projected(segment, stacked[moving])
+            weak = weak.reshape(len(pending), *valid.shape)
             for (place, _), projection in zip(pending, weak, strict=True):
                 kept[:, place] = projection[valid] * whiten
             pending.clear()
