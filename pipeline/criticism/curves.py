@@ -53,12 +53,14 @@ class Basis:
         """The curve of `weights` [len(names)] at `at` [n]; analytic where there are only waves."""
         count = self.mix.shape[1]
         total = 0.0 * at
-        if count:
+        if np.any(weights[:count]):
             total = total + np.interp(at, self.nodes, self.mix @ weights[:count], period=self.period)
         for place, order in enumerate(self.orders):
             sine, cosine = weights[count + 2 * place : count + 2 * place + 2]
-            if sine or cosine:
-                total = total + sine * np.sin(order * at) + cosine * np.cos(order * at)
+            if sine:
+                total = total + sine * np.sin(order * at)
+            if cosine:
+                total = total + cosine * np.cos(order * at)
         return total
 
 
@@ -136,8 +138,9 @@ def coarse(variable: Variable, machine: Machine) -> Basis:
     if variable.kind == "warm":
         mix = _cardinal(np.array(_WARM_K), nodes)
     else:
-        knots = np.linspace(0.0, 1.0, _PIECES)
-        half = _cardinal(knots, (np.abs(nodes) / variable.top) ** (1.0 / _BEND))
+        # natural splines of the size itself hold a straight line, which friction has too
+        knots = variable.top * np.linspace(0.0, 1.0, _PIECES) ** _BEND
+        half = _cardinal(knots, np.abs(nodes))
         sides = [nodes > 0.0] if variable.kind == "size" else [nodes < 0.0, nodes > 0.0]
         mix = np.concatenate([half * side[:, None] for side in sides], axis=1)
     names = tuple(f"k{n}" for n in range(mix.shape[1]))

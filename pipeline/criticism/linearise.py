@@ -409,6 +409,11 @@ class _Sampler:
                 change.drop_v - before.drop_v,
                 change.drag_nm - before.drag_nm,
             )
+        if effect.hook == "torque" and self.segment.kind == "dq":
+            # a drag is in the torque alone: no voltage needs to be predicted for it
+            drag = np.zeros_like(self.start)
+            drag[-1] = change.drag_nm / column.step
+            return drag if np.any(drag) else None
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.segment.kind == "shaft":
             still = self._pieces_of_nothing()

@@ -8,7 +8,7 @@ the sense of rotation times waves of the angle, a drop that is current times a c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -201,7 +201,7 @@ def _port(
     word = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}[hook]
     times = carriers[0].words
     words = f"{word} as a curve of {variable.name}" + (f" times {times}" if times else "")
-    title = f"port:{hook}:{'+'.join(signals)}:{variable.name}:{times}"
+    title = f"port:{hook}:{'+'.join(signals)}:{variable.name}:{times}:{count}"
     effect = Effect(title, words, "", (), "", "", _parameters(names, hook), **hooks)
     return Port(effect, hook, variable, basis, carriers, signals)
 
@@ -228,7 +228,3 @@ def _flux_map() -> Port:
     )
     return Port(effect, "flux", None, None, (), ("psi_d_wb", "psi_q_wb"), powers)
 
-
-def renamed(port: Port, name: str) -> Port:
-    """The same port under another effect name."""
-    return replace(port, effect=replace(port.effect, name=name))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.ports import Port, ports, refined
 from pipeline.criticism.segments import Segment
 from pipeline.criticism.sketch import Pursuit, expression
-from pipeline.criticism.system import Fitted, System, own_columns, system
+from pipeline.criticism.system import Fitted, System, clipped, own_columns, system
 from pipeline.criticism.telling import told
 from pipeline.records.diagnosis import UnknownStructure
 
@@ -21,6 +21,7 @@ _TIE = 12.0
 _NEAR = 0.05
 _PRIOR = 1.0
 _CARRIED = 5.0
+_EFFORT = ((1.0, 0.0), 20)
 _SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 
 
@@ -59,12 +60,25 @@ def unknown_structure(
         if one is not best and one.held > (1.0 - _NEAR) * best.held
     )
     port = refined(best.port, fitted.model.machine)
-    fine = system(segments, fitted, effect_columns(port.effect, fitted.model), wide)
+    near = _moved(fitted, wide, best.step)
+    fine = system(segments, near, effect_columns(port.effect, near.model), wide)
     own = len(own_columns(fitted.model))
     weight = 1.0 / np.maximum(fine.spreads(best.left), 1.0)[fine.group]
     pursuit = Pursuit(fine, own, port, weight)
     sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
+
+
+def _moved(fitted: Fitted, wide: System, step: Array) -> Fitted:
+    """The fit with the model's own constants where the best port puts them.
+
+    A drag over an inertia is a product: the expression is sought around the inertia found.
+    """
+    own = wide.columns[: len(own_columns(fitted.model))]
+    values = dict(fitted.values)
+    for column, change in zip(own, step, strict=False):
+        values[column.name] += float(change)
+    return replace(fitted, values=clipped(fitted.model, values))
 
 
 def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
@@ -98,14 +112,14 @@ def _ranked(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        step, after = wide.best(chosen)
+        _, after = wide.best(chosen, *_EFFORT)
         gain = base - wide.misfit_of(wide.spreads(after)) - live.size * price
         if gain <= 0.0:
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
         held = reference - _held_out(wide, chosen, after, ridge, carried)
         if held > _TIE:
-            found.append(Found(port, gain, held, after, step))
+            found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge)))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
@@ -148,6 +162,18 @@ def _carried(around: System, own: Array, left: Array) -> frozenset[int]:
         if grown.max() > _CARRIED or (np.diag(less) < 1e-5 * np.diag(normal)).any():
             carried.add(number)
     return frozenset(carried)
+
+
+def _calm(around: System, places: Array, left: Array, ridge: Array) -> Array:
+    """Step [k] of least misfit in which a curve and a constant of one shape do not run away."""
+    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    matrix = around.matrix[:, places]
+    weighted = matrix * weight[:, None]
+    normal = weighted.T @ matrix + np.diag(around.penalty[places] + ridge)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    slope = (weighted.T @ around.residual + around.pull[places]) / scale
+    step: Array = -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
+    return step
 
 
 def _held_out(
