@@ -156,6 +156,7 @@ class Pursuit:
         pull = np.concatenate([around.pull[:own], np.zeros(curves.shape[1])])
         weight, before = self.weight, np.inf
         step, left, now = np.zeros(matrix.shape[1]), around.residual, np.inf
+        places = np.arange(own)
         for _ in range(_ROUNDS):
             weighted = matrix * weight[:, None]
             normal = weighted.T @ matrix + np.diag(penalty)
@@ -164,7 +165,7 @@ class Pursuit:
             step = -(inverse @ ((weighted.T @ around.residual + pull) / scale)) / scale
             left = around.residual + matrix @ step
             spreads = around.spreads(left)
-            now = around.misfit_of(spreads)
+            now = around.misfit_of(spreads) + float(around.prior_costs(places, step[:own]).sum())
             weight = 1.0 / np.maximum(spreads, 1.0)[around.group]
             if abs(before - now) < _SETTLED:
                 break

@@ -98,8 +98,8 @@ def _ranked(
     columns = [effect_columns(port.effect, fitted.model) for port in offered]
     wide = system(segments, fitted, [c for some in columns for c in some], before)
     own = np.arange(len(own_columns(fitted.model)))
-    _, left = wide.best(own)
-    base = wide.misfit_of(wide.spreads(left))
+    none = wide.best(own)
+    left, base = none.residual, none.misfit
     carried = _carried(wide, own, left)
     reference = _held_out(wide, own, left, np.zeros(own.size), carried)
     price = math.log(wide.size)
@@ -112,8 +112,9 @@ def _ranked(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        _, after = wide.best(chosen, *_EFFORT)
-        gain = base - wide.misfit_of(wide.spreads(after)) - live.size * price
+        end = wide.best(chosen, *_EFFORT)
+        after = end.residual
+        gain = base - end.misfit - live.size * price
         if gain <= 0.0:
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])

@@ -15,7 +15,11 @@ from pipeline.stages.campaigns import campaigns, start_constants
 
 
 def main(settings: DiagnoseSettings) -> Outcome:
-    """Writes `diagnosis/MOTOR.json` for every motor of `input`."""
+    """Writes `diagnosis/MOTOR.json` for every motor of `input`.
+
+    Where structure is left that no effect explains, an effect to start from is written as well:
+    `diagnosis/effects/MOTOR_unknown.py`.
+    """
     watch, output = Stopwatch(), Path(settings.output)
     with watch.stage("read"):
         found, findings = campaigns(settings.input, settings.source, settings.motor)
@@ -26,6 +30,9 @@ def main(settings: DiagnoseSettings) -> Outcome:
             result = diagnose(campaign, spec, start_constants(campaign))
         path = output / "diagnosis" / f"{file_stem(campaign.motor_id)}.json"
         write_whole(path, canonical_json(result.document()))
+        if result.unknown is not None and result.unknown.sketch:
+            effect = output / "diagnosis" / "effects" / f"{result.unknown.effect}.py"
+            write_whole(effect, result.unknown.source.encode())
         lines.extend(_lines(result))
         undecided = undecided or result.verdict == "insufficient"
     refused = any(finding.severity == "refused" for finding in findings)
@@ -50,5 +57,8 @@ def _lines(result: Diagnosis) -> list[str]:
             told.append(f"  {ranked.effect} could as well be {others}; {ranked.experiment}")
     if result.unknown is not None:
         told.append(f"  left over in {result.unknown.signal}: {result.unknown.shape}")
+    if result.unknown is not None and result.unknown.sketch:
+        told.append(f"  {result.unknown.expression}")
+        told.append(f"  an effect to start from: diagnosis/effects/{result.unknown.effect}.py")
     told.extend(f"  {note}" for note in result.notes)
     return told
