@@ -9,7 +9,7 @@ while a dynamometer that holds the far end reads S itself, [T − drags − J θ
 and load are recorded; the twist is a function of S. A coasting shaft passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
-(2002), backlash as a dead zone of the twist.
+(2002), backlash as a dead zone of the twist; [3] Savitzky & Golay, Anal. Chem. 36 (1964).
 """
 
 from __future__ import annotations
@@ -17,20 +17,24 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from pipeline.criticism.effect import Array, Operating
-from pipeline.criticism.traces import smoothed
+
+_WIDTH_S = 0.004
+_MOST = 41
+_LEAST = 7
+_DEGREE = 4
 
 
-def passed_on(x: Operating, share: float, smooth_s: float = 0.0) -> Array:
+def passed_on(x: Operating, share: float) -> Array:
     """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
 
-    `share` of the inertia is at the far end; `smooth_s` averages what the encoder's rounding does.
+    `share` of the inertia is at the far end. Quartics over 4 ms [3] keep the encoder's rounding,
+    twice differenced, out of it and leave a resonance of some 100 Hz as it is.
     """
     near = (1.0 - share) * x.base["j_kgm2"]
-    torque: Array = x.torque_nm - near * bend(x.theta_rad, x.ts_s)
-    if smooth_s > 0.0:
-        return smoothed(torque, 2 * round(smooth_s / x.ts_s / 2) + 1)
+    torque: Array = _smooth(x.torque_nm, x.ts_s, 0) - near * _smooth(x.theta_rad, x.ts_s, 2)
     return torque
 
 
@@ -38,13 +42,27 @@ def far_drag(x: Operating, share: float, twist_rad: Callable[[], Array]) -> Arra
     """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m]."""
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
-    moved = x.theta_rad if x.held else twist_rad()
-    drag: Array = -share * x.base["j_kgm2"] * bend(moved, x.ts_s)
-    return drag
+    far = share * x.base["j_kgm2"]
+    if not x.held:
+        return -far * _smooth(twist_rad(), x.ts_s, 2)
+    acceleration = np.zeros(x.theta_rad.size)
+    acceleration[1:-1] = np.diff(x.theta_rad, 2) / x.ts_s**2
+    return -far * acceleration
 
 
-def bend(signal: Array, period_s: float) -> Array:
-    """Second difference [n] over the period's square, zero at the ends."""
-    found = np.zeros(np.shape(signal))
-    found[1:-1] = np.diff(signal, 2) / period_s**2
+def present(amplitude: float, negligible: float) -> float:
+    """How much of a far inertia there is, 0 to 1: all of it from 5 negligible sizes on.
+
+    What a dynamometer reads depends on the inertia behind the coupling, however stiff that is; the
+    ramp makes the effect vanish with its amplitude.
+    """
+    return min(max(amplitude / (5.0 * negligible), 0.0), 1.0)
+
+
+def _smooth(signal: Array, period_s: float, derivative: int) -> Array:
+    """A signal [n] or its derivative by a local quartic."""
+    width = max(min(2 * round(_WIDTH_S / period_s / 2) + 1, _MOST), _LEAST)
+    if signal.size < width:
+        return np.zeros(signal.size)
+    found: Array = savgol_filter(signal, width, _DEGREE, deriv=derivative, delta=period_s)
     return found

@@ -54,7 +54,9 @@ class Basis:
         count = self.mix.shape[1]
         total = 0.0 * at
         if np.any(weights[:count]):
-            total = total + np.interp(at, self.nodes, self.mix @ weights[:count], period=self.period)
+            total = total + np.interp(
+                at, self.nodes, self.mix @ weights[:count], period=self.period
+            )
         for place, order in enumerate(self.orders):
             sine, cosine = weights[count + 2 * place : count + 2 * place + 2]
             if sine:

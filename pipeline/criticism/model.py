@@ -89,9 +89,7 @@ class Model:
         instruments, else the constant's own.
         """
         stated = self.machine.stated_u
-        return {
-            c.name: (c.center, stated.get(c.name, c.prior)) for c in BASE if c.prior != _FREE
-        }
+        return {c.name: (c.center, stated.get(c.name, c.prior)) for c in BASE if c.prior != _FREE}
 
     def with_effects(self, *effects: Effect) -> Model:
         """This model and further effects."""

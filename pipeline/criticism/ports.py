@@ -76,7 +76,9 @@ def refined(port: Port, machine: Machine) -> Port:
     """The same port with narrow hats instead of a few smooth curves, where it has a curve."""
     if port.variable is None or port.hook == "flux":
         return port
-    return _port(port.hook, port.variable, fine(port.variable, machine), port.carriers, port.signals)
+    return _port(
+        port.hook, port.variable, fine(port.variable, machine), port.carriers, port.signals
+    )
 
 
 def _torque_ports(machine: Machine) -> list[Port]:
@@ -119,7 +121,8 @@ def _drop_ports(machine: Machine) -> list[Port]:
     """Drops of a drive's log: along an axis, along the current, at right angles to the flux."""
     speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
     d, q = (
-        Carrier((), "", code, lambda _, unit=unit: unit) for code, unit in (("1.0", 1.0), ("1j", 1j))
+        Carrier((), "", code, lambda _, unit=unit: unit)
+        for code, unit in (("1.0", 1.0), ("1j", 1j))
     )
     along = Carrier(
         ("id_a", "iq_a"),
@@ -227,4 +230,3 @@ def _flux_map() -> Port:
         coenergy=coenergy,
     )
     return Port(effect, "flux", None, None, (), ("psi_d_wb", "psi_q_wb"), powers)
-

@@ -90,13 +90,11 @@ def sparse(segment: Segment) -> Segment:
         return segment
     chosen = np.linspace(0, weak.starts.size - 1, _FEW).round().astype(np.int64)
     starts = weak.starts[chosen]
-    rows = (starts[:, None] - PAD + np.arange(weak.length + 2 * PAD)[None, :])
+    rows = starts[:, None] - PAD + np.arange(weak.length + 2 * PAD)[None, :]
     rows = np.clip(rows, 0, segment.size - 1).ravel()
     cut = {name: column[rows] for name, column in segment.recorded.items()}
     moved = PAD + (weak.length + 2 * PAD) * np.arange(_FEW)
-    few = replace(
-        weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen]
-    )
+    few = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     return replace(segment, recorded=cut, weak=few)
 
 

@@ -340,13 +340,14 @@ def curve_about(
     if basis is None:
         raise ValueError("a port without a curve has no hats")
     first = carrier * len(basis.names)
-    shapes = np.stack(
-        [
-            basis.curve(at, one[first : first + len(basis.names)])
-            for one in coarse[:, live].T
-        ],
-        axis=1,
-    ) if live.any() else np.zeros((at.size, 0))
+    shapes = (
+        np.stack(
+            [basis.curve(at, one[first : first + len(basis.names)]) for one in coarse[:, live].T],
+            axis=1,
+        )
+        if live.any()
+        else np.zeros((at.size, 0))
+    )
     spread = np.sqrt(
         np.maximum(np.einsum("vi,ij,vj->v", shapes, covariance, shapes), 0.0)
         + found.spread(at, carrier) ** 2

@@ -307,9 +307,7 @@ def _linear(column: Column, model: Model) -> bool:
     return effect.hook != "sensor" and not shaped
 
 
-def _priors(
-    model: Model, columns: Sequence[Column], values: Values
-) -> tuple[Array, Array]:
+def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
     penalty, pull = np.zeros(len(columns)), np.zeros(len(columns))
     priors = model.priors()
     for place, column in enumerate(columns):

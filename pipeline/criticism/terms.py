@@ -38,7 +38,12 @@ SHAPES = (
     Shape("cube", "|u|³", "u³", "{a} ** 3", False, lambda a: a**3),
     Shape("decay", "exp(-|u|)", "sign(u)·exp(-|u|)", "np.exp(-{a})", True, lambda a: np.exp(-a)),
     Shape(
-        "bell", "exp(-u²)", "sign(u)·exp(-u²)", "np.exp(-({a} ** 2))", True, lambda a: np.exp(-a * a)
+        "bell",
+        "exp(-u²)",
+        "sign(u)·exp(-u²)",
+        "np.exp(-({a} ** 2))",
+        True,
+        lambda a: np.exp(-a * a),
     ),
     Shape("tanh", "tanh|u|", "tanh u", "np.tanh({a})", True, np.tanh),
     Shape(

@@ -202,5 +202,3 @@ def _held_out(
         step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
         predicted[mine] = around.residual[mine] + matrix[mine] @ step
     return around.misfit_of(around.spreads(predicted))
-
-

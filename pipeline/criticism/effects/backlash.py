@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.coupling import far_drag, passed_on
+from pipeline.criticism.coupling import far_drag, passed_on, present
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
-_SMOOTH_S = 0.002
+_NEGLIGIBLE_RAD = 2e-4
 
 
 def _torque(x: Operating, q: Values) -> Array:
     share, gap = q["share"], q["gap_rad"]
     if x.held:
-        return far_drag(x, share if gap > 0.0 else 0.0, lambda: x.theta_rad)
+        return far_drag(x, share * present(gap, _NEGLIGIBLE_RAD), lambda: x.theta_rad)
 
     def twist() -> Array:
-        side: Array = np.tanh(passed_on(x, share, _SMOOTH_S) / q["torque_nm"])
+        side: Array = np.tanh(passed_on(x, share) / q["torque_nm"])
         return 0.5 * gap * side
 
     return far_drag(x, share, twist)
@@ -30,7 +30,7 @@ EFFECT = Effect(
     experiment="reversals of torque with the angle recorded on the load side as well",
     reference="Nordin & Gutman, Automatica 38 (2002), controlling systems with backlash",
     parameters=(
-        Parameter("gap_rad", "rad", 0.005, 0.0002, low=0.0, high=0.3),
+        Parameter("gap_rad", "rad", 0.005, _NEGLIGIBLE_RAD, low=0.0, high=0.3),
         Parameter("share", "1", 0.5, 0.0, low=0.05, high=0.95, scan=(0.5,)),
         Parameter(
             "torque_nm", "N·m", 0.03, 0.0, "torque_nm", low=0.003, high=0.5, scan=(0.01, 0.05)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.coupling import far_drag, passed_on
+from pipeline.criticism.coupling import far_drag, passed_on, present
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
+_NEGLIGIBLE_PERIODS2 = 8.0
+
+
 def _torque(x: Operating, q: Values) -> Array:
-    stiff = max(q["share"] * x.base["j_kgm2"], 1e-30)
-    square = q["square_s2"]
-    softness = square / stiff
-    held = 0.0 if square <= 0.0 else q["share"]
+    share, square = q["share"], q["square_s2"]
     if x.held:
-        return far_drag(x, held, lambda: x.theta_rad)
-    return far_drag(x, q["share"], lambda: softness * passed_on(x, q["share"]))
+        negligible = _NEGLIGIBLE_PERIODS2 * x.machine.scales["period_s2"]
+        return far_drag(x, share * present(square, negligible), lambda: x.theta_rad)
+    softness = square / (share * x.base["j_kgm2"] + 1e-30)
+    return far_drag(x, share, lambda: softness * passed_on(x, share))
 
 
 EFFECT = Effect(
@@ -24,7 +26,7 @@ EFFECT = Effect(
     experiment="torque steps with the angle recorded on the load side as well",
     reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
     parameters=(
-        Parameter("square_s2", "s²", 800.0, 8.0, "period_s2", low=0.0, high=4e4),
+        Parameter("square_s2", "s²", 800.0, _NEGLIGIBLE_PERIODS2, "period_s2", low=0.0, high=4e4),
         Parameter("share", "1", 0.5, 0.0, low=0.05, high=0.95, scan=(0.5,)),
     ),
     signals=("torque_shaft_nm",),
