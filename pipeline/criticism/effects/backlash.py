@@ -16,21 +16,24 @@ def _torque(x: Operating, q: Values) -> Array:
         return far_drag(x, share * present(gap, _NEGLIGIBLE_RAD), lambda: x.theta_rad)
 
     def twist() -> Array:
-        side: Array = np.tanh(passed_on(x, share) / q["torque_nm"])
-        return 0.5 * gap * side
+        through = passed_on(x, share)
+        softness = q["square_s2"] / (share * x.base["j_kgm2"] + 1e-30)
+        found: Array = 0.5 * gap * np.tanh(through / q["torque_nm"]) + softness * through
+        return found
 
     return far_drag(x, share, twist)
 
 
 EFFECT = Effect(
     name="backlash",
-    words="the far mass lags by half a gap on the side that the torque presses to",
+    words="twist of half a gap to the side that the torque presses to, and J_load/K in s² of spring",
     signature="no torque at the shaft while the gap is crossed, a jump of the angle at reversals",
     tests=("drive", "torque_map"),
     experiment="reversals of torque with the angle recorded on the load side as well",
     reference="Nordin & Gutman, Automatica 38 (2002), controlling systems with backlash",
     parameters=(
         Parameter("gap_rad", "rad", 0.005, _NEGLIGIBLE_RAD, low=0.0, high=0.3),
+        Parameter("square_s2", "s²", 40.0, 8.0, "period_s2", low=0.0, high=4e4),
         Parameter("share", "1", 0.5, 0.0, low=0.05, high=0.95, scan=(0.5,)),
         Parameter(
             "torque_nm", "N·m", 0.03, 0.0, "torque_nm", low=0.003, high=0.5, scan=(0.01, 0.05)
@@ -42,4 +45,5 @@ EFFECT = Effect(
         "presliding": "an angle on the load side: friction moves no far mass",
     },
     torque=_torque,
+    allowed=lambda q: q["gap_rad"] > 0.0,
 )
