@@ -29,6 +29,7 @@ from pipeline.records.diagnosis import (
     UnknownStructure,
     Verdict,
 )
+from pipeline.records.naming import file_stem
 
 _SEEN = 3.0
 _EXPLAINED = 0.5
@@ -52,7 +53,9 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     held = [leave_out(r.around, len(own_columns(r.fitted.model))) for r in rungs]
     residual = last.around.residual
     left = remainder(last.around, found, residual)
-    sketch = None if _explained(rungs, left) else _unknown(found, rungs, left)
+    sketch = None
+    if not _explained(rungs, left):
+        sketch = _unknown(found, rungs, left, f"{file_stem(campaign.motor_id)}_unknown")
     missing = last.added
     ranking = _ranking(rungs, held, offered, library, found)
     unseen = _unseen(campaign, library, last, offered)
@@ -96,10 +99,11 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
 
 
 def _unknown(
-    found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder]
+    found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder], name: str
 ) -> UnknownStructure | None:
-    sketch, _ = unknown_structure(found, rungs[-1].fitted, [r.signal for r in left])
-    return sketch
+    last = rungs[-1]
+    signals = list(dict.fromkeys(r.signal for r in left))
+    return unknown_structure(found, last.fitted, signals, last.around, name)[0]
 
 
 def _excess(rung: Rung, channels: set[str]) -> float:

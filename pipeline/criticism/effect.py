@@ -77,7 +77,8 @@ class Operating:
     inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
     `ts_s` is the sample period, `travel_rad` the angle turned since the last reversal (infinite
     before the first).
-    `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks.
+    `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks. `held`: a
+    dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
     """
 
     machine: Machine
@@ -95,6 +96,7 @@ class Operating:
     ts_s: float
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
+    held: bool = False
 
     @property
     def i_a(self) -> Complex:

@@ -175,7 +175,10 @@ def linearise(
     def flush() -> None:
         if pending:
             stacked = np.concatenate([change for _, change in pending])
-            weak = projected(segment, stacked).reshape(len(pending), *valid.shape)
+            moving = stacked.any(axis=1)
+            weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
+            weak[moving] = projected(segment, stacked[moving])
+            weak = weak.reshape(len(pending), *valid.shape)
             for (place, _), projection in zip(pending, weak, strict=True):
                 kept[:, place] = projection[valid] * whiten
             pending.clear()
@@ -412,6 +415,11 @@ class _Sampler:
                 change.drop_v - before.drop_v,
                 change.drag_nm - before.drag_nm,
             )
+        if effect.hook == "torque" and self.segment.kind == "dq":
+            # a drag is in the torque alone: no voltage needs to be predicted for it
+            drag = np.zeros_like(self.start)
+            drag[-1] = change.drag_nm / column.step
+            return drag if np.any(drag) else None
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.segment.kind == "shaft":
             still = self._pieces_of_nothing()

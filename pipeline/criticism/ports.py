@@ -1,191 +1,232 @@
 """Generic places where an unknown effect could act: curves of one variable, without a formula.
 
-Each port is an effect like any other, so the same fit and score serve it.
+Each port is an effect like any other, so the same fit and score serve it. A port's curve may be
+carried by a second variable: a drag that is speed times a curve of temperature, a friction that is
+the sense of rotation times waves of the angle, a drop that is current times a curve of speed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import (
-    Array,
-    Complex,
-    Effect,
-    Machine,
-    Operating,
-    Parameter,
-    Values,
-)
+from pipeline.criticism.curves import Basis, Variable, coarse, fine, variables
+from pipeline.criticism.effect import Effect, Machine, Operating, Parameter, Values
 
-_KNOTS = (
-    -1.0,
-    -0.8,
-    -0.6,
-    -0.42,
-    -0.28,
-    -0.16,
-    -0.08,
-    -0.03,
-    0.03,
-    0.08,
-    0.16,
-    0.28,
-    0.42,
-    0.6,
-    0.8,
-    1.0,
-)
 _WIDE = 1e6
+_SCALES = {
+    "torque": ("torque_nm", "N·m"),
+    "drop": ("voltage_v", "V"),
+    "flux": ("flux_wb", "Wb"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Carrier:
+    """What multiplies a curve. `columns` are the capture columns it adds to the curve's own;
+    `words` and `code` say it in a sentence and in Python, `value` computes it.
+    """
+
+    columns: tuple[str, ...]
+    words: str
+    code: str
+    value: Callable[[Operating], Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One generic effect: the signal it enters, the capture column it depends on, its knots."""
+    """One generic effect: the hook it enters, its variable, basis and carriers.
+
+    `signals` are the recorded signals that the carriers act on, one each; a torque's is the
+    shaft's. `monomials` [K] are the powers of d and q current of a co-energy, in place of a curve.
+    """
 
     effect: Effect
-    signal: str
-    variables: tuple[str, ...]
-    knots: tuple[float, ...]
-    unit: str
+    hook: str
+    variable: Variable | None
+    basis: Basis | None
+    carriers: tuple[Carrier, ...]
+    signals: tuple[str, ...]
+    monomials: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def unit(self) -> str:
+        """Unit of every coefficient."""
+        return _SCALES[self.hook][1]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The capture columns that the structure depends on."""
+        if self.variable is None:
+            return ("id_a", "iq_a")
+        names = [*self.variable.columns, *(c for a in self.carriers for c in a.columns)]
+        return tuple(dict.fromkeys(names))
 
 
-def ports(machine: Machine) -> tuple[Port, ...]:
-    """Every port for one machine."""
-    s = machine.scales
-    ranges: dict[str, tuple[float, Callable[[Operating], Array]]] = {
-        "omega_mech_rad_s": (s["speed_rad_s"], lambda x: x.omega_rad_s),
-        "iq_a": (s["current_a"], lambda x: np.real(x.iq_a)),
-        "id_a": (s["current_a"], lambda x: np.real(x.id_a)),
-        "temp_winding_degc": (100.0, lambda x: x.winding_k),
-        "temp_magnet_degc": (100.0, lambda x: x.magnet_k),
-    }
-    made = []
-    for name, (top, read) in ranges.items():
-        made.append(_torque_curve(name, top, read))
-        made += [_drop_curve(name, top, read, axis) for axis in "dq"]
-    for signal, variable in (
-        ("torque", "theta_mech_rad"),
-        ("drop", "theta_mech_rad"),
-        ("flux", "theta_elec_rad"),
-    ):
-        made.append(_waves(signal, variable, machine))
-    made.append(_flux_map())
-    return tuple(made)
+def ports(machine: Machine, hooks: Iterable[str] = ("torque", "drop", "flux")) -> tuple[Port, ...]:
+    """Every port of some hooks for one machine."""
+    makers = {"torque": _torque_ports, "drop": _drop_ports, "flux": _flux_ports}
+    return tuple(port for hook in hooks for port in makers[hook](machine))
 
 
-def _hats(value: Array, knots: Array, weights: Array) -> Array:
-    """Piecewise linear curve through `weights` at `knots`, flat outside."""
-    return np.interp(value, knots, weights)
-
-
-def _curve_parameters(scale: str, unit: str, knots: Array) -> tuple[Parameter, ...]:
-    return tuple(
-        Parameter(f"k{n}", unit, 0.01, 0.0, scale, -_WIDE, _WIDE) for n in range(knots.size)
+def refined(port: Port, machine: Machine) -> Port:
+    """The same port with narrow hats instead of a few smooth curves, where it has a curve."""
+    if port.variable is None or port.hook == "flux":
+        return port
+    return _port(
+        port.hook, port.variable, fine(port.variable, machine), port.carriers, port.signals
     )
 
 
-def _effect(name: str, words: str, parameters: tuple[Parameter, ...], **hooks: Any) -> Effect:
-    return Effect(name, words, "", (), "", "", parameters, **hooks)
-
-
-def _torque_curve(name: str, top: float, read: Callable[[Operating], Array]) -> Port:
-    knots = top * np.array(_KNOTS)
-
-    def torque(x: Operating, q: Values) -> Array:
-        return _hats(read(x), knots, np.array(list(q.values())))
-
-    effect = _effect(
-        f"port:torque:{name}",
-        f"drag as a curve of {name}",
-        _curve_parameters("torque_nm", "N·m", knots),
-        torque=torque,
+def _torque_ports(machine: Machine) -> list[Port]:
+    speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
+    one = Carrier((), "", "1.0", lambda _: 1.0)
+    omega = Carrier(
+        ("omega_mech_rad_s",),
+        f"omega_mech_rad_s/({speed:.4g} rad/s)",
+        f"x.omega_rad_s / {speed:.6g}",
+        lambda x: x.omega_rad_s / float(f"{speed:.6g}"),
     )
-    return Port(effect, "torque_shaft_nm", (name,), tuple(knots), "N·m")
-
-
-def _drop_curve(name: str, top: float, read: Callable[[Operating], Array], axis: str) -> Port:
-    knots = top * np.array(_KNOTS)
-    turn = 1.0 if axis == "d" else 1j
-
-    def drop(x: Operating, q: Values) -> Complex:
-        curve = _hats(read(x), knots, np.array(list(q.values())))
-        voltage: Complex = (turn * curve * (1.0 if x.inverter else 0.0)).astype(np.complex128)
-        return voltage
-
-    effect = _effect(
-        f"port:v{axis}:{name}",
-        f"v_{axis} drop as a curve of {name}",
-        _curve_parameters("voltage_v", "V", knots),
-        drop=drop,
+    sense = Carrier(
+        ("omega_mech_rad_s",),
+        "sign(omega_mech_rad_s)",
+        "np.sign(x.omega_rad_s)",
+        lambda x: np.sign(x.omega_rad_s),
     )
-    return Port(effect, f"v{axis}_v", (name,), tuple(knots), "V")
-
-
-def _waves(signal: str, variable: str, machine: Machine) -> Port:
-    p = machine.pole_pairs
-    electrical = variable == "theta_elec_rad"
-    orders = {1, 2, 3, 4, 5, 6, 8, 12} if electrical else {1, 2, 3, 4, 5, 6, p, 2 * p, 6 * p}
-    if not electrical:
-        orders |= set(machine.torque_orders)
-    scale, unit = {
-        "torque": ("torque_nm", "N·m"),
-        "drop": ("voltage_v", "V"),
-        "flux": ("flux_wb", "Wb"),
-    }[signal]
-    axes = ("",) if signal == "torque" else ("d", "q")
-    parameters = tuple(
-        Parameter(f"{axis}{wave}{k}", unit, 0.01, 0.0, scale, -_WIDE, _WIDE)
-        for axis in axes
-        for k in sorted(orders)
-        for wave in ("sin", "cos")
+    iq = Carrier(
+        ("iq_a",),
+        f"iq_a/({current:.4g} A)",
+        f"np.real(x.iq_a) / {current:.6g}",
+        lambda x: np.real(x.iq_a) / float(f"{current:.6g}"),
     )
+    warm, turn = ("temp_winding_degc", "temp_magnet_degc"), ("theta_mech_rad", "theta_elec_rad")
+    pairs = (
+        *((one, name) for name in ("omega_mech_rad_s", "iq_a", "id_a", *warm, *turn)),
+        *((omega, name) for name in (*warm, turn[0], "i_a")),
+        *((sense, name) for name in (*warm, turn[0], "i_a")),
+        *((iq, name) for name in (*warm, *turn, "omega_mech_rad_s")),
+    )
+    known = variables(machine)
+    shaft = ("torque_shaft_nm",)
+    return [
+        _port("torque", known[name], coarse(known[name], machine), (carrier,), shaft)
+        for carrier, name in pairs
+    ]
 
-    def series(x: Operating, q: Values, axis: str) -> Any:
-        angle = x.eps_rad if electrical else x.theta_rad
-        total = 0.0 * angle
-        for name, value in q.items():
-            if value and name.startswith(axis):
-                bare = name.removeprefix(axis)
-                wave = np.sin if bare.startswith("sin") else np.cos
-                total = total + value * wave(int(bare[3:]) * angle)
-        return total
+
+def _drop_ports(machine: Machine) -> list[Port]:
+    """Drops of a drive's log: along an axis, along the current, at right angles to the flux."""
+    speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
+    d, q = (
+        Carrier((), "", code, lambda _, unit=unit: unit)
+        for code, unit in (("1.0", 1.0), ("1j", 1j))
+    )
+    along = Carrier(
+        ("id_a", "iq_a"),
+        f"(id_a + j iq_a)/({current:.4g} A)",
+        f"x.i_a / {current:.6g}",
+        lambda x: x.i_a / float(f"{current:.6g}"),
+    )
+    turned = [
+        Carrier(
+            ("omega_mech_rad_s",),
+            f"omega_mech_rad_s/({speed:.4g} rad/s)",
+            f"{code} * x.omega_rad_s / {speed:.6g}",
+            lambda x, unit=unit: unit * x.omega_rad_s / float(f"{speed:.6g}"),
+        )
+        for code, unit in (("1.0", 1.0), ("1j", 1j))
+    ]
+    both = ("vd_v", "vq_v")
+    warm, turn = ("temp_winding_degc", "temp_magnet_degc"), ("theta_mech_rad", "theta_elec_rad")
+    straight = ("id_a", "iq_a", "omega_mech_rad_s")
+    pairs = (
+        *(((d,), both[:1], name) for name in straight),
+        *(((q,), both[1:], name) for name in straight),
+        *(((along,), both[1:], name) for name in ("i_a", "omega_mech_rad_s", *warm)),
+        *(((turned[1],), both[1:], name) for name in (*warm, "i_a", "iq_a", "id_a")),
+        *(((turned[0],), both[:1], name) for name in ("iq_a", "id_a")),
+        *(((d, q), both, name) for name in turn),
+        *((tuple(turned), both, name) for name in turn),
+    )
+    known = variables(machine)
+    return [
+        _port("drop", known[name], coarse(known[name], machine), carriers, signals)
+        for carriers, signals, name in pairs
+    ]
+
+
+def _flux_ports(machine: Machine) -> list[Port]:
+    d, q = (
+        Carrier((), "", "x.id_a", lambda x: x.id_a),
+        Carrier((), "", "x.iq_a", lambda x: x.iq_a),
+    )
+    turn = variables(machine)["theta_elec_rad"]
+    both = ("psi_d_wb", "psi_q_wb")
+    return [
+        _port("flux", turn, coarse(turn, machine), (d, q), both),
+        _flux_map(),
+    ]
+
+
+def _parameters(names: Iterable[str], hook: str) -> tuple[Parameter, ...]:
+    scale, unit = _SCALES[hook]
+    return tuple(Parameter(name, unit, 0.01, 0.0, scale, -_WIDE, _WIDE) for name in names)
+
+
+def _port(
+    hook: str,
+    variable: Variable,
+    basis: Basis,
+    carriers: tuple[Carrier, ...],
+    signals: tuple[str, ...],
+) -> Port:
+    count = len(basis.names)
+    names = [f"c{n}{name}" for n in range(len(carriers)) for name in basis.names]
+
+    def value(x: Operating, q: Values) -> Any:
+        weights = np.array(list(q.values()))
+        at = variable.read(x)
+        total: Any = 0.0
+        for n, carrier in enumerate(carriers):
+            mine = weights[n * count : (n + 1) * count]
+            if np.any(mine):
+                total = total + carrier.value(x) * basis.curve(at, mine)
+        return total + np.zeros(np.shape(x.omega_rad_s))
 
     hooks: dict[str, Any] = {
-        "torque": {"torque": lambda x, q: series(x, q, "")},
-        "drop": {
-            "drop": lambda x, q: (
-                (series(x, q, "d") + 1j * series(x, q, "q")) * (1.0 if x.inverter else 0.0)
-            )
-        },
-        "flux": {"coenergy": lambda x, q: x.id_a * series(x, q, "d") + x.iq_a * series(x, q, "q")},
-    }[signal]
-    effect = _effect(
-        f"port:{signal}:{variable}", f"{signal} as waves of {variable}", parameters, **hooks
-    )
-    shown = {"torque": "torque_shaft_nm", "drop": "vd_v", "flux": "psi_d_wb"}[signal]
-    return Port(effect, shown, (variable,), (), unit)
+        "torque": {"torque": value},
+        "drop": {"drop": lambda x, q: value(x, q).astype(complex) * (1.0 if x.inverter else 0.0)},
+        "flux": {"coenergy": value},
+    }[hook]
+    word = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}[hook]
+    times = carriers[0].words
+    words = f"{word} as a curve of {variable.name}" + (f" times {times}" if times else "")
+    title = f"port:{hook}:{'+'.join(signals)}:{variable.name}:{times}:{count}"
+    effect = Effect(title, words, "", (), "", "", _parameters(names, hook), **hooks)
+    return Port(effect, hook, variable, basis, carriers, signals)
 
 
 def _flux_map() -> Port:
-    powers = [(a, n - a) for n in (3, 4, 5) for a in range(n + 1)]
-    parameters = tuple(
-        Parameter(f"d{a}q{b}", "Wb", 0.01, 0.0, "flux_wb", -_WIDE, _WIDE) for a, b in powers
-    )
+    powers = tuple((a, n - a) for n in (3, 4, 5) for a in range(n + 1))
+    names = tuple(f"d{a}q{b}" for a, b in powers)
 
     def coenergy(x: Operating, q: Values) -> Any:
         size = x.machine.scales["current_a"]
         d, i = x.id_a / size, x.iq_a / size
-        terms = {(a, b): q[f"d{a}q{b}"] for a, b in powers}
-        return size * sum(c * d**a * i**b for (a, b), c in terms.items() if c)
+        weights = zip(powers, q.values(), strict=True)
+        return size * sum(c * d**a * i**b for (a, b), c in weights if c)
 
-    effect = _effect(
+    effect = Effect(
         "port:flux:current",
         "co-energy as a polynomial of the currents",
-        parameters,
+        "",
+        (),
+        "",
+        "",
+        _parameters(names, "flux"),
         coenergy=coenergy,
     )
-    return Port(effect, "psi_q_wb", ("id_a", "iq_a"), (), "Wb")
+    return Port(effect, "flux", None, None, (), ("psi_d_wb", "psi_q_wb"), powers)

@@ -112,6 +112,7 @@ def _operating(
         inverter=segment.kind == "dq",
         ts_s=segment.ts_s,
         freq_hz=freq,
+        held=segment.test == "torque_map",
     )
 
 

@@ -4,44 +4,106 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.criticism.effect import Array
-from pipeline.criticism.linearise import effect_columns
-from pipeline.criticism.ports import Port, ports
+from pipeline.criticism.linearise import Column, effect_columns
+from pipeline.criticism.ports import Port, ports, refined
 from pipeline.criticism.segments import Segment
-from pipeline.criticism.system import Fitted, own_columns, system
+from pipeline.criticism.sketch import Pursuit, expression
+from pipeline.criticism.system import Fitted, System, clipped, own_columns, system
+from pipeline.criticism.telling import told
 from pipeline.records.diagnosis import UnknownStructure
 
+_TIE = 12.0
 _NEAR = 0.05
+_PRIOR = 1.0
+_CARRIED = 5.0
+_EFFORT = ((1.0, 0.0), 20)
+_SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A port with the misfit it removes less its price, and its fitted coefficients."""
+    """A port with the misfit it removes less its price, in sample and held out."""
 
     port: Port
     gain: float
-    values: dict[str, float]
-    spread: Array
+    held: float
+    left: Array
+    step: Array
 
 
 def unknown_structure(
-    segments: Sequence[Segment], fitted: Fitted, signals: Sequence[str]
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    signals: Sequence[str],
+    before: System | None = None,
+    name: str = "unknown",
 ) -> tuple[UnknownStructure | None, float]:
-    """The port that removes most misfit, as a sketch, and the misfit it removes.
+    """What the structure left in `signals` depends on, as curve, expression and effect file.
 
-    `signals` are the recorded signals that miss their floor; the structure is told of them.
+    Ports are held against each other by the misfit they remove from whole captures that they
+    were not fitted to; of those that do as well the one of fewest variables is told, and the
+    others are named beside it. Also returns the misfit (−2 log likelihood) it removes.
+    `before`: a system around the same fit, whose columns are used again. `name`: of the effect.
     """
-    offered = ports(fitted.model.machine)
+    found, wide = _ranked(segments, fitted, _hooks(signals), before)
+    if not found:
+        return None, 0.0
+    best = _simplest(found)
+    others = tuple(
+        (one.port.columns, one.held / best.held)
+        for one in found
+        if one is not best and one.held > (1.0 - _NEAR) * best.held
+    )
+    port = refined(best.port, fitted.model.machine)
+    near = _moved(fitted, wide, best.step)
+    fine = system(segments, near, effect_columns(port.effect, near.model), wide)
+    own = len(own_columns(fitted.model))
+    weight = 1.0 / np.maximum(fine.spreads(best.left), 1.0)[fine.group]
+    pursuit = Pursuit(fine, own, port, weight)
+    sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
+    return sketch, best.gain
+
+
+def _moved(fitted: Fitted, wide: System, step: Array) -> Fitted:
+    """The fit with the model's own constants where the best port puts them.
+
+    A drag over an inertia is a product: the expression is sought around the inertia found.
+    """
+    own = wide.columns[: len(own_columns(fitted.model))]
+    values = dict(fitted.values)
+    for column, change in zip(own, step, strict=False):
+        values[column.name] += float(change)
+    return replace(fitted, values=clipped(fitted.model, values))
+
+
+def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
+    """Hooks that can reach the signals that miss: a shaft's own torque is not in the voltage."""
+    if signals and all(signal in _SHAFT for signal in signals):
+        return ("torque",)
+    if any(signal in _SHAFT for signal in signals) or not signals:
+        return ("torque", "drop", "flux")
+    return ("drop", "flux")
+
+
+def _ranked(
+    segments: Sequence[Segment], fitted: Fitted, hooks: Sequence[str], before: System | None
+) -> tuple[list[Found], System]:
+    """Every port that is worth its price and helps where it was not fitted, the best first."""
+    offered = ports(fitted.model.machine, hooks)
     columns = [effect_columns(port.effect, fitted.model) for port in offered]
-    wide = system(segments, fitted, [c for some in columns for c in some])
+    wide = system(segments, fitted, [c for some in columns for c in some], before)
     own = np.arange(len(own_columns(fitted.model)))
-    before = wide.best(own).misfit
+    none = wide.best(own)
+    left, base = none.residual, none.misfit
+    carried = _carried(wide, own, left)
+    reference = _held_out(wide, own, left, np.zeros(own.size), carried)
     price = math.log(wide.size)
-    found: list[Found] = []
+    found = []
     first = own.size
     for port, mine in zip(offered, columns, strict=True):
         places = np.arange(first, first + len(mine))
@@ -50,57 +112,93 @@ def unknown_structure(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        end = wide.best(chosen)
-        gain = before - end.misfit - live.size * price
-        spread = np.sqrt(np.maximum(np.diag(wide.covariance(chosen))[own.size :], 0.0))
-        names = [wide.columns[n].name for n in live]
-        values = dict(zip(names, end.step[own.size :].tolist(), strict=True))
-        found.append(Found(port, gain, values, spread))
-    best = max(found, key=lambda f: f.gain, default=None)
-    if best is None or best.gain <= 0.0:
-        return None, 0.0
-    return _sketched(best, signals), best.gain
-
-
-def _sketched(found: Found, signals: Sequence[str]) -> UnknownStructure:
-    port = found.port
-    terms = []
-    for n, (name, value) in enumerate(found.values.items()):
-        if abs(value) < 2.0 * found.spread[n]:
+        end = wide.best(chosen, *_EFFORT)
+        after = end.residual
+        gain = base - end.misfit - live.size * price
+        if gain <= 0.0:
             continue
-        short = name.rsplit(".", 1)[1]
-        if port.knots:
-            at = port.knots[int(short.removeprefix("k"))]
-            short = f"at {port.variables[0]} = {at:.4g}"
-        terms.append((short, value, port.unit))
-    signal = port.signal
-    if signal not in signals and port.signal in ("psi_d_wb", "psi_q_wb") and signals:
-        signal = signals[0]
-    return UnknownStructure(signal, port.variables, _shape(found), tuple(terms))
+        ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
+        held = reference - _held_out(wide, chosen, after, ridge, carried)
+        if held > _TIE:
+            found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge)))
+    return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
-def _shape(found: Found) -> str:
-    """The curve in words: where it is largest and how it runs between its ends."""
-    port = found.port
-    if not port.knots:
-        names = sorted(found.values, key=lambda n: -abs(found.values[n]))[:3]
-        told = ", ".join(f"{n.rsplit('.', 1)[1]} {found.values[n]:.3g} {port.unit}" for n in names)
-        return f"{port.effect.words}: led by {told}"
-    curve = {port.knots[int(n.rsplit(".k", 1)[1])]: v for n, v in found.values.items()}
-    knots = np.array(sorted(curve))
-    values = np.array([curve[k] for k in knots])
-    span = float(np.ptp(values))
-    odd = values + values[::-1] if knots.size % 2 == 0 else values
-    even = values - values[::-1] if knots.size % 2 == 0 else values
-    kind = "neither odd nor even"
-    if np.abs(odd).max() < 0.2 * span:
-        kind = "odd"
-    elif np.abs(even).max() < 0.2 * span:
-        kind = "even"
-    top = float(knots[int(np.argmax(np.abs(values)))])
-    edge = abs(top) < (1.0 - _NEAR) * float(np.abs(knots).max())
-    bend = "with its largest value inside the range" if edge else "largest at the end of the range"
-    return (
-        f"{port.effect.words}, {kind}, {bend}: {np.abs(values).max():.3g} {port.unit} at "
-        f"{port.variables[0]} = {top:.4g}"
-    )
+def _ridge(columns: Sequence[Column], live: Array, fitted: Fitted) -> Array:
+    """Inverse prior variance [k] of a port's coefficients: the machine's own scale."""
+    machine = fitted.model.machine
+    scales = []
+    for n in live:
+        effect = columns[n].effect
+        parameter = None if effect is None else effect.parameters_of(machine)[0]
+        scales.append(1.0 if parameter is None else machine.scale(parameter))
+    return (_PRIOR * np.array(scales)) ** -2.0
+
+
+def _simplest(found: Sequence[Found]) -> Found:
+    """Of the ports that do about as well as the best, the one of fewest variables."""
+    enough = found[0].held - max(_TIE, _NEAR * found[0].held)
+    close = [one for one in found if one.held >= enough]
+    return min(close, key=lambda one: (len(one.port.columns), -one.held, one.port.effect.name))
+
+
+def _segment_of(around: System) -> Array:
+    return np.array([number for number, _, _ in around.labels])[around.group]
+
+
+def _carried(around: System, own: Array, left: Array) -> frozenset[int]:
+    """Segments without which some constant of the model is lost: they are always in the fit."""
+    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
+    matrix, segment = around.matrix[:, live], _segment_of(around)
+    normal = (matrix * weight[:, None]).T @ matrix + np.diag(around.penalty[live])
+    scale = np.sqrt(np.diag(normal))
+    spread = np.diag(np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True))
+    carried = set()
+    for number in range(len(around.tests)):
+        rows = matrix[segment == number]
+        less = normal - (rows * weight[segment == number, None]).T @ rows
+        inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        grown = np.diag(inverse) / np.maximum(spread, 1e-300)
+        if grown.max() > _CARRIED or (np.diag(less) < 1e-5 * np.diag(normal)).any():
+            carried.add(number)
+    return frozenset(carried)
+
+
+def _calm(around: System, places: Array, left: Array, ridge: Array) -> Array:
+    """Step [k] of least misfit in which a curve and a constant of one shape do not run away."""
+    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    matrix = around.matrix[:, places]
+    weighted = matrix * weight[:, None]
+    normal = weighted.T @ matrix + np.diag(around.penalty[places] + ridge)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    slope = (weighted.T @ around.residual + around.pull[places]) / scale
+    step: Array = -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
+    return step
+
+
+def _held_out(
+    around: System, places: Array, left: Array, ridge: Array, carried: frozenset[int]
+) -> float:
+    """Misfit of every capture as predicted without it, by the columns at `places`.
+
+    `left` [R] is the residual at their best fit, whose weights count; captures in `carried` are
+    left where they are. A coefficient that no other capture tells of stays at zero by `ridge`.
+    """
+    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    matrix, segment = around.matrix[:, places], _segment_of(around)
+    weighted = matrix * weight[:, None]
+    penalty = np.diag(around.penalty[places] + ridge)
+    normal = weighted.T @ matrix + penalty
+    slope = weighted.T @ around.residual + around.pull[places]
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    predicted = left.copy()
+    for number in range(len(around.tests)):
+        mine = segment == number
+        if number in carried or not np.any(matrix[mine]):
+            continue
+        less = (normal - weighted[mine].T @ matrix[mine]) / np.outer(scale, scale)
+        right = (slope - weighted[mine].T @ around.residual[mine]) / scale
+        step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
+        predicted[mine] = around.residual[mine] + matrix[mine] @ step
+    return around.misfit_of(around.spreads(predicted))

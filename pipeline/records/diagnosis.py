@@ -121,13 +121,38 @@ class Remainder:
 
 
 @dataclass(frozen=True, slots=True)
+class CurvePoint:
+    """A curve at one place: value and 95 % band [unit of the curve]."""
+
+    at: float
+    value: float
+    low: float
+    high: float
+
+    def document(self) -> dict[str, float]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {"at": self.at, "value": self.value, "low": self.low, "high": self.high}
+
+
+@dataclass(frozen=True, slots=True)
 class UnknownStructure:
-    """Error that no known effect explains: where it acts, on what it depends, its shape."""
+    """Error that no known effect explains: where it acts, on what it depends, its shape.
+
+    `curve` runs over the first of `variables`, temperatures counted from 25 degC; `times` is what
+    multiplies it. `alternatives`: variables that explain nearly as much, with their share of the
+    held-out evidence. `effect` is the name of an effect whose file has the text `source`.
+    """
 
     signal: str
     variables: tuple[str, ...]
     shape: str
     sketch: tuple[tuple[str, float, str], ...]
+    expression: str = ""
+    curve: tuple[CurvePoint, ...] = ()
+    times: str = ""
+    alternatives: tuple[tuple[tuple[str, ...], float], ...] = ()
+    effect: str = ""
+    source: str = ""
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -139,6 +164,14 @@ class UnknownStructure:
                 {"term": term, "coefficient": coefficient, "unit": unit}
                 for term, coefficient, unit in self.sketch
             ],
+            "expression": self.expression,
+            "curve": [point.document() for point in self.curve],
+            "times": self.times,
+            "alternatives": [
+                {"variables": list(variables), "share": share}
+                for variables, share in self.alternatives
+            ],
+            "effect": self.effect,
         }
 
 

@@ -17,7 +17,11 @@ from pipeline.stages.criticism import Judged, each_motor
 
 
 def main(settings: DiagnoseSettings) -> Outcome:
-    """Writes `diagnosis/MOTOR.json`, its page and the ladder's recording for every motor."""
+    """Writes `diagnosis/MOTOR.json`, its page and the ladder's recording for every motor.
+
+    Where structure is left that no effect explains, an effect to start from is written as well:
+    `diagnosis/effects/MOTOR_unknown.py`.
+    """
     return each_motor(settings, _judge)
 
 
@@ -28,6 +32,9 @@ def _judge(
         result = diagnose(campaign, spec, start)
     stem = file_stem(campaign.motor_id)
     write_whole(output / "diagnosis" / f"{stem}.json", canonical_json(result.document()))
+    if result.unknown is not None and result.unknown.sketch:
+        effect = output / "diagnosis" / "effects" / f"{result.unknown.effect}.py"
+        write_whole(effect, result.unknown.source.encode())
     from pipeline.report.ladder_page import render_ladder
 
     with watch.stage("page"):
@@ -54,5 +61,8 @@ def _lines(result: Diagnosis) -> list[str]:
             told.append(f"  {ranked.effect} could as well be {others}; {ranked.experiment}")
     if result.unknown is not None:
         told.append(f"  left over in {result.unknown.signal}: {result.unknown.shape}")
+    if result.unknown is not None and result.unknown.sketch:
+        told.append(f"  {result.unknown.expression}")
+        told.append(f"  an effect to start from: diagnosis/effects/{result.unknown.effect}.py")
     told.extend(f"  {note}" for note in result.notes)
     return told

@@ -8,7 +8,10 @@ from pipeline.criticism.effect import Array, Effect, Parameter, Recorded, Values
 
 
 def _load(r: Recorded, q: Values) -> Array:
-    return r.torque_nm + q["lag_s"] * np.gradient(r.torque_nm, r.ts_s)
+    slope = np.gradient(r.torque_nm, r.ts_s)
+    bend = np.zeros_like(r.torque_nm)
+    bend[1:-1] = np.diff(r.torque_nm, 2) / r.ts_s**2
+    return r.torque_nm + q["lag_s"] * (slope + q["late"] * r.ts_s * bend)
 
 
 EFFECT = Effect(
@@ -18,7 +21,19 @@ EFFECT = Effect(
     tests=("torque_map",),
     experiment="steps of torque at constant speed",
     reference="Wegener & Andrae, Measurement 40 (2007), dynamic torque measurement",
-    parameters=(Parameter("lag_s", "s", 10.0, 0.5, "period_s", low=0.0, high=400.0),),
+    parameters=(
+        Parameter("lag_s", "s", 10.0, 0.5, "period_s", low=0.0, high=400.0),
+        Parameter(
+            "late",
+            "1",
+            0.5,
+            0.0,
+            low=-2.0,
+            high=2.0,
+            scan=(0.0,),
+            words="sample periods that the torque is stamped late",
+        ),
+    ),
     signals=("torque_shaft_nm", "iq_a"),
     load=_load,
 )

@@ -1,0 +1,68 @@
+"""A shaft in two parts: motor and far inertia, with a twist between them.
+
+The coupling passes S = T − drags − (1 − f) J θ″ on to the far part, f its share of the inertia.
+The far angle is θ less the twist, so that with a load at the far end
+
+    T_load = S − f J (θ″ − twist″) = [T − drags − J θ″] + f J twist″,
+
+while a dynamometer that holds the far end reads S itself, [T − drags − J θ″] + f J θ″. Motor angle
+and load are recorded; the twist is a function of S. A coasting shaft passes on next to nothing.
+
+References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
+(2002), backlash as a dead zone of the twist; [3] Savitzky & Golay, Anal. Chem. 36 (1964).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from pipeline.criticism.effect import Array, Operating
+
+_WIDTH_S = 0.004
+_MOST = 41
+_LEAST = 7
+_DEGREE = 4
+
+
+def passed_on(x: Operating, share: float) -> Array:
+    """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
+
+    `share` of the inertia is at the far end. Quartics over 4 ms [3] keep the encoder's rounding,
+    twice differenced, out of it and leave a resonance of some 100 Hz as it is.
+    """
+    near = (1.0 - share) * x.base["j_kgm2"]
+    torque: Array = _smooth(x.torque_nm, x.ts_s, 0) - near * _smooth(x.theta_rad, x.ts_s, 2)
+    return torque
+
+
+def far_drag(x: Operating, share: float, twist_rad: Callable[[], Array]) -> Array:
+    """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m]."""
+    if not x.inverter:
+        return np.zeros(np.shape(x.omega_rad_s))
+    far = share * x.base["j_kgm2"]
+    if not x.held:
+        return -far * _smooth(twist_rad(), x.ts_s, 2)
+    acceleration = np.zeros(x.theta_rad.size)
+    acceleration[1:-1] = np.diff(x.theta_rad, 2) / x.ts_s**2
+    return -far * acceleration
+
+
+def present(amplitude: float, negligible: float) -> float:
+    """How much of a far inertia there is, 0 to 1: all of it from 5 negligible sizes on.
+
+    What a dynamometer reads depends on the inertia behind the coupling, however stiff that is; the
+    ramp makes the effect vanish with its amplitude.
+    """
+    return min(max(amplitude / (5.0 * negligible), 0.0), 1.0)
+
+
+def _smooth(signal: Array, period_s: float, derivative: int) -> Array:
+    """A signal [n] or its derivative by a local quartic."""
+    width = max(min(2 * round(_WIDTH_S / period_s / 2) + 1, _MOST), _LEAST)
+    if signal.size < width:
+        return np.zeros(signal.size)
+    found: Array = savgol_filter(signal, width, _DEGREE, deriv=derivative, delta=period_s)
+    return found

@@ -1,0 +1,193 @@
+"""Linear bases for a curve of one variable: splines, waves, fine hats, and their ranges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from pipeline.criticism.effect import Array, Machine, Operating
+
+TURN_RAD = 2.0 * math.pi
+_BEND = 1.6
+_PIECES = 8
+_NODES = 40
+_TURN_NODES = 48
+_WARM_K = (-15.0, 0.0, 10.0, 20.0, 35.0, 55.0, 80.0, 110.0)
+_EDGE = 1e-9
+LOWEST = tuple(range(1, 9))
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """What a curve may depend on. `columns` are the capture columns that hold it, `code` reads it
+    from an `Operating` x, `top` is its range [unit]; `kind` is `signed`, `size`, `warm` or `turn`.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    unit: str
+    kind: str
+    top: float
+    code: str
+    read: Callable[[Operating], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """Curves c(v) = Σ c_k mix_k(v) + Σ waves: `mix` [N, K] are curves on `nodes` [N], linear
+    between and constant beyond them; each of `orders` adds a sine and a cosine.
+    """
+
+    names: tuple[str, ...]
+    nodes: Array
+    mix: Array
+    orders: tuple[int, ...]
+    period: float | None
+
+    def curve(self, at: Any, weights: Array) -> Any:
+        """The curve of `weights` [len(names)] at `at` [n]; analytic where there are only waves."""
+        count = self.mix.shape[1]
+        total = 0.0 * at
+        if np.any(weights[:count]):
+            total = total + np.interp(
+                at, self.nodes, self.mix @ weights[:count], period=self.period
+            )
+        for place, order in enumerate(self.orders):
+            sine, cosine = weights[count + 2 * place : count + 2 * place + 2]
+            if sine:
+                total = total + sine * np.sin(order * at)
+            if cosine:
+                total = total + cosine * np.cos(order * at)
+        return total
+
+
+def variables(machine: Machine) -> Mapping[str, Variable]:
+    """Every variable, by name, with its range on one machine."""
+    s = machine.scales
+    current, speed = s["current_a"], s["speed_rad_s"]
+    listed = (
+        Variable(
+            "omega_mech_rad_s",
+            ("omega_mech_rad_s",),
+            "rad/s",
+            "signed",
+            speed,
+            "x.omega_rad_s",
+            lambda x: x.omega_rad_s,
+        ),
+        Variable(
+            "iq_a", ("iq_a",), "A", "signed", current, "np.real(x.iq_a)", lambda x: np.real(x.iq_a)
+        ),
+        Variable(
+            "id_a", ("id_a",), "A", "signed", current, "np.real(x.id_a)", lambda x: np.real(x.id_a)
+        ),
+        Variable(
+            "i_a", ("id_a", "iq_a"), "A", "size", current, "np.abs(x.i_a)", lambda x: np.abs(x.i_a)
+        ),
+        Variable(
+            "temp_winding_degc",
+            ("temp_winding_degc",),
+            "K",
+            "warm",
+            100.0,
+            "x.winding_k",
+            lambda x: x.winding_k,
+        ),
+        Variable(
+            "temp_magnet_degc",
+            ("temp_magnet_degc",),
+            "K",
+            "warm",
+            100.0,
+            "x.magnet_k",
+            lambda x: x.magnet_k,
+        ),
+        Variable(
+            "theta_mech_rad",
+            ("theta_mech_rad",),
+            "rad",
+            "turn",
+            TURN_RAD,
+            "x.theta_rad",
+            lambda x: x.theta_rad,
+        ),
+        Variable(
+            "theta_elec_rad",
+            ("theta_elec_rad",),
+            "rad",
+            "turn",
+            TURN_RAD,
+            "x.eps_rad",
+            lambda x: x.eps_rad,
+        ),
+    )
+    return {variable.name: variable for variable in listed}
+
+
+def coarse(variable: Variable, machine: Machine) -> Basis:
+    """A few smooth curves, enough to see whether and how something depends on the variable.
+
+    A signed variable has a spline for each sign, since friction jumps at zero.
+    """
+    if variable.kind == "turn":
+        return waves(_orders(variable, machine))
+    nodes = _nodes(variable)
+    if variable.kind == "warm":
+        mix = _cardinal(np.array(_WARM_K), nodes)
+    else:
+        # natural splines of the size itself hold a straight line, which friction has too
+        knots = variable.top * np.linspace(0.0, 1.0, _PIECES) ** _BEND
+        half = _cardinal(knots, np.abs(nodes))
+        sides = [nodes > 0.0] if variable.kind == "size" else [nodes < 0.0, nodes > 0.0]
+        mix = np.concatenate([half * side[:, None] for side in sides], axis=1)
+    names = tuple(f"k{n}" for n in range(mix.shape[1]))
+    return Basis(names, nodes, mix, (), None)
+
+
+def fine(variable: Variable, machine: Machine) -> Basis:
+    """Hats narrow enough for any curve that the sketch may try, and the waves they miss."""
+    nodes = _nodes(variable)
+    periodic = variable.kind == "turn"
+    high = ()
+    if periodic:
+        high = tuple(k for k in _orders(variable, machine) if k > LOWEST[-1])
+    names = tuple(f"k{n}" for n in range(nodes.size)) + _wave_names(high)
+    return Basis(names, nodes, np.eye(nodes.size), high, TURN_RAD if periodic else None)
+
+
+def waves(orders: tuple[int, ...]) -> Basis:
+    """Sine and cosine of each order."""
+    return Basis(_wave_names(orders), np.empty(0), np.empty((0, 0)), orders, TURN_RAD)
+
+
+def _wave_names(orders: tuple[int, ...]) -> tuple[str, ...]:
+    return tuple(f"{wave}{k}" for k in orders for wave in ("sin", "cos"))
+
+
+def _orders(variable: Variable, machine: Machine) -> tuple[int, ...]:
+    if variable.name == "theta_elec_rad":
+        return (*LOWEST, 12)
+    p = machine.pole_pairs
+    slots = () if machine.slots is None else (machine.slots, math.lcm(machine.slots, 2 * p))
+    return tuple(sorted({*LOWEST, p, 2 * p, 6 * p, *slots, *machine.torque_orders}))
+
+
+def _nodes(variable: Variable) -> Array:
+    if variable.kind == "turn":
+        return TURN_RAD * np.arange(_TURN_NODES) / _TURN_NODES
+    if variable.kind == "warm":
+        return np.linspace(_WARM_K[0], _WARM_K[-1], 2 * _NODES)
+    half = variable.top * np.maximum(np.linspace(0.0, 1.0, _NODES) ** _BEND, _EDGE)
+    return half if variable.kind == "size" else np.concatenate([-half[::-1], half])
+
+
+def _cardinal(knots: Array, at: Array) -> Array:
+    """Natural cubic splines [N, K] that are one at a knot and zero at the others."""
+    spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
+    found: Array = spline(np.clip(at, knots[0], knots[-1]))
+    return found
