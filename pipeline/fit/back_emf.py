@@ -251,7 +251,10 @@ def _steady_core(speeds: Array, start: int, stop: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class StretchFlux:
-    """Flux and harmonics of one stretch: psi [Wb], relative complex harmonics, uncertainties."""
+    """Flux and harmonics of one stretch: psi [Wb], relative complex harmonics, uncertainties.
+
+    `u_harmonic` is that of each component, real and imaginary, of a relative harmonic.
+    """
 
     psi_wb: float
     u_psi_wb: float
@@ -306,7 +309,7 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
         psi,
         u_psi,
         {abs(k): complex(c[n] / c[0]) for n, k in enumerate(ranks) if abs(k) > 1},
-        u_psi / psi * math.sqrt(2.0),
+        u_psi / psi,
         stretch.speed_rad_s,
         None if temps is None or not np.isfinite(temps).any() else float(np.nanmean(temps)),
         float(psi * omega.mean()),

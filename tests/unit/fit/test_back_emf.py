@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -171,3 +172,34 @@ def test_one_turn_by_hand(columns):
     found = estimates(hand_turn.ESTIMATOR, one)
     assert found["pole_pairs"].value == 7
     assert found["psi_pm_wb"].number == pytest.approx(3e-3, rel=2e-3)
+
+
+def test_what_an_instrument_reads_high_moves_psi_as_its_budget_says():
+    """Sign and size: voltages high by u read psi high, a warm-reading thermometer too where
+    alpha is negative; both as contributions of their own.
+    """
+    alpha = -0.002
+    cold = spin_capture((60.0, 120.0), psi=4e-3 * (1.0 - 5.0 * alpha), temp=20.0)
+    warm = spin_capture((-60.0, -120.0), psi=4e-3 * (1.0 + 40.0 * alpha), temp=65.0)
+    found = estimates(open_circuit.ESTIMATOR, cold, warm)["psi_pm_wb"]
+    said = {part.source: part.u for part in found.budget}
+    moved = {
+        "voltage@s": [pl.col("vab_v", "vbc_v") * 1.001],
+        "temperature@s": [pl.col("temp_magnet_degc") + 0.5],
+    }
+    for source, changed in moved.items():
+        runs = [replace(c, tables=(c.tables[0].with_columns(changed),)) for c in (cold, warm)]
+        high = estimates(open_circuit.ESTIMATOR, *runs)["psi_pm_wb"]
+        assert said[source] == pytest.approx(high.number - found.number, rel=5e-3)
+
+
+def test_a_harmonics_uncertainty_is_its_scatter():
+    """Over 16 seeds of two speeds whose noise differs fivefold, about the harmonic put in."""
+    found = [
+        estimates(open_circuit.ESTIMATOR, spin_capture((24.0, 120.0), seed=seed))
+        for seed in range(16)
+    ]
+    fifth = np.array([one["bemf_harmonic_5"].number for one in found])
+    u = float(np.mean([one["bemf_harmonic_5"].u for one in found]))
+    assert 0.55 < fifth.std(ddof=1) / u < 1.6
+    assert abs(fifth.mean() - 0.03) < 4.0 * u / math.sqrt(16)
