@@ -6,26 +6,26 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.special import betainc
 
-from pipeline.criticism.effect import Array
+from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, leave_out
+from pipeline.criticism.maps import all_maps, told_signal, unit_of
 from pipeline.criticism.model import BASE, PHYSICAL, Model
 from pipeline.criticism.segments import Segment, segments
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, first_fit, own_columns
+from pipeline.criticism.system import Fitted, System, first_fit, gauss_newton, own_columns
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import (
     Comparison,
     Dependence,
     ModelParameter,
     ModelSpec,
+    Move,
     SignalError,
 )
 from pipeline.records.constants import Constants
-
-_BINS = 12
+from pipeline.records.error_map import ErrorMap
 
 
 def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Comparison:
@@ -43,18 +43,30 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
     fitted, around = first_fit(found, asked)
     held = leave_out(around, len(own_columns(asked)))
+    simulated = simulate(found, fitted, around, held)
+    residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
+    maps = all_maps(found, around, residual, fitted)
+    parameters = _parameters(fitted, around)
+    without = model_of(model.bare(), machine)
+    bare, moved = _bare(found, fitted, without, parameters)
     return Comparison(
         campaign.motor_id,
         model.name,
         names,
-        _parameters(fitted, around, asked),
-        tuple(_errors(found, around, held)),
+        parameters,
+        (*_errors(found, around, held), *run_errors(simulated)),
         held.total if math.isfinite(held.total) else 0.0,
-        tuple(_where(found, around, held)),
+        tuple(_where(maps)),
+        (),
+        maps,
+        moved,
+        bare,
+        tuple(traces(found, fitted, simulated)),
     )
 
 
-def _parameters(fitted: Fitted, around: System, model: Model) -> dict[str, ModelParameter]:
+def _parameters(fitted: Fitted, around: System) -> dict[str, ModelParameter]:
+    model = fitted.model
     own = np.arange(len(own_columns(model)))
     spread = np.sqrt(np.maximum(np.diag(around.covariance(own)), 0.0))
     u = {around.columns[n].name: float(spread[n]) for n in own}
@@ -72,8 +84,30 @@ def _parameters(fitted: Fitted, around: System, model: Model) -> dict[str, Model
     return told
 
 
+def _bare(
+    found: Sequence[Segment], fitted: Fitted, without: Model, after: dict[str, ModelParameter]
+) -> tuple[float | None, tuple[Move, ...]]:
+    """Held-out error and parameters of the model without the effects that were asked for.
+
+    Both fits share the noise floor of the fuller one, so that their errors compare.
+    """
+    names = {effect.name for effect in without.effects}
+    if names == {effect.name for effect in fitted.model.effects}:
+        return None, ()
+    gone = [e.name for e in fitted.model.effects if e.name not in names]
+    values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
+    plain, around = gauss_newton(found, Fitted(without, values, fitted.sigma))
+    before = _parameters(plain, around)
+    moved = tuple(
+        Move(name, one.unit, one.value, one.u, after[name].value, after[name].u)
+        for name, one in before.items()
+    )
+    total = leave_out(around, len(own_columns(without))).total
+    return (total if math.isfinite(total) else None), moved
+
+
 def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[SignalError]:
-    """Errors of every capture's signals in plain windows; half-overlapping windows count half."""
+    """Errors of every capture's equations in plain windows."""
     for place, (number, channel, order) in enumerate(around.labels):
         mine = around.group == place
         if order != 0 or not mine.any():
@@ -81,89 +115,22 @@ def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator
         out = bool(np.isfinite(held.residual[mine]).all())
         residual = held.residual[mine] if out else around.residual[mine]
         unit = around.unit[mine]
-        n = int(mine.sum())
+        signal = told_signal(channel)
         yield SignalError(
-            channel,
+            signal,
             found[number].capture,
             "held_out" if out else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
             math.sqrt(float((unit**2).mean())),
-            n,
-            _effective(residual),
+            int(mine.sum()),
+            effective(residual),
+            unit_of(signal),
         )
 
 
-def _effective(residual: Array) -> float:
-    """Independent samples in autocorrelated ones: n (1 − r)/(1 + r) with lag-one r ≥ 0."""
-    n = residual.size
-    if n < 4:
-        return float(n)
-    centred = residual - residual.mean()
-    power = float(centred @ centred)
-    r = float(centred[1:] @ centred[:-1]) / power if power > 0 else 0.0
-    return n * (1.0 - max(r, 0.0)) / (1.0 + max(r, 0.0))
-
-
-def _where(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[Dependence]:
+def _where(maps: Sequence[ErrorMap]) -> Iterator[Dependence]:
     """For every signal: which variable's binned curve explains its error's variance."""
-    residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
-    pooled: dict[tuple[str, str], list[tuple[Array, Array, float]]] = {}
-    for place, (number, channel, order) in enumerate(around.labels):
-        mine = around.group == place
-        segment = found[number]
-        if order != 0 or segment.weak is None or mine.sum() < 8:
-            continue
-        values = _variables(segment)
-        at = around.window[mine]
-        for name, means in values.items():
-            scaled = residual[mine] * around.unit[mine]
-            pooled.setdefault((channel, name), []).append(
-                (means[at], scaled, _effective(residual[mine]) / at.size)
-            )
-    for (channel, name), parts in sorted(pooled.items()):
-        value = np.concatenate([p[0] for p in parts])
-        error = np.concatenate([p[1] for p in parts])
-        share = min(p[2] for p in parts)
-        told = _binned(value, error, share)
-        if told is not None:
-            yield Dependence(channel, name, *told)
-
-
-def _variables(segment: Segment) -> dict[str, Array]:
-    """Window means [W] of what an error may depend on; angles within a turn, at mid-window."""
-    weak = segment.weak
-    if weak is None:
-        return {}
-    signals = dict(segment.recorded)
-    values = {}
-    theta = signals.get("theta_mech_rad")
-    if theta is not None and np.ptp(theta) > 0:
-        middle = theta[weak.starts + weak.length // 2]
-        values["theta_mech_rad"] = np.mod(middle, 2 * np.pi)
-        speed = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / (
-            (weak.length - 1) * segment.ts_s
-        )
-        values["omega_mech_rad_s"] = speed
-    for name in ("id_a", "iq_a", "i_pair_a", "temp_winding_degc", "temp_magnet_degc"):
-        if name in signals:
-            values[name] = weak.means(signals[name][None])[0]
-    values["t_s"] = weak.starts * segment.ts_s
-    return values
-
-
-def _binned(value: Array, error: Array, share: float) -> tuple[float, float] | None:
-    """Share of variance between quantile bins, and its F test with effective samples."""
-    edges = np.unique(np.quantile(value, np.linspace(0, 1, _BINS + 1)[1:-1]))
-    place = np.searchsorted(edges, value)
-    bins = int(place.max()) + 1
-    total = float(((error - error.mean()) ** 2).sum())
-    n_eff = share * error.size
-    if bins < 2 or total <= 0 or n_eff <= bins + 1:
-        return None
-    count = np.bincount(place, minlength=bins)
-    means = np.bincount(place, error, minlength=bins) / np.maximum(count, 1)
-    between = float((count * (means - error.mean()) ** 2).sum())
-    explained = min(between / total, 1.0)
-    low, high = bins - 1.0, n_eff - bins
-    # P(F > f) as an incomplete beta function of the share left
-    return explained, float(betainc(high / 2, low / 2, max(1.0 - explained, 0.0)))
+    for one in maps:
+        if one.y is None:
+            p_value = None if math.isnan(one.p_map) else one.p_map
+            yield Dependence(one.signal, one.x.variable, one.explained, p_value)

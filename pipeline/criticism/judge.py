@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,11 +23,13 @@ _MATERIAL_BENCH = 1e-2
 @dataclass(frozen=True, slots=True)
 class HeldOut:
     """Residual [R] of every row as predicted without its own capture; NaN where that capture
-    alone carries a constant and so is always in the fit. `total` is 1 at the noise floor.
+    alone carries a constant and so is always in the fit. `total` is 1 at the noise floor. `steps`
+    [own columns] are how far the parameters move without a capture, by its number.
     """
 
     residual: Array
     total: float
+    steps: Mapping[int, Array] = field(default_factory=dict)
 
 
 def leave_out(around: System, own: int) -> HeldOut:
@@ -44,6 +46,7 @@ def leave_out(around: System, own: int) -> HeldOut:
     slope = weighted.T @ around.residual + around.pull[places]
     spread = np.diag(np.linalg.pinv(_unit(normal), hermitian=True))
     left = np.full(around.size, np.nan)
+    steps: dict[int, Array] = {}
     for number in sorted(set(segment.tolist())):
         mine = segment == number
         less = normal - weighted[mine].T @ matrix[mine]
@@ -54,9 +57,11 @@ def leave_out(around: System, own: int) -> HeldOut:
             continue
         step = -(inverse @ ((slope - weighted[mine].T @ around.residual[mine]) / scale)) / scale
         left[mine] = around.residual[mine] + matrix[mine] @ step
+        steps[number] = np.zeros(own)
+        steps[number][places] = step
     told = (left / around.soft)[np.isfinite(left)]
     total = math.sqrt(float((told**2).mean())) if told.size else math.nan
-    return HeldOut(left, total)
+    return HeldOut(left, total, steps)
 
 
 def _unit(normal: Array) -> Array:

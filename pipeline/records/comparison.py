@@ -3,8 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.records.error_map import ErrorMap
+
+Array = NDArray[np.float64]
+SIGNALS = (
+    "vd_v",
+    "vq_v",
+    "torque_shaft_nm",
+    "omega_mech_rad_s",
+    "iq_a",
+    "psi_d_wb",
+    "psi_q_wb",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +33,10 @@ class ModelSpec:
     name: str = "standard"
     effects: tuple[str, ...] = ()
     effects_path: str | None = None
+
+    def bare(self) -> ModelSpec:
+        """The same model without the effects that were added."""
+        return replace(self, effects=tuple(e for e in self.effects if e.startswith("-")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +54,39 @@ class ModelParameter:
 
 
 @dataclass(frozen=True, slots=True)
+class Move:
+    """A parameter before and after effects were added, with standard uncertainties [unit]."""
+
+    parameter: str
+    unit: str
+    before: float
+    u_before: float
+    after: float
+    u_after: float
+
+    @property
+    def in_u(self) -> float:
+        """The change over the uncertainty it had before; 0 where it had none."""
+        return (self.after - self.before) / self.u_before if self.u_before > 0 else 0.0
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {
+            "parameter": self.parameter,
+            "unit": self.unit,
+            "before": {"value": self.before, "u": self.u_before},
+            "after": {"value": self.after, "u": self.u_after},
+            "change_in_u": self.in_u,
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class SignalError:
-    """Error of one signal of one capture, as means over smooth windows [unit of the signal]."""
+    """Error of one signal of one capture, as means over smooth windows [unit of the signal].
+
+    `kind`: what an `equation` misses by, sample by sample, or what a `free_run` of the model away
+    from each window's start does.
+    """
 
     signal: str
     capture: str
@@ -44,6 +95,8 @@ class SignalError:
     noise_floor: float
     n: int
     n_eff: float
+    unit: str = ""
+    kind: Literal["equation", "free_run"] = "equation"
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -55,17 +108,22 @@ class SignalError:
             "noise_floor": self.noise_floor,
             "n": self.n,
             "n_eff": self.n_eff,
+            "unit": self.unit,
+            "kind": self.kind,
         }
 
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """How much of a signal's error variance a variable explains, as a binned curve."""
+    """How much of a signal's error variance a variable explains, as a binned curve.
+
+    `p_value` is None where too few stretches of record tell.
+    """
 
     signal: str
     variable: str
     explained: float
-    p_value: float
+    p_value: float | None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -78,8 +136,28 @@ class Dependence:
 
 
 @dataclass(frozen=True, slots=True)
+class Trace:
+    """A signal of a capture as recorded and as the model makes it [n, unit], NaN between windows.
+
+    The model is fitted without this capture where `split` is `held_out`.
+    """
+
+    capture: str
+    signal: str
+    kind: Literal["equation", "free_run"]
+    split: Literal["fit", "held_out"]
+    t_s: Array
+    measured: Array
+    model: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Comparison:
-    """One model of one motor: parameters, errors, and where the error lives."""
+    """One model of one motor: parameters, errors, and where the error lives.
+
+    `moved` tells parameters with and without the effects that were added; `bare` the held-out
+    error without them, None where none were. `traces` are for looking, not for the document.
+    """
 
     motor_id: str
     name: str
@@ -89,9 +167,18 @@ class Comparison:
     held_out: float
     where: tuple[Dependence, ...]
     notes: tuple[str, ...] = field(default=())
+    maps: tuple[ErrorMap, ...] = field(default=())
+    moved: tuple[Move, ...] = field(default=())
+    bare: float | None = None
+    traces: tuple[Trace, ...] = field(default=())
 
     def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`, schema model-comparison/1."""
+        """The JSON form of `contract/outputs.md`, schema model-comparison/1.
+
+        Signals that the contract does not name are under `errors_other` and `where_other`.
+        """
+        errors = [(e.signal in SIGNALS, e.document()) for e in self.errors]
+        where = [(d.signal in SIGNALS, d.document()) for d in self.where]
         return {
             "schema": "model-comparison/1",
             "motor_id": self.motor_id,
@@ -100,8 +187,12 @@ class Comparison:
                 "effects": list(self.effects),
                 "parameters": {n: p.document() for n, p in self.parameters.items()},
             },
-            "errors": [error.document() for error in self.errors],
-            "total": {"held_out": self.held_out},
-            "where": [dependence.document() for dependence in self.where],
+            "errors": [one for named, one in errors if named],
+            "errors_other": [one for named, one in errors if not named],
+            "total": {"held_out": self.held_out, "without_effects": self.bare},
+            "where": [one for named, one in where if named],
+            "where_other": [one for named, one in where if not named],
+            "maps": [one.document() for one in self.maps],
+            "moved": [one.document() for one in self.moved],
             "notes": list(self.notes),
         }

@@ -1,0 +1,91 @@
+"""Where an error lives: its mean over cells of one or two variables, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Bins:
+    """The cells of one variable, a glossary name: cell n runs from edge n to edge n + 1."""
+
+    variable: str
+    edges: tuple[float, ...]
+
+    @property
+    def count(self) -> int:
+        """Cells."""
+        return len(self.edges) - 1
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form."""
+        return {"variable": self.variable, "edges": list(self.edges)}
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorMap:
+    """Mean error of one signal [unit] over cells of `x` [X], or of `y` and `x` [Y, X].
+
+    `count` are the samples of each cell, `mean` is NaN where there are none. `p_value` is that of
+    a mean this far from zero by chance, NaN where too few visits tell; `p_map` that of means this
+    far from each other. `explained` is the share of the error's variance between the cells.
+    """
+
+    signal: str
+    unit: str
+    x: Bins
+    y: Bins | None
+    count: NDArray[np.int64]
+    mean: Array
+    p_value: Array
+    explained: float
+    p_map: float
+
+    @property
+    def reach(self) -> float:
+        """The largest mean, without its sign [unit]; 0 where no cell has one."""
+        finite = np.abs(self.mean[np.isfinite(self.mean)])
+        return float(finite.max()) if finite.size else 0.0
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: null where a number is not there."""
+        return {
+            "signal": self.signal,
+            "unit": self.unit,
+            "x": self.x.document(),
+            "y": None if self.y is None else self.y.document(),
+            "count": self.count.tolist(),
+            "mean": _nulls(self.mean.tolist()),
+            "p_value": _nulls(self.p_value.tolist()),
+            "explained": self.explained,
+            "p_map": None if math.isnan(self.p_map) else self.p_map,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """How often [H] a signal's error, over its noise floor, falls between the edges [H + 1].
+
+    Errors beyond the last edges are counted in the outermost bins.
+    """
+
+    signal: str
+    edges: tuple[float, ...]
+    count: tuple[int, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form."""
+        return {"signal": self.signal, "edges": list(self.edges), "count": list(self.count)}
+
+
+def _nulls(nested: Any) -> Any:
+    if isinstance(nested, list):
+        return [_nulls(one) for one in nested]
+    return None if math.isnan(nested) else nested

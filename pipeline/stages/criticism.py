@@ -1,0 +1,42 @@
+"""What `compare` and `diagnose` share: every motor of a folder judged, files written, one code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
+from pipeline.settings import CompareSettings
+from pipeline.stages.campaigns import campaigns, start_constants
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One motor's result: the text to print, and whether the captures were too few to tell."""
+
+    text: str
+    undecided: bool
+
+
+Judge = Callable[[Campaign, ModelSpec, Constants, Path, Stopwatch], Judged]
+
+
+def each_motor(settings: CompareSettings, judge: Judge) -> Outcome:
+    """Runs `judge` on every motor of `input`; it writes under the folder that it is given."""
+    watch, output = Stopwatch(), Path(settings.output)
+    with watch.stage("read"):
+        found, findings = campaigns(settings.input, settings.source, settings.motor)
+    spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
+    told = [judge(one, spec, start_constants(one), output, watch) for one in found]
+    refused = any(finding.severity == "refused" for finding in findings)
+    undecided = not told or any(one.undecided for one in told)
+    return Outcome(
+        first_that_applies(3 if refused else 0, 4 if undecided else 0),
+        "\n".join(one.text for one in told) + "\n",
+        tuple(finding.line() for finding in findings),
+        watch.table(),
+    )
