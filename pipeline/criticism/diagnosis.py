@@ -9,7 +9,8 @@ import numpy as np
 from scipy.special import gammaincc
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.judge import HeldOut, leave_out, remainder, signal_errors
+from pipeline.criticism.judge import HeldOut, leave_out, remainder
+from pipeline.criticism.ladder import rung_record
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, rivals_of
 from pipeline.criticism.segments import Segment, segments
@@ -23,7 +24,6 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import (
     Diagnosis,
-    LadderRung,
     RankedEffect,
     Remainder,
     UnknownStructure,
@@ -63,7 +63,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         verdict,
         missing,
         ranking,
-        tuple(_rung(r, h) for r, h in zip(rungs, held, strict=True)),
+        tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
         sketch if verdict == "unknown" else None,
         left,
         tuple(f"no test here excites {name}: {library[name].experiment}" for name in unseen),
@@ -146,11 +146,6 @@ def _unseen(
         and not present.issuperset(effect.tests[:1])
         and detectable(effect, last.fitted, last.around, offered) < _SEEN
     )
-
-
-def _rung(rung: Rung, held: HeldOut) -> LadderRung:
-    residual = np.where(np.isfinite(held.residual), held.residual, rung.around.residual)
-    return LadderRung(rung.added, held.total, signal_errors(rung.around, residual))
 
 
 def _ranking(

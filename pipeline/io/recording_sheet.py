@@ -16,8 +16,8 @@ def sheet_markdown(datasheet: Datasheet, path: str) -> str:
     names = sorted(datasheet.constants)
     own = [name for name in names if path in datasheet.constants[name].captures]
     rest = [name for name in names if name not in own]
-    lines = [f"# {_plain(datasheet.motor_id)}: {datasheet.status}", ""]
-    lines += [f"- {_plain(reason)}" for reason in datasheet.why]
+    lines = [f"# {plain(datasheet.motor_id)}: {datasheet.status}", ""]
+    lines += [f"- {plain(reason)}" for reason in datasheet.why]
     if own:
         lines += ["", "## Constants from this capture", "", *_table(datasheet, own)]
     if rest:
@@ -25,8 +25,8 @@ def sheet_markdown(datasheet: Datasheet, path: str) -> str:
     lines += ["", "## Checks", "", "| check | result | meaning |", "| --- | --- | --- |"]
     for check in datasheet.checks:
         suspect = f"; suspect: {check.suspect}" if check.suspect else ""
-        meaning = _plain(check.meaning + suspect)
-        lines.append(f"| {_plain(check.name)} | {_plain(check.status)} | {meaning} |")
+        meaning = plain(check.meaning + suspect)
+        lines.append(f"| {plain(check.name)} | {plain(check.status)} | {meaning} |")
     return "\n".join([*lines, "", f"version {datasheet.version}", ""])
 
 
@@ -40,9 +40,9 @@ def _line(estimate: Estimate) -> str:
     if estimate.known:
         text = reading(estimate.number, estimate.u, estimate.unit).text()
         text += " (at its bound)" if estimate.at_bound else ""
-    return f"| {_plain(estimate.name)} | {text} | {_plain(estimate.method)} |"
+    return f"| {plain(estimate.name)} | {text} | {plain(estimate.method)} |"
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """Text that markdown leaves alone, on one line."""
     return _SPECIAL.sub(r"\\\1", " ".join(text.split()))

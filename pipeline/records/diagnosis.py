@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from pipeline.records.error_map import ErrorMap, Histogram
 
 Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
 
@@ -44,12 +46,34 @@ class RankedEffect:
 
 
 @dataclass(frozen=True, slots=True)
+class RungError:
+    """Held-out error of one signal's window means beside their noise floor [unit]."""
+
+    rmse: float
+    noise_floor: float
+    unit: str
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {"rmse": self.rmse, "noise_floor": self.noise_floor, "unit": self.unit}
+
+
+@dataclass(frozen=True, slots=True)
 class LadderRung:
-    """A model's held-out error, 1 at the noise floor, and rms error of each signal [its unit]."""
+    """A model's held-out error, 1 at the noise floor, and rms error of each signal [its unit].
+
+    For looking: `errors` are those of `signals` beside their noise floors, `parameters` those of
+    the effects on this rung (value, standard uncertainty, unit), `maps` where the error lives,
+    `histograms` how it is spread.
+    """
 
     effects: tuple[str, ...]
     held_out: float
     signals: Mapping[str, float]
+    errors: Mapping[str, RungError] = field(default_factory=dict)
+    parameters: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+    maps: tuple[ErrorMap, ...] = field(default=())
+    histograms: tuple[Histogram, ...] = field(default=())
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -57,7 +81,22 @@ class LadderRung:
             "effects": list(self.effects),
             "held_out": self.held_out,
             "signals": dict(self.signals),
+            "errors": {name: one.document() for name, one in self.errors.items()},
+            "parameters": {
+                name: {"value": value, "u": u, "unit": unit}
+                for name, (value, u, unit) in self.parameters.items()
+            },
+            "maps": [one.document() for one in self.maps],
+            "histograms": [one.document() for one in self.histograms],
         }
+
+    def map_of(self, signal: str, *variables: str) -> ErrorMap | None:
+        """The map of a signal over one variable, or over x and y."""
+        for one in self.maps:
+            axes = (one.x.variable,) if one.y is None else (one.x.variable, one.y.variable)
+            if one.signal == signal and axes == variables:
+                return one
+        return None
 
 
 @dataclass(frozen=True, slots=True)

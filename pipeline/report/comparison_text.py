@@ -1,4 +1,4 @@
-"""What `compare` prints: errors by signal against their noise floor, where they live, what moved."""
+"""What `compare` prints: errors by signal beside their noise floor, and where they live."""
 
 from __future__ import annotations
 

@@ -6,35 +6,39 @@ from pathlib import Path
 
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.io.publish import canonical_json, write_whole
+from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.naming import file_stem
-from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
+from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import DiagnoseSettings
-from pipeline.stages.campaigns import campaigns, start_constants
+from pipeline.stages.criticism import Judged, each_motor
 
 
 def main(settings: DiagnoseSettings) -> Outcome:
-    """Writes `diagnosis/MOTOR.json` for every motor of `input`."""
-    watch, output = Stopwatch(), Path(settings.output)
-    with watch.stage("read"):
-        found, findings = campaigns(settings.input, settings.source, settings.motor)
-    spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
-    lines, undecided = [], not found
-    for campaign in found:
-        with watch.stage("diagnose"):
-            result = diagnose(campaign, spec, start_constants(campaign))
-        path = output / "diagnosis" / f"{file_stem(campaign.motor_id)}.json"
-        write_whole(path, canonical_json(result.document()))
-        lines.extend(_lines(result))
-        undecided = undecided or result.verdict == "insufficient"
-    refused = any(finding.severity == "refused" for finding in findings)
-    return Outcome(
-        first_that_applies(3 if refused else 0, 4 if undecided else 0),
-        "\n".join(lines) + "\n",
-        tuple(finding.line() for finding in findings),
-        watch.table(),
-    )
+    """Writes `diagnosis/MOTOR.json`, its page and the ladder's recording for every motor."""
+    return each_motor(settings, _judge)
+
+
+def _judge(
+    campaign: Campaign, spec: ModelSpec, start: Constants, output: Path, watch: Stopwatch
+) -> Judged:
+    with watch.stage("diagnose"):
+        result = diagnose(campaign, spec, start)
+    stem = file_stem(campaign.motor_id)
+    write_whole(output / "diagnosis" / f"{stem}.json", canonical_json(result.document()))
+    from pipeline.report.ladder_page import render_ladder
+
+    with watch.stage("page"):
+        page = render_ladder(result)
+        write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
+    if result.ladder:
+        from pipeline.io.recording_ladder import write_ladder_recording
+
+        with watch.stage("recording"):
+            write_ladder_recording(result, output / "recordings" / f"ladder-{stem}.rrd")
+    return Judged("\n".join(_lines(result)), result.verdict == "insufficient")
 
 
 def _lines(result: Diagnosis) -> list[str]:

@@ -1,0 +1,88 @@
+"""An error map as a picture: cells in blue to red, gaps hatched, ticks and a colour bar.
+
+The viewer has no view of one variable over two others, so that a map is an image with labels at
+its sides; the numbers themselves go beside it as a tensor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.physics.notation import scale_for
+from pipeline.records.error_map import Bins, ErrorMap
+
+CELL, BAR_GAP, BAR_WIDTH = 24, 36, 24
+TICKS = 4
+_COLD = np.array([33.0, 102.0, 172.0])
+_WARM = np.array([178.0, 24.0, 43.0])
+_NEUTRAL = 247.0
+_HATCH = ((74, 74, 74), (58, 58, 58))
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Labels:
+    """Texts at places [L, 2] in pixels of the picture."""
+
+    places: NDArray[np.float64]
+    texts: tuple[str, ...]
+
+
+def diverging(share: NDArray[np.float64]) -> Image:
+    """Colours [..., 3] of shares from −1 (blue) over 0 (white) to 1 (red)."""
+    strength = np.clip(np.abs(share), 0.0, 1.0)[..., None]
+    end = np.where(share[..., None] < 0.0, _COLD, _WARM)
+    colours: Image = np.rint(_NEUTRAL + (end - _NEUTRAL) * strength).astype(np.uint8)
+    return colours
+
+
+def map_picture(one: ErrorMap, reach: float) -> Image:
+    """RGBA picture [height, width, 4] of a map of x and y; `reach` [unit] is full colour."""
+    rows, columns = one.mean.shape
+    height, width = CELL * rows, CELL * columns
+    picture = np.zeros((height, width + BAR_GAP + BAR_WIDTH, 4), dtype=np.uint8)
+    known = np.isfinite(one.mean)[::-1]
+    share = np.where(known, one.mean[::-1], 0.0) / reach if reach > 0 else np.zeros(known.shape)
+    cells = np.kron(diverging(share), np.ones((CELL, CELL, 1), dtype=np.uint8))
+    down, across = np.indices((height, width)) // (CELL // 2)
+    hatch = np.array(_HATCH, dtype=np.uint8)[(down + across) % 2]
+    seen = np.kron(known, np.ones((CELL, CELL), dtype=bool))
+    picture[:, :width, :3] = np.where(seen[..., None], cells, hatch)
+    picture[:, :width, 3] = 255
+    ramp = np.linspace(1.0, -1.0, height)[:, None] * np.ones((1, BAR_WIDTH))
+    picture[:, width + BAR_GAP :, :3] = diverging(ramp)
+    picture[:, width + BAR_GAP :, 3] = 255
+    return picture
+
+
+def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
+    """Ticks of both axes and of the colour bar, and `words` for x and y, in picture pixels."""
+    if one.y is None:
+        raise ValueError("a picture needs a map of two variables")
+    width, height = CELL * one.x.count, CELL * one.y.count
+    bar = width + BAR_GAP + BAR_WIDTH / 2
+    scale = scale_for(reach, one.unit)
+    places = [(CELL * place, height + 16.0) for place, _ in _ticks(one.x)]
+    texts = [text for _, text in _ticks(one.x)]
+    places += [(-26.0, height - CELL * place) for place, _ in _ticks(one.y)]
+    texts += [text for _, text in _ticks(one.y)]
+    places += [(width / 2, height + 46.0), (0.0, -18.0), (bar, -18.0)]
+    texts += [words[0], words[1], scale.unit or "1"]
+    full = f"{scale.shown(reach):.3g}"
+    places += [(bar + 42.0, 8.0), (bar + 42.0, height / 2), (bar + 42.0, height - 8.0)]
+    texts += [f"+{full}", "0", f"-{full}"]
+    return Labels(np.array(places), tuple(texts))
+
+
+def _ticks(bins: Bins) -> list[tuple[float, str]]:
+    """Place in cells and text of round numbers along an axis."""
+    low, high = bins.edges[0], bins.edges[-1]
+    rough = (high - low) / TICKS
+    decade = 10.0 ** np.floor(np.log10(rough))
+    step = float(min((s for s in (1, 2, 2.5, 5, 10) if s * decade >= rough), default=10) * decade)
+    numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
+    each = (high - low) / bins.count
+    return [((n - low) / each, f"{n:.6g}" if abs(n) > 1e-9 * step else "0") for n in numbers]

@@ -1,0 +1,191 @@
+"""The page of one diagnosis: what is missing, how sure that is, and the error falling by rungs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pipeline.physics.notation import MINUS, quantity, reading, significant
+from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect
+from pipeline.report.axis import quantity_words
+from pipeline.report.heatmap import angle_bars, heatmap
+from pipeline.report.page import render
+from pipeline.report.rung_chart import rung_chart
+
+VERDICT_WORDS = {
+    "adequate": "The model explains these captures down to the noise; nothing is missing.",
+    "missing": "Known effects are missing from the model. With them the error falls as below.",
+    "unknown": "Something is missing that no known effect explains.",
+    "insufficient": "The captures cannot tell; record what is named below.",
+}
+SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
+MOST_RANKED = 12
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorCell:
+    """One signal's error on one rung, its floor, their ratio, the change from the rung below."""
+
+    rmse: str
+    floor: str
+    ratio: str
+    change: str
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One signal of one rung: map over speed and current, bars over the angle."""
+
+    signal: str
+    flat: str
+    turn: str
+
+
+@dataclass(frozen=True, slots=True)
+class RungView:
+    """One rung, every text ready to be shown."""
+
+    number: int
+    title: str
+    explanations: tuple[str, ...]
+    held_out: str
+    change: str
+    parameters: tuple[tuple[str, str], ...]
+    others: tuple[tuple[str, str], ...]
+    errors: tuple[tuple[str, ErrorCell | None], ...]
+    figures: tuple[Figure, ...]
+
+
+def render_ladder(result: Diagnosis) -> str:
+    """The self-contained HTML page of one diagnosis; equal input gives equal text."""
+    signals = _signals(result)
+    reach = _reaches(result.ladder)
+    views = [_view(result, n, signals, reach) for n in range(len(result.ladder))]
+    over = {
+        name: [r.errors[name].rmse / max(r.errors[name].noise_floor, 1e-300) for r in result.ladder]
+        for name in signals
+    }
+    return render(
+        "ladder.html.jinja",
+        result=result,
+        verdict_words=VERDICT_WORDS[result.verdict],
+        chart=rung_chart([_short(view) for view in views], over),
+        rungs=views,
+        signals=[quantity_words(name) for name in signals],
+        found=[_ranked(one) for one in result.ranking if one.effect in result.missing],
+        others=[_ranked(one) for one in result.ranking if one.effect not in result.missing][
+            :MOST_RANKED
+        ],
+        sketch=_sketch(result),
+        remainder=[
+            (
+                one.capture,
+                quantity_words(one.signal),
+                str(one.order) if one.order else "mean",
+                significant(one.chi2_per_n, 3),
+                significant(one.size, 3),
+            )
+            for one in result.remainder
+        ],
+    )
+
+
+def _signals(result: Diagnosis) -> list[str]:
+    """Signals told on every rung, the one farthest over its floor on the first rung first."""
+    if not result.ladder:
+        return []
+    first = result.ladder[0].errors
+    names = [name for name in first if all(name in rung.errors for rung in result.ladder)]
+    return sorted(names, key=lambda n: (-first[n].rmse / max(first[n].noise_floor, 1e-300), n))
+
+
+def _reaches(ladder: Sequence[LadderRung]) -> dict[tuple[str, str], float]:
+    """Full colour, or the axis' end, of each signal's maps: the largest mean on any rung."""
+    reach: dict[tuple[str, str], float] = {}
+    for rung in ladder:
+        for one in rung.maps:
+            key = (one.signal, one.x.variable)
+            reach[key] = max(reach.get(key, 0.0), one.reach)
+    return reach
+
+
+def _view(
+    result: Diagnosis, number: int, signals: Sequence[str], reach: dict[tuple[str, str], float]
+) -> RungView:
+    rung = result.ladder[number]
+    below = result.ladder[number - 1] if number else None
+    came = [e for e in rung.effects if below is None or e not in below.effects]
+    gone = [e for e in below.effects if e not in rung.effects] if below is not None else []
+    title = " ".join([*(f"+ {e}" for e in came), *(f"{MINUS} {e}" for e in gone)])
+    told = {one.effect: one.explanation for one in result.ranking}
+    shown = [(n, reading(*v).text()) for n, v in rung.parameters.items()]
+    own = tuple(one for one in shown if one[0].split(".")[0] in came)
+    return RungView(
+        number,
+        title or f"model {result.model}",
+        tuple(told[e] for e in came if e in told),
+        f"{rung.held_out:.4g}",
+        "" if below is None else _percent(rung.held_out, below.held_out),
+        own,
+        tuple(one for one in shown if one not in own),
+        tuple((quantity_words(n), _cell(rung, below, n)) for n in signals),
+        tuple(_figures(rung, signals, reach)),
+    )
+
+
+def _cell(rung: LadderRung, below: LadderRung | None, name: str) -> ErrorCell | None:
+    error = rung.errors.get(name)
+    if error is None:
+        return None
+    before = None if below is None else below.errors.get(name)
+    return ErrorCell(
+        quantity(error.rmse, error.unit, 3),
+        quantity(error.noise_floor, error.unit, 3),
+        significant(error.rmse / max(error.noise_floor, 1e-300), 3),
+        "" if before is None else _percent(error.rmse, before.rmse),
+    )
+
+
+def _percent(now: float, before: float) -> str:
+    if before <= 0.0:
+        return ""
+    return f"{100.0 * (now / before - 1.0):+.0f} %".replace("-", MINUS)
+
+
+def _figures(
+    rung: LadderRung, signals: Sequence[str], reach: dict[tuple[str, str], float]
+) -> Iterator[Figure]:
+    mapped = [n for n in signals if rung.map_of(n, SPEED, CURRENT) is not None]
+    for name in [*mapped, *(n for n in signals if n not in mapped)]:
+        flat = rung.map_of(name, SPEED, CURRENT)
+        angle = "theta_mech_rad" if name == "torque_shaft_nm" else "theta_elec_rad"
+        turn = rung.map_of(name, angle)
+        if flat is None and turn is None:
+            continue
+        yield Figure(
+            quantity_words(name),
+            "" if flat is None else heatmap(flat, reach[name, SPEED]),
+            "" if turn is None else angle_bars(turn, reach[name, angle]),
+        )
+
+
+def _short(view: RungView) -> str:
+    return f"{view.number}: {view.title}" if len(view.title) < 26 else f"rung {view.number}"
+
+
+def _ranked(one: RankedEffect) -> dict[str, str]:
+    return {
+        "effect": one.effect,
+        "score": f"{one.score:.4g}".replace("-", MINUS),
+        "drop": f"{100.0 * one.held_out_drop:.0f} %" if one.held_out_drop else "–",
+        "p_value": f"{one.p_value:.2g}",
+        "confused_with": ", ".join(one.confused_with),
+        "explanation": one.explanation,
+        "experiment": one.experiment,
+    }
+
+
+def _sketch(result: Diagnosis) -> list[tuple[str, str]]:
+    if result.unknown is None:
+        return []
+    return [(term, quantity(value, unit, 4)) for term, value, unit in result.unknown.sketch]

@@ -1,0 +1,76 @@
+"""The ladder in one picture: every signal's error over its noise floor, rung by rung."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from html import escape
+
+from pipeline.report.axis import quantity_words
+
+WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 760.0, 250.0, 56.0, 130.0, 22.0, 44.0
+LABEL_PITCH, COLOURS = 14.0, 6
+
+
+def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str:
+    """SVG of `over`, each signal's error over its noise floor [rungs], on a logarithmic scale.
+
+    `names` are the rungs in words. The band below 1 is the noise floor.
+    """
+    finite = [max(v, 0.3) for values in over.values() for v in values if math.isfinite(v)]
+    if not finite or not names:
+        return '<p class="empty">no errors to draw</p>'
+    low, high = -0.5, max(math.ceil(math.log10(max(finite)) * 2) / 2, 0.5)
+    bottom = TOP + HEIGHT
+
+    def y(value: float) -> float:
+        place = (math.log10(max(value, 10**low)) - low) / (high - low)
+        return bottom - HEIGHT * place
+
+    def x(rung: int) -> float:
+        wide = WIDTH - LEFT - RIGHT
+        return LEFT + wide * (rung + 0.5) / len(names)
+
+    parts = [
+        f'<rect class="band" x="{LEFT:g}" y="{y(1.0):.1f}" width="{WIDTH - LEFT - RIGHT:g}" '
+        f'height="{bottom - y(1.0):.1f}"/>'
+    ]
+    for decade in range(math.ceil(high) + 1):
+        if decade <= high:
+            place = y(10.0**decade)
+            parts.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')
+            parts.append(
+                f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10**decade}</text>'
+            )
+    for rung, name in enumerate(names):
+        parts.append(
+            f'<text class="tick x" x="{x(rung):.1f}" y="{bottom + 16:.1f}">{escape(name)}</text>'
+        )
+    parts += _lines(over, x, y)
+    return (
+        f'<svg class="ladder" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
+        'aria-label="error over noise floor of every signal, rung by rung">'
+        f'<text class="title" x="2" y="12">held-out error over noise floor</text>'
+        f'<text class="tick" x="{WIDTH - RIGHT + 8:g}" y="{y(1.0) + 14:.1f}">noise floor</text>'
+        f"{''.join(parts)}</svg>"
+    )
+
+
+def _lines(
+    over: Mapping[str, Sequence[float]], x: Callable[[int], float], y: Callable[[float], float]
+) -> Iterator[str]:
+    ends = sorted((y(values[-1]), name) for name, values in over.items())
+    places: dict[str, float] = {}
+    last = -math.inf
+    for place, name in ends:
+        last = max(place, last + LABEL_PITCH)
+        places[name] = last
+    for number, (name, values) in enumerate(over.items()):
+        line = "".join(f"{'L' if n else 'M'}{x(n):.1f} {y(v):.1f}" for n, v in enumerate(values))
+        dots = "".join(f"M{x(n):.1f} {y(v):.1f}h0" for n, v in enumerate(values))
+        css = f"c{number % COLOURS}"
+        yield f'<path class="{css}" d="{line}"/><path class="{css} dots few" d="{dots}"/>'
+        yield (
+            f'<text class="end t{number % COLOURS}" x="{x(len(values) - 1) + 12:.1f}" '
+            f'y="{places[name] + 4:.1f}">{escape(quantity_words(name))}</text>'
+        )
