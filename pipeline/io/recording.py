@@ -120,7 +120,7 @@ def capture_traces(capture: Capture) -> Iterator[Trace]:
         if table.height == 0 or values.width == 0:
             continue
         if "t_s" in table.columns:
-            yield _timed(entity, table["t_s"].to_numpy(), values)
+            yield timed(entity, table["t_s"].to_numpy(), values)
         else:
             rows = pl.Series(ROW, np.arange(table.height, dtype=np.int64))
             yield Trace(entity, ROW, values.insert_column(0, rows))
@@ -138,13 +138,13 @@ def fit_traces(capture: Capture, evidence: Sequence[Evidence]) -> Iterator[FitTr
                 residual = series.measured - series.fitted
             columns = {"measured": series.measured, "fitted": series.fitted, "residual": residual}
             frame = pl.DataFrame({k: v.astype(np.float32) for k, v in columns.items()})
-            trace = _timed(f"/model/{one.estimator}/{number}_{place}", series.x, frame)
+            trace = timed(f"/model/{one.estimator}/{number}_{place}", series.x, frame)
             finite = np.abs(residual[np.isfinite(residual)])
             reach = float(finite.max()) if finite.size else 0.0
             yield FitTrace(one.title, series.label, one.y_name, trace, reach)
 
 
-def _timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
+def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
     """A trace on the time line; rows whose instant is not finite have no place there."""
     finite = np.isfinite(t_s)
     nanoseconds = np.rint(t_s[finite] * 1e9).astype(np.int64)
@@ -153,12 +153,19 @@ def _timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace
     return Trace(entity, TIME, kept.insert_column(0, index))
 
 
+def send_trace(stream: RecordingStream, trace: Trace) -> None:
+    """Sends a table in slices of 4096 rows."""
+    import rerun as rr
+
+    for batch in trace.frame.to_arrow().to_batches(max_chunksize=ROWS_A_CHUNK):
+        rr.send_record_batch(batch, stream, index=trace.index, entity_path=trace.entity)
+
+
 def _send(stream: RecordingStream, capture: Capture, traces: Sequence[Trace]) -> None:
     import rerun as rr
 
     for trace in traces:
-        for batch in trace.frame.to_arrow().to_batches(max_chunksize=ROWS_A_CHUNK):
-            rr.send_record_batch(batch, stream, index=trace.index, entity_path=trace.entity)
+        send_trace(stream, trace)
     meta = capture.meta
     stated: dict[str, Any] = {
         "motor_id": meta.motor_id,

@@ -5,7 +5,7 @@ A recording holds, on the sequence timeline `rung` and for every SIGNAL whose er
     /sheet                 what this rung adds, with parameters and errors, as a markdown page
     /errors/SIGNAL         rms error of the rungs up to here (bars), in /floor/SIGNAL their floor
     /map/SIGNAL/picture    mean error over speed and q current, one colour scale for all rungs
-    /map/SIGNAL/values     the same numbers as a tensor
+    /map/SIGNAL/values     the same numbers [unit of the signal] as a tensor
     /angle/SIGNAL          mean error over the electrical angle (torque: the mechanical one)
     /spread/SIGNAL         how the errors are spread, in noise floors
     /over/SIGNAL           the error over its floor, as a line over the rungs
@@ -27,7 +27,8 @@ from pipeline.io.publish import canonical_json, write_whole
 from pipeline.io.recording import APPLICATION, FLUSH_S
 from pipeline.io.recording_ladder_sheet import rung_markdown
 from pipeline.io.recording_layout import MEASURED, MODEL, RESIDUAL
-from pipeline.io.recording_map import CELL, map_labels, map_picture
+from pipeline.io.recording_map import BAR_GAP, CELL, bar_picture, map_labels, map_picture
+from pipeline.physics.notation import Scale, scale_for
 from pipeline.records.diagnosis import Diagnosis, LadderRung
 from pipeline.records.error_map import ErrorMap
 
@@ -38,6 +39,7 @@ RUNG = "rung"
 SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
 WORDS = ("speed [rad/s]", "iq [A]")
 _GREY = (140, 140, 140)
+_FAINT = (140, 140, 140, 60)
 
 
 def write_ladder_recording(result: Diagnosis, path: Path) -> None:
@@ -61,6 +63,7 @@ def ladder_bytes(result: Diagnosis) -> bytes:
     for signal in shown_signals(result):
         _send_errors(stream, result, signal)
         _send_maps(stream, result, signal)
+        _send_angle_ends(stream, result, signal)
         _send_spread(stream, result, signal)
     stated: dict[str, Any] = {
         "motor_id": result.motor_id,
@@ -99,6 +102,23 @@ def common_reach(ladder: Sequence[LadderRung], signal: str) -> float:
     return max((one.reach for one in flat if one is not None), default=0.0)
 
 
+def error_scale(result: Diagnosis, signal: str) -> Scale:
+    """The unit in which a signal's errors are drawn on all rungs: mV where volts would be small."""
+    errors = [rung.errors[signal] for rung in result.ladder]
+    return scale_for(max(e.rmse for e in errors), errors[0].unit)
+
+
+def angle_reach(result: Diagnosis, signal: str) -> float:
+    """The largest mean error over the angle on any rung [unit]."""
+    turns = [rung.map_of(signal, angle_of(signal)) for rung in result.ladder]
+    return max((one.reach for one in turns if one is not None), default=0.0)
+
+
+def angle_scale(result: Diagnosis, signal: str) -> Scale:
+    """The unit in which a signal's error is drawn over the angle on all rungs."""
+    return scale_for(angle_reach(result, signal), result.ladder[0].errors[signal].unit)
+
+
 def _send(stream: RecordingStream, entity: str, rungs: Sequence[int], columns: Any) -> None:
     import rerun as rr
 
@@ -119,8 +139,10 @@ def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
     """Bars that grow with the rung, and the same over the noise floor as a line."""
     import rerun as rr
 
-    rmse = np.array([rung.errors[signal].rmse for rung in result.ladder])
-    floor = np.array([rung.errors[signal].noise_floor for rung in result.ladder])
+    scale = error_scale(result, signal)
+    errors = [rung.errors[signal] for rung in result.ladder]
+    rmse = np.array([scale.shown(error.rmse) for error in errors])
+    floor = np.array([scale.shown(error.noise_floor) for error in errors])
     places = np.arange(rmse.size, dtype=np.float64)
     for entity, values, colour in (("errors", rmse, MODEL), ("floor", floor, MEASURED)):
         for rung in range(rmse.size):
@@ -159,7 +181,7 @@ def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
             shape = rr.encodings.ImageFormat(
                 width=picture.shape[1],
                 height=picture.shape[0],
-                color_model="RGBA",
+                color_model="RGB",
                 channel_datatype="U8",
             )
             columns = rr.Image.columns(buffer=[picture.tobytes()], format=[shape])
@@ -170,7 +192,7 @@ def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
         turn = rung.map_of(signal, angle_of(signal))
         if turn is not None:
             edges = np.degrees(np.array(turn.x.edges))
-            shown = np.nan_to_num(turn.mean)
+            shown = np.nan_to_num(turn.mean) / 10.0 ** angle_scale(result, signal).exponent
             _send_bars(
                 stream,
                 f"/angle/{signal}",
@@ -180,6 +202,15 @@ def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
                 float(edges[1] - edges[0]),
                 RESIDUAL,
             )
+
+
+def _send_angle_ends(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
+    """Two marks beyond the turn that keep the bars' axis the same on every rung."""
+    import rerun as rr
+
+    reach = angle_scale(result, signal).shown(angle_reach(result, signal))
+    marks = rr.BarChart([reach, -reach], abscissa=[362.0, 364.0], color=_FAINT, widths=[1.0, 1.0])
+    stream.log(f"/angle_axis/{signal}", marks, static=True)
 
 
 def _send_frame(stream: RecordingStream, signal: str, flat: ErrorMap, reach: float) -> None:
@@ -195,6 +226,8 @@ def _send_frame(stream: RecordingStream, signal: str, flat: ErrorMap, reach: flo
     border = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows], [0, 0]]) * CELL
     frame = rr.LineStrips2D([border], colors=_GREY, radii=0.5)
     stream.log(f"/map/{signal}/frame", frame, static=True)
+    place = rr.Transform3D(translation=[columns * CELL + BAR_GAP, 0.0, 0.0])
+    stream.log(f"/map/{signal}/bar", place, rr.Image(bar_picture(rows)), static=True)
 
 
 def _send_spread(stream: RecordingStream, result: Diagnosis, signal: str) -> None:

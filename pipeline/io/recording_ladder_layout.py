@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 from pipeline.io.recording_layout import PALETTE
 from pipeline.io.recording_map import BAR_GAP, BAR_WIDTH, CELL
 from pipeline.physics.glossary import suffix_of
-from pipeline.physics.notation import unit_text
-from pipeline.physics.units import SUFFIX_UNITS
 from pipeline.records.diagnosis import Diagnosis
 
 if TYPE_CHECKING:
@@ -43,9 +41,10 @@ def _page() -> Any:
 def _workspace(result: Diagnosis, signal: str) -> Any:
     import rerun.blueprint as rrb
 
-    from pipeline.io.recording_ladder import CURRENT, SPEED, angle_of
+    from pipeline.io.recording_ladder import CURRENT, SPEED, angle_of, angle_scale, error_scale
 
-    named, unit = signal_words(signal), unit_text(SUFFIX_UNITS.get(suffix_of(signal), ""))
+    named = signal_words(signal)
+    unit, over = error_scale(result, signal).unit, angle_scale(result, signal).unit
     flat = result.ladder[0].map_of(signal, SPEED, CURRENT)
     upper = [_page()]
     if flat is not None:
@@ -56,8 +55,8 @@ def _workspace(result: Diagnosis, signal: str) -> Any:
         upper.append(
             rrb.Spatial2DView(
                 origin=f"/map/{signal}",
-                contents=[f"/map/{signal}/picture", f"/map/{signal}/axes", f"/map/{signal}/frame"],
-                name=f"{named}: mean error over speed and current [{unit}]",
+                contents=[f"/map/{signal}/{part}" for part in ("picture", "bar", "axes", "frame")],
+                name=f"{named}: mean error over speed and current",
                 visual_bounds=bounds,
             )
         )
@@ -65,7 +64,7 @@ def _workspace(result: Diagnosis, signal: str) -> Any:
     turn = "electrical" if angle == "theta_elec_rad" else "mechanical"
     lower = [
         rrb.BarChartView(
-            name=f"rms error per rung [{unit}], grey: noise floor",
+            name=f"rms error per rung [{unit}], beside its noise floor",
             origin="/",
             contents=[f"/errors/{signal}", f"/floor/{signal}"],
         )
@@ -73,7 +72,9 @@ def _workspace(result: Diagnosis, signal: str) -> Any:
     if result.ladder[0].map_of(signal, angle) is not None:
         lower.append(
             rrb.BarChartView(
-                name=f"mean error [{unit}] over {turn} angle [°]", origin=f"/angle/{signal}"
+                name=f"mean error [{over}] over {turn} angle [°]",
+                origin="/",
+                contents=[f"/angle/{signal}", f"/angle_axis/{signal}"],
             )
         )
     lower.append(
@@ -118,4 +119,4 @@ def signal_words(signal: str) -> str:
     """A signal without its unit: `torque_shaft_nm` is torque shaft."""
     suffix = suffix_of(signal)
     stem = signal[: -len(suffix) - 1] if suffix else signal
-    return stem.replace("_", " ")
+    return stem.replace("_", " ").replace("alpha", "acceleration")

@@ -79,7 +79,7 @@ def capture_layout(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> Bluepri
         ),
         row_shares=[3.0, 1.0],
     )
-    plots = rrb.Vertical(*map(_view, plans), row_shares=[plan.share for plan in plans] or None)
+    plots = rrb.Vertical(*map(time_view, plans), row_shares=[plan.share for plan in plans] or None)
     return rrb.Blueprint(
         rrb.Horizontal(plots, side, column_shares=[2.4, 1.0]),
         rrb.TimePanel(state="collapsed", timeline=traces[0].index if traces else None),
@@ -101,7 +101,7 @@ def _fit_view(
     else:
         measured = [Line(home.entity, y_name, "measured", MEASURED)]
     models = [Line(f.trace.entity, "fitted", f"model{_after(f, fits)}", MODEL) for f in fits]
-    return ViewPlan(f"{title}: {_named(y_name)}", (*measured, *models), 3.0)
+    return ViewPlan(f"{title}: {named(y_name)}", (*measured, *models), 3.0)
 
 
 def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
@@ -111,7 +111,7 @@ def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
         Line(f.trace.entity, "residual", f"measured − model{_after(f, fits)}", RESIDUAL)
         for f in fits
     ]
-    return ViewPlan(f"{_named(y_name)}, measured − model", tuple(lines), 1.6, reach)
+    return ViewPlan(f"{named(y_name)}, measured − model", tuple(lines), 1.6, reach)
 
 
 def _after(fit: FitTrace, fits: Sequence[FitTrace]) -> str:
@@ -137,7 +137,8 @@ def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[
     return groups
 
 
-def _view(plan: ViewPlan) -> TimeSeriesView:
+def time_view(plan: ViewPlan) -> TimeSeriesView:
+    """A time series view of a plan; x axes of all views move together."""
     import rerun.blueprint as rrb
     from rerun.blueprint.components import LinkAxis
 
@@ -186,5 +187,6 @@ def _stem(name: str) -> str:
     return (name[: -len(suffix) - 1] if suffix else name).replace("_", " ")
 
 
-def _named(name: str) -> str:
+def named(name: str) -> str:
+    """A column in words with its unit."""
     return f"{_stem(name)} [{_unit(name)}]"

@@ -40,22 +40,23 @@ def diverging(share: NDArray[np.float64]) -> Image:
 
 
 def map_picture(one: ErrorMap, reach: float) -> Image:
-    """RGBA picture [height, width, 4] of a map of x and y; `reach` [unit] is full colour."""
+    """RGB picture [height, width, 3] of a map of x and y; `reach` [unit] is full colour."""
     rows, columns = one.mean.shape
     height, width = CELL * rows, CELL * columns
-    picture = np.zeros((height, width + BAR_GAP + BAR_WIDTH, 4), dtype=np.uint8)
     known = np.isfinite(one.mean)[::-1]
-    share = np.where(known, one.mean[::-1], 0.0) / reach if reach > 0 else np.zeros(known.shape)
+    share = np.where(known, one.mean[::-1], 0.0) / (reach or 1.0)
     cells = np.kron(diverging(share), np.ones((CELL, CELL, 1), dtype=np.uint8))
     down, across = np.indices((height, width)) // (CELL // 2)
     hatch = np.array(_HATCH, dtype=np.uint8)[(down + across) % 2]
     seen = np.kron(known, np.ones((CELL, CELL), dtype=bool))
-    picture[:, :width, :3] = np.where(seen[..., None], cells, hatch)
-    picture[:, :width, 3] = 255
-    ramp = np.linspace(1.0, -1.0, height)[:, None] * np.ones((1, BAR_WIDTH))
-    picture[:, width + BAR_GAP :, :3] = diverging(ramp)
-    picture[:, width + BAR_GAP :, 3] = 255
+    picture: Image = np.where(seen[..., None], cells, hatch)
     return picture
+
+
+def bar_picture(rows: int) -> Image:
+    """RGB picture [height, width, 3] of the colours from +reach down to −reach."""
+    ramp = np.linspace(1.0, -1.0, CELL * rows)[:, None] * np.ones((1, BAR_WIDTH))
+    return diverging(ramp)
 
 
 def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:

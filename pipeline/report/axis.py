@@ -15,7 +15,13 @@ from pipeline.physics.units import SUFFIX_UNITS
 Array = NDArray[np.float64]
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _ANGLE_STEPS = (5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0)
-_SPOKEN = {"t": "time", "theta": "angle", "omega": "speed", "temp": "temperature"}
+_SPOKEN = {
+    "t": "time",
+    "theta": "angle",
+    "omega": "speed",
+    "alpha": "acceleration",
+    "temp": "temperature",
+}
 _AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc", "vca", "vdc"}
 
 

@@ -65,6 +65,7 @@ def _lines(
     for place, name in ends:
         last = max(place, last + LABEL_PITCH)
         places[name] = last
+    lift = max(last - TOP - HEIGHT, 0.0)
     for number, (name, values) in enumerate(over.items()):
         line = "".join(f"{'L' if n else 'M'}{x(n):.1f} {y(v):.1f}" for n, v in enumerate(values))
         dots = "".join(f"M{x(n):.1f} {y(v):.1f}h0" for n, v in enumerate(values))
@@ -72,5 +73,5 @@ def _lines(
         yield f'<path class="{css}" d="{line}"/><path class="{css} dots few" d="{dots}"/>'
         yield (
             f'<text class="end t{number % COLOURS}" x="{x(len(values) - 1) + 12:.1f}" '
-            f'y="{places[name] + 4:.1f}">{escape(quantity_words(name))}</text>'
+            f'y="{places[name] - lift + 4:.1f}">{escape(quantity_words(name))}</text>'
         )

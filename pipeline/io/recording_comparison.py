@@ -1,0 +1,147 @@
+"""A comparison as a Rerun recording: measured under model over time, capture by capture.
+
+A recording holds, on the timeline `t` (duration), for every capture that was simulated,
+
+    /CAPTURE/equation/SIGNAL  `measured`, `model`, `residual`: the model from the measured state
+    /CAPTURE/free_run/SIGNAL  the same of the model on its own, from each window's start
+    /sheet                    every error beside its noise floor, as a markdown page
+
+Two files of equal input differ in the ids that Rerun draws, so compare their content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.recording import APPLICATION, FLUSH_S, TIME, send_trace, timed
+from pipeline.io.recording import Trace as Table
+from pipeline.io.recording_layout import AIR, MEASURED, MODEL, RESIDUAL, Line, ViewPlan, named
+from pipeline.io.recording_sheet import plain
+from pipeline.physics.notation import quantity, significant
+from pipeline.records.comparison import Comparison, Trace
+
+if TYPE_CHECKING:
+    from rerun.blueprint import Blueprint
+
+_KINDS = {"equation": "from the measured state", "free_run": "on its own"}
+
+
+def write_comparison_recording(result: Comparison, path: Path) -> None:
+    """Writes one motor's comparison as .rrd; MachineError where the disk refuses."""
+    write_whole(path, comparison_bytes(result))
+
+
+def comparison_bytes(result: Comparison) -> bytes:
+    """The .rrd of one comparison, made in memory."""
+    import rerun as rr
+
+    rr.set_strict_mode(True)
+    digest = hashlib.sha256(canonical_json(result.document())).hexdigest()[:32]
+    stream = rr.RecordingStream(APPLICATION, recording_id=digest, send_properties=False)
+    memory = stream.memory_recording()
+    stream.send_blueprint(_layout(result), make_active=False, make_default=True)
+    for trace in result.traces:
+        send_trace(stream, table_of(trace))
+    page = rr.TextDocument(_sheet(result), media_type=rr.MediaType.MARKDOWN)
+    stream.log("/sheet", page, static=True)
+    stated: dict[str, Any] = {
+        "motor_id": result.motor_id,
+        "model": result.name,
+        "effects": list(result.effects),
+        "held_out": result.held_out,
+    }
+    stream.send_property("comparison", rr.AnyValues(**stated))
+    stream.flush(timeout_sec=FLUSH_S)
+    content: bytes = memory.drain_as_bytes()
+    return content
+
+
+def entity_of(trace: Trace) -> str:
+    """Where a trace lies; the capture's path is one part of the address."""
+    safe = "".join(c if c.isalnum() or c in "._-" else "_" for c in trace.capture)
+    return f"/{safe}/{trace.kind}/{trace.signal}"
+
+
+def table_of(trace: Trace) -> Table:
+    """A trace as columns of float32."""
+    columns = {
+        "measured": trace.measured,
+        "model": trace.model,
+        "residual": trace.measured - trace.model,
+    }
+    frame = pl.DataFrame({name: column.astype(np.float32) for name, column in columns.items()})
+    return timed(entity_of(trace), trace.t_s, frame)
+
+
+def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
+    """Views of one capture: each signal with its residual under it, on an axis that stays."""
+    plans: list[ViewPlan] = []
+    for trace in result.traces:
+        if trace.capture != capture:
+            continue
+        entity = entity_of(trace)
+        words = f"{named(trace.signal)}, model {_KINDS[trace.kind]}"
+        lines = (
+            Line(entity, "measured", "measured", MEASURED),
+            Line(entity, "model", "model", MODEL),
+        )
+        plans.append(ViewPlan(words, lines, 2.0))
+        left = np.abs(trace.measured - trace.model)
+        reach = AIR * float(np.nanmax(left)) if np.isfinite(left).any() else 1.0
+        line = Line(entity, "residual", "measured − model", RESIDUAL)
+        plans.append(ViewPlan(f"{named(trace.signal)}, left over", (line,), 1.0, reach or 1.0))
+    return tuple(plans)
+
+
+def _layout(result: Comparison) -> Blueprint:
+    """A tab a capture, equations at the left, free runs at the right; errors in the last tab."""
+    import rerun.blueprint as rrb
+
+    from pipeline.io.recording_layout import time_view
+
+    tabs: list[Any] = []
+    for capture in dict.fromkeys(trace.capture for trace in result.traces):
+        plans = planned(result, capture)
+        sides = []
+        for kind in _KINDS:
+            mine = [p for p in plans if f"/{kind}/" in p.lines[0].entity]
+            if mine:
+                shares: Sequence[float] = [p.share for p in mine]
+                sides.append(rrb.Vertical(*map(time_view, mine), row_shares=list(shares)))
+        tabs.append(rrb.Horizontal(*sides, name=capture.rsplit("/", 1)[-1]))
+    tabs.append(rrb.TextDocumentView(origin="/sheet", name="All errors"))
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=TIME),
+        auto_views=False,
+        auto_layout=False,
+        collapse_panels=True,
+    )
+
+
+def _sheet(result: Comparison) -> str:
+    effects = ", ".join(result.effects) or "no effects"
+    lines = [
+        f"# {plain(result.motor_id)}: model {plain(result.name)}",
+        "",
+        f"with {plain(effects)}; held-out error **{result.held_out:.4g}** (1 is the noise floor)",
+        "",
+        "| capture | signal | | rms | noise floor | ratio |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for one in result.errors:
+        how = "held out" if one.split == "held_out" else "in the fit"
+        ratio = significant(one.rmse / max(one.noise_floor, 1e-300), 3)
+        lines.append(
+            f"| {plain(one.capture)} | {plain(one.signal)} | {_KINDS[one.kind]}, {how} "
+            f"| {quantity(one.rmse, one.unit, 3)} | {quantity(one.noise_floor, one.unit, 3)} "
+            f"| {ratio} |"
+        )
+    return "\n".join([*lines, ""])
