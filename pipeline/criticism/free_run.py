@@ -43,6 +43,7 @@ _SETTLED = 1e-4
 _LOST = 30.0
 _REPLICATES, _POOLED = 3, 96
 _OFFSET = 0.5
+_OFFSETS = ("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
 _SEED = 20261121
 _PROBE = 1e-3
 
@@ -52,8 +53,8 @@ class Run:
     """Simulated beside recorded signals [W, N] of one capture's windows, on `t_s` [W, N].
 
     `signals` are `id_a` and `iq_a` of a capture under current and, where load and angle are
-    recorded or the shaft coasts, `omega_mech_rad_s`; `floor` is the noise floor of each one's
-    window means.
+    recorded or the shaft coasts, `omega_mech_rad_s`. `floor` is the noise floor of each one's
+    window means, `drift` [K, W] how they move with each sensor's offset, of its prior size.
     """
 
     capture: str
@@ -61,6 +62,7 @@ class Run:
     recorded: Mapping[str, Array]
     simulated: Mapping[str, Array]
     floor: Mapping[str, float]
+    drift: Mapping[str, Array]
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -68,8 +70,19 @@ class Run:
         return tuple(self.simulated)
 
     def errors(self, signal: str) -> Array:
-        """Recorded less simulated as means [W] under a smooth window."""
-        return _means(self.recorded[signal] - self.simulated[signal])
+        """Recorded less simulated as means [W] under a smooth window.
+
+        Offsets of the capture's sensors are taken out as far as their priors allow: the means are
+        whitened by 1 + Σ d dᵀ over the drifts d, as the equations' residuals are.
+        """
+        floor = max(self.floor[signal], 1e-300)
+        error = _means(self.recorded[signal] - self.simulated[signal]) / floor
+        if not self.drift[signal].size:
+            return error * floor
+        axes, size, _ = np.linalg.svd((self.drift[signal] / floor).T, full_matrices=False)
+        taken = axes @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2)) * (axes.T @ error))
+        left: Array = (error - taken) * floor
+        return left
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +135,10 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
     told = {name: _signal(batch, recorded, name)[settled] for name in names}
     made = {name: _signal(batch, found, name)[settled] for name in names}
-    floor = _floor(batch, found, model, values, jacobian, settled, names)
+    moved = _Response(batch, found, model, values, jacobian, settled, names)
     time = recorded.get("t_s", segment.ts_s * np.arange(batch.segment.size, dtype=np.float64))
-    return Run(segment.capture, batch.inside(time)[settled], told, made, floor)
+    floor, drift = _floor(moved), _drift(moved)
+    return Run(segment.capture, batch.inside(time)[settled], told, made, floor, drift)
 
 
 def _batch(segment: Segment, model: Model, values: Values) -> _Batch | None:
@@ -370,37 +384,62 @@ def _corrected(
     return np.nan_to_num(current.T, nan=np.inf), np.nan_to_num(angle.T, nan=np.inf)
 
 
-def _floor(
-    batch: _Batch,
-    found: Mapping[str, Array],
-    model: Model,
-    values: Values,
-    jacobian: _Jacobian,
-    settled: NDArray[np.bool_],
-    names: tuple[str, ...],
-) -> dict[str, float]:
-    """Noise of the window means of recorded less simulated that the sensors alone make.
+@dataclass(frozen=True, slots=True)
+class _Response:
+    """How window means of recorded less simulated move with the recording, to first order."""
 
-    Noise of each sensor's level is added to the recording, with the offset and the reading error
-    that every equation is allowed, and the simulation is moved by it to first order.
+    batch: _Batch
+    found: Mapping[str, Array]
+    model: Model
+    values: Values
+    jacobian: _Jacobian
+    settled: NDArray[np.bool_]
+    names: tuple[str, ...]
+
+    def to(
+        self, added: Mapping[str, Any], extra: tuple[Complex, Array] | None = None
+    ) -> dict[str, Array]:
+        """Changes [W] by what is added to recorded signals, and to each window's equations."""
+        batch, recorded = self.batch, self.batch.segment.recorded
+        other = {name: column + added.get(name, 0.0) for name, column in recorded.items()}
+        moved, _ = _settle(
+            batch, self.found, other, self.model, self.values, self.jacobian, 1, extra
+        )
+        changes = {}
+        for name in self.names:
+            after = _signal(batch, other, name) - _signal(batch, moved, name)
+            before = _signal(batch, recorded, name) - _signal(batch, self.found, name)
+            changes[name] = _means((after - before)[self.settled])
+        return changes
+
+
+def _floor(response: _Response) -> dict[str, float]:
+    """Noise of the window means that the sensors alone make.
+
+    Noise of each sensor's level is added to the recording, and to the equations the reading error
+    that they are allowed.
     """
-    recorded, noise = batch.segment.recorded, batch.segment.noise
-    total: dict[str, list[Array]] = {name: [] for name in names}
-    for replicate in range(max(_REPLICATES, -(-_POOLED // int(settled.sum())))):
+    batch = response.batch
+    noise = batch.segment.noise
+    total: dict[str, list[Array]] = {name: [] for name in response.names}
+    for replicate in range(max(_REPLICATES, -(-_POOLED // int(response.settled.sum())))):
         rng = np.random.default_rng([_SEED, replicate])
-        noisy = {
-            name: column
-            + rng.normal(0.0, noise.get(name, 0.0), column.size)
-            + rng.normal(0.0, _OFFSET * noise.get(name, 0.0)) * (name != "theta_mech_rad")
-            for name, column in recorded.items()
+        added = {
+            name: rng.normal(0.0, sigma, batch.segment.size)
+            for name, sigma in sorted(noise.items())
+            if sigma > 0.0 and name in batch.segment.recorded
         }
-        extra = _missed(batch, rng, values)
-        moved, _ = _settle(batch, found, noisy, model, values, jacobian, 1, extra)
-        for name in names:
-            change = _signal(batch, noisy, name) - _signal(batch, moved, name)
-            plain = _signal(batch, recorded, name) - _signal(batch, found, name)
-            total[name].append(_means((change - plain)[settled]) ** 2)
+        for name, change in response.to(added, _missed(batch, rng, response.values)).items():
+            total[name].append(change**2)
     return {name: math.sqrt(float(np.mean(squares))) for name, squares in total.items()}
+
+
+def _drift(response: _Response) -> dict[str, Array]:
+    """Moves [K, W] of the window means with an offset of each sensor, of half its noise."""
+    noise = response.batch.segment.noise
+    offsets = [name for name in _OFFSETS if noise.get(name, 0.0) > 0.0]
+    moves = [response.to({name: _OFFSET * noise[name]}) for name in offsets]
+    return {name: np.array([move[name] for move in moves]) for name in response.names}
 
 
 def _missed(batch: _Batch, rng: np.random.Generator, values: Values) -> tuple[Complex, Array]:

@@ -16,9 +16,11 @@ from pipeline.criticism.maps import disjoint, unit_of
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segments import Segment
 from pipeline.criticism.system import Fitted, System, clipped
+from pipeline.criticism.traces import smoothed
 from pipeline.records.comparison import SignalError, Trace
 
 Split = Literal["fit", "held_out"]
+_LOOK_S = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,17 +94,30 @@ def traces(
     """Recorded and predicted signals of the simulated captures, window by window."""
     for one in simulated:
         segment, run = found[one.number], one.run
-        if segment.kind == "dq" and segment.weak is not None:
-            left = residual(segment, fitted.model, one.values)
-            starts = disjoint(segment.weak.starts, segment.weak.length)
-            rows = starts[:, None] + np.arange(segment.weak.length)[None, :]
-            for place, channel in enumerate(segment.channels):
-                told = segment.recorded[channel][rows]
-                time, model = segment.recorded["t_s"][rows], told - left[place][rows]
-                yield _trace(segment, channel, "equation", one.split, time, told, model)
+        if segment.kind == "dq":
+            yield from _equations(segment, fitted, one)
         for signal in run.signals:
             told, made = run.recorded[signal], run.simulated[signal]
             yield _trace(segment, signal, "free_run", one.split, run.t_s, told, made)
+
+
+def _equations(segment: Segment, fitted: Fitted, one: Simulated) -> Iterator[Trace]:
+    """What the equations make of the recorded state, averaged over a millisecond.
+
+    Sample by sample the second difference of the angle would drown the torque in noise.
+    """
+    weak = segment.weak
+    if weak is None:
+        return
+    left = residual(segment, fitted.model, one.values)
+    width = max(2 * round(_LOOK_S / segment.ts_s / 2) + 1, 1)
+    starts = disjoint(weak.starts, weak.length)
+    rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
+    for place, channel in enumerate(segment.channels):
+        told = smoothed(segment.recorded[channel], width)[rows]
+        model = told - smoothed(left[place], width)[rows]
+        time = segment.recorded["t_s"][rows]
+        yield _trace(segment, channel, "equation", one.split, time, told, model)
 
 
 def _trace(
