@@ -153,6 +153,13 @@ def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
     _send(stream, f"/over/{signal}", range(rmse.size), columns)
 
 
+def _tensor(values: NDArray[np.float64]) -> Any:
+    """One row of a column of tensors; a bare list of arrays would become one of more axes."""
+    import rerun as rr
+
+    return rr.encodings.TensorData(array=np.ascontiguousarray(values))
+
+
 def _send_bars(
     stream: RecordingStream,
     entity: str,
@@ -165,7 +172,7 @@ def _send_bars(
     import rerun as rr
 
     columns = rr.BarChart.columns(
-        values=[values], abscissa=[places], color=[colour], widths=[width]
+        values=_tensor(values), abscissa=_tensor(places), color=[colour], widths=[width]
     )
     _send(stream, entity, [rung], columns)
 
@@ -186,7 +193,9 @@ def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
             )
             columns = rr.Image.columns(buffer=[picture.tobytes()], format=[shape])
             _send(stream, f"/map/{signal}/picture", [place], columns)
-            _send(stream, f"/map/{signal}/values", [place], rr.Tensor.columns(data=[flat.mean]))
+            _send(
+                stream, f"/map/{signal}/values", [place], rr.Tensor.columns(data=_tensor(flat.mean))
+            )
             if place == 0:
                 _send_frame(stream, signal, flat, reach)
         turn = rung.map_of(signal, angle_of(signal))

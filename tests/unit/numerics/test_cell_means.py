@@ -1,4 +1,4 @@
-"""Cell means: p-values uniform on noise, honest under autocorrelation, and sharp on a real error."""
+"""Cell means: p-values uniform on noise, honest under memory, and sharp on a real error."""
 
 from __future__ import annotations
 

@@ -1,0 +1,169 @@
+"""The ladder's recording holds the document's numbers; a comparison's holds its traces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.io.recording_comparison import (
+    entity_of,
+    planned,
+    table_of,
+    write_comparison_recording,
+)
+from pipeline.io.recording_ladder import (
+    common_reach,
+    error_scale,
+    shown_signals,
+    write_ladder_recording,
+)
+from pipeline.io.recording_ladder_sheet import added, rung_markdown
+from pipeline.io.recording_map import CELL, diverging, map_labels, map_picture
+from pipeline.records.comparison import Comparison, SignalError, Trace
+from tests.unit.ladders import make_diagnosis, make_map
+
+
+def rows(path: Path, entity: str, index: str = "rung") -> Iterator[tuple[int, dict[str, Any]]]:
+    """Every row of an entity that is not static: its place and its components."""
+    from rerun.chunk import RrdReader
+
+    for chunk in RrdReader(str(path)).stream().filter(content=entity, is_static=False):
+        batch = chunk.to_record_batch()
+        for row in batch.to_pylist():
+            yield row[index], row
+
+
+@pytest.fixture(scope="module")
+def ladder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recordings") / "ladder.rrd"
+    write_ladder_recording(make_diagnosis(), path)
+    return path
+
+
+def component(row: dict[str, Any], name: str) -> Any:
+    (found,) = [value for key, value in row.items() if key.endswith(name)]
+    return found
+
+
+def numbers(tensor: Any) -> np.ndarray:
+    """The numbers of a tensor component in its own shape."""
+    one = tensor[0]
+    return np.array(one["buffer"], dtype=float).reshape(one["shape"])
+
+
+def test_the_map_read_back_is_the_documents(ladder: Path) -> None:
+    told = make_diagnosis().document()["ladder"]
+    seen = dict(rows(ladder, "/map/vq_v/values"))
+    assert sorted(seen) == [0, 1]
+    for place, row in seen.items():
+        expected = np.array(told[place]["maps"][0]["mean"], dtype=float)
+        np.testing.assert_array_equal(numbers(component(row, "Tensor:data")), expected)
+
+
+def test_error_bars_grow_rung_by_rung_and_hold_the_documents_errors(ladder: Path) -> None:
+    result = make_diagnosis()
+    unit = 10.0 ** error_scale(result, "vq_v").exponent
+    assert unit == 1e-3
+    seen = dict(rows(ladder, "/errors/vq_v"))
+    first, last = (numbers(component(seen[n], "BarChart:values")) for n in (0, 1))
+    assert first * unit == pytest.approx([0.13, 0.0])
+    assert last * unit == pytest.approx([0.13, 0.0026])
+    floor = dict(rows(ladder, "/floor/vq_v"))
+    assert numbers(component(floor[1], "BarChart:values")) * unit == pytest.approx([2e-3, 2e-3])
+
+
+def test_the_picture_shows_the_map_upside_up_with_its_gap_hatched(ladder: Path) -> None:
+    one = make_map(1.0)
+    picture = map_picture(one, one.reach)
+    assert picture.shape == (3 * CELL, 4 * CELL, 3)
+    # the largest current is on top: red at the left, a hatched gap at the right
+    assert (picture[5, 5] == diverging(np.array(0.2 / one.reach))).all()
+    assert len({tuple(p) for p in picture[:CELL, 3 * CELL :].reshape(-1, 3)}) == 2
+    assert (picture[-5, -5] == diverging(np.array(-1.0))).all()
+    for _, row in rows(ladder, "/map/vq_v/picture"):
+        (buffer,) = component(row, "Image:buffer")
+        assert len(buffer) == picture.size
+
+
+def test_colours_of_all_rungs_share_one_scale() -> None:
+    result = make_diagnosis()
+    assert common_reach(result.ladder, "vq_v") == pytest.approx(0.21)
+    quiet = map_picture(make_map(0.02), 0.21)
+    assert (np.abs(quiet[: CELL // 2, : CELL // 2].astype(int) - 247) < 8).all()
+    labels = map_labels(make_map(1.0), 0.21, ("speed [rad/s]", "iq [A]"))
+    assert {"+210", "-210", "mV", "speed [rad/s]"} <= set(labels.texts)
+
+
+def test_the_page_of_a_rung_says_what_came_and_every_error_so_far(ladder: Path) -> None:
+    result = make_diagnosis(unknown=True)
+    assert added(result, 0) == ()
+    assert added(result, 1) == ("dead_time",)
+    text = rung_markdown(result, 1).replace("\\", "")
+    for words in ("+ dead_time", "179.90 ± 0.24 mV", "130 mV", "2.60 mV", "(−98 %)", "noise floor"):
+        assert words in text
+    assert "dead_time could as well be phase_imbalance: low-speed current steps" in text
+    assert "Left over in vq_v: odd in iq_a" in text
+    pages = dict(rows(ladder, "/sheet"))
+    (page,) = component(pages[1], "TextDocument:text")
+    assert page == rung_markdown(make_diagnosis(), 1)
+
+
+def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last() -> None:
+    assert shown_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
+    assert shown_signals(replace(make_diagnosis(), ladder=())) == ()
+
+
+def test_equal_work_has_equal_content_and_no_wall_clock(ladder: Path, tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    again = tmp_path / "again.rrd"
+    write_ladder_recording(make_diagnosis(), again)
+    ids = [RrdReader(str(p)).recordings()[0].recording_id for p in (ladder, again)]
+    assert ids[0] == ids[1]
+    for chunk in RrdReader(str(ladder)).stream().filter(is_static=False):
+        assert "log_time" not in chunk.to_record_batch().schema.names
+
+
+def make_comparison() -> Comparison:
+    t = np.arange(500) * 1e-4
+    told = np.sin(40 * t)
+    made = told - 0.01
+    told[100] = made[100] = np.nan
+    traces = (
+        Trace("a/drive 0.mcap", "iq_a", "free_run", "held_out", t, told, made),
+        Trace("a/drive 0.mcap", "vq_v", "equation", "held_out", t, told, made),
+    )
+    error = SignalError("iq_a", "a/drive 0.mcap", "held_out", 0.01, 0.002, 5, 4.0, "A", "free_run")
+    return Comparison("m", "standard", (), {}, (error,), 5.0, (), traces=traces)
+
+
+def test_a_comparisons_traces_come_back_with_their_gaps(tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    result = make_comparison()
+    write_comparison_recording(result, tmp_path / "c.rrd")
+    trace = result.traces[0]
+    assert entity_of(trace) == "/a_drive_0.mcap/free_run/iq_a"
+    stream = RrdReader(str(tmp_path / "c.rrd")).stream()
+    chunks = stream.filter(content=entity_of(trace), is_static=False)
+    back = pl.concat([pl.from_arrow(c.to_record_batch()) for c in chunks]).sort("t")
+    back = back.explode("measured", "model", "residual")
+    expected = table_of(trace).frame
+    for name in ("measured", "model", "residual"):
+        np.testing.assert_array_equal(back[name].to_numpy(), expected[name].to_numpy())
+    assert np.isnan(back["model"].to_numpy()).sum() == 1
+    assert back["t"].to_physical().to_list() == (np.arange(500) * 100_000).tolist()
+
+
+def test_every_planned_curve_of_a_comparison_is_in_its_data() -> None:
+    result = make_comparison()
+    held = {(entity_of(t), n) for t in result.traces for n in ("measured", "model", "residual")}
+    views = planned(result, "a/drive 0.mcap")
+    assert {(line.entity, line.component) for view in views for line in view.lines} == held
+    assert [view.reach for view in views][1] == pytest.approx(0.011, rel=1e-3)

@@ -1,0 +1,81 @@
+"""A diagnosis of two rungs with maps, as the page and the recording get it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.records.diagnosis import (
+    Diagnosis,
+    LadderRung,
+    RankedEffect,
+    Remainder,
+    RungError,
+    UnknownStructure,
+)
+from pipeline.records.error_map import Bins, ErrorMap, Histogram
+
+SPEED = Bins("omega_mech_rad_s", (-200.0, -100.0, 0.0, 100.0, 200.0))
+CURRENT = Bins("iq_a", (-15.0, -5.0, 5.0, 15.0))
+TURN = Bins("theta_elec_rad", tuple(np.linspace(0.0, 2 * np.pi, 9).tolist()))
+
+
+def make_map(scale: float) -> ErrorMap:
+    """Voltage errors that go with the current, in volts; one corner was never visited."""
+    mean = scale * np.array(
+        [[-0.2, -0.19, -0.2, -0.21], [0.0, 0.01, 0.0, 0.0], [0.2, 0.2, 0.19, 0]]
+    )
+    mean[2, 3] = np.nan
+    count = np.where(np.isfinite(mean), 12, 0)
+    p_value = np.where(np.abs(mean) > 0.1, 1e-9, 0.4)
+    p_value[2, 3] = np.nan
+    return ErrorMap("vq_v", "V", SPEED, CURRENT, count, mean, p_value, 0.9, 1e-12)
+
+
+def make_turn(scale: float) -> ErrorMap:
+    mean = scale * np.array([1.0, 0.5, -0.5, -1.0, -0.5, 0.25, 0.5, 0.75]) * 1e-3
+    return ErrorMap(
+        "vq_v", "V", TURN, None, np.full(8, 90), mean, np.full(8, 0.5), 0.1, float("nan")
+    )
+
+
+def make_rung(effects: tuple[str, ...], scale: float) -> LadderRung:
+    parameters = {"coulomb_friction.torque_nm": (0.004, 1e-5, "N·m")}
+    if effects:
+        parameters["dead_time.loss_v"] = (0.1799, 1.2e-4, "V")
+    errors = {"vq_v": RungError(0.13 * scale, 2e-3, "V"), "v_pair_v": RungError(5e-4, 5e-4, "V")}
+    edges = tuple(np.linspace(-8.0, 8.0, 9).tolist())
+    return LadderRung(
+        effects,
+        20.5 * scale,
+        {"vq_v": 0.13 * scale, "v_pair_v": 5e-4},
+        errors,
+        parameters,
+        (make_map(scale), make_turn(scale)),
+        (Histogram("vq_v", edges, (0, 1, 5, 20, 18, 6, 0, 2)),),
+    )
+
+
+def make_diagnosis(motor_id: str = "joint-P1", *, unknown: bool = False) -> Diagnosis:
+    found = RankedEffect(
+        "dead_time",
+        4321.0,
+        0.93,
+        1e-30,
+        ("phase_imbalance",),
+        "each phase loses V; offset at small current",
+        "low-speed current steps",
+        {"loss_v": (0.1799, 1.2e-4, "V")},
+    )
+    other = RankedEffect("windage", -12.0, 0.0, 0.3, (), "c ω|ω|", "a spin-down", {})
+    sketch = UnknownStructure("vq_v", ("iq_a",), "odd in iq_a", (("at iq_a = 4", 0.12, "V"),))
+    return Diagnosis(
+        motor_id,
+        "standard",
+        "unknown" if unknown else "missing",
+        ("dead_time",),
+        (found, other),
+        (make_rung((), 1.0), make_rung(("dead_time",), 0.02)),
+        sketch if unknown else None,
+        (Remainder("drive_0.mcap", "vq_v", 0, 3.5, 4e-3),),
+        ("no test here excites compliance: a torque step",),
+    )

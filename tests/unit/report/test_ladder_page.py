@@ -1,0 +1,148 @@
+"""The ladder's page: every number of the document, one scale for all rungs, no injection."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
+from pipeline.report.comparison_text import comparison_text
+from pipeline.report.heatmap import angle_bars, colour, heatmap
+from pipeline.report.ladder_page import render_ladder
+from pipeline.report.rung_chart import rung_chart
+from tests.unit.ladders import make_diagnosis, make_map, make_turn
+
+HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>'
+
+
+def cells(svg: str) -> list[tuple[str, str]]:
+    """Colour and hover text of every cell of a heat map."""
+    root = ElementTree.fromstring(svg)
+    return [(g[1].attrib["fill"], g[0].text or "") for g in root.iter("g")]
+
+
+def test_every_number_of_the_ladder_is_on_the_page() -> None:
+    html = render_ladder(make_diagnosis())
+    for words in (
+        "20.5",
+        "0.41",
+        "130 mV",
+        "2.60 mV",
+        "−98 %",
+        "179.90 ± 0.24 mV",
+        "dead_time.loss_v",
+    ):
+        assert words in html
+    assert "phase_imbalance" in html
+    assert "low-speed current steps" in html
+    assert "no test here excites compliance" in html
+    assert html.count('<svg class="heat"') == 4
+
+
+def test_the_unknown_and_what_is_left_are_told() -> None:
+    html = render_ladder(make_diagnosis(unknown=True))
+    assert "odd in iq_a" in html
+    assert "at iq_a = 4" in html
+    assert "120.0 mV" in html
+    assert "drive_0.mcap" in html
+    assert 'id="unknown"' not in render_ladder(make_diagnosis())
+
+
+def test_nothing_foreign_runs_and_nothing_is_fetched() -> None:
+    diagnosis = replace(make_diagnosis(HOSTILE), notes=(HOSTILE,))
+    html = render_ladder(diagnosis)
+    assert "<script>alert(1)" not in html
+    assert "<img" not in html
+    assert "49" not in re.findall(r"<h1>(.*?)</h1>", html)[0]
+    assert not re.search(r'(src|href)="(?!#)', html)
+
+
+def test_equal_input_gives_equal_text_and_an_empty_ladder_a_page() -> None:
+    assert render_ladder(make_diagnosis()) == render_ladder(make_diagnosis())
+    empty = replace(make_diagnosis(), ladder=(), verdict="insufficient", missing=())
+    assert "No model could be fitted" in render_ladder(empty)
+
+
+def test_a_cell_has_its_colour_its_number_and_a_dot_where_it_is_sure() -> None:
+    one = make_map(1.0)
+    seen = cells(heatmap(one, one.reach))
+    assert len(seen) == int(np.isfinite(one.mean).sum())
+    assert seen[3] == (colour(-1.0), "−210 mV, n 12, p 1e-09")
+    assert heatmap(one, one.reach).count('class="sure"') == int((np.abs(one.mean) > 0.1).sum())
+    quiet = cells(heatmap(make_map(0.02), one.reach))
+    assert quiet[3][0] == colour(-0.02)
+
+
+def test_blue_is_below_white_is_nothing_red_is_above() -> None:
+    assert colour(0.0) == "#f7f7f7"
+    red, blue = (int(colour(s)[1:], 16) for s in (1.0, -1.0))
+    assert red >> 16 > 150 > red & 255
+    assert blue >> 16 < 50 < blue & 255
+    assert colour(2.0) == colour(1.0)
+
+
+def test_bars_over_the_angle_keep_their_axis() -> None:
+    loud, quiet = angle_bars(make_turn(1.0), 1e-3), angle_bars(make_turn(0.02), 1e-3)
+
+    def height(svg: str) -> float:
+        root = ElementTree.fromstring(svg)
+        marks = next(p.attrib["d"] for p in root.iter("path") if "bars" in p.attrib["class"])
+        tops = [float(y) for y in re.findall(r"V([\d.]+)H", marks)]
+        return max(tops) - min(tops)
+
+    assert height(quiet) == pytest.approx(0.02 * height(loud), abs=0.2)
+
+
+def test_the_chart_puts_the_floor_and_the_errors_on_one_logarithmic_scale() -> None:
+    svg = rung_chart(["0: standard", "1: + dead_time"], {"vq_v": [65.0, 1.3], "vd_v": [10.0, 1.0]})
+    root = ElementTree.fromstring(svg)
+    lines = [p.attrib["d"] for p in root.iter("path") if p.attrib["class"] in ("c0", "c1")]
+    ys = [[float(y) for y in re.findall(r" ([\d.]+)", line)] for line in lines]
+    band = next(r for r in root.iter("rect") if r.attrib["class"] == "band")
+    assert ys[1][1] == pytest.approx(float(band.attrib["y"]), abs=0.1)
+    decade = ys[1][1] - ys[1][0]
+    assert ys[0][1] - ys[0][0] == pytest.approx(decade * np.log10(65.0 / 1.3), abs=0.3)
+
+
+def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
+    errors = (
+        SignalError("vq_v", "a.mcap", "held_out", 0.03, 0.01, 10, 9.0, "V"),
+        SignalError("vq_v", "b.mcap", "fit", 0.04, 0.01, 10, 9.0, "V"),
+        SignalError("iq_a", "a.mcap", "held_out", 0.02, 0.01, 10, 9.0, "A", "free_run"),
+    )
+    where = (
+        Dependence("vq_v", "iq_a", 0.8, 1e-9),
+        Dependence("vq_v", "t_s", 0.01, 1e-9),
+        Dependence("vq_v", "theta_mech_rad", 0.3, None),
+    )
+    moves = (
+        Move("r_ohm", "ohm", 0.32, 0.001, 0.31, 0.001),
+        Move("psi_wb", "Wb", 0.0094, 1e-6, 0.0094, 1e-6),
+    )
+    text = comparison_text(
+        Comparison(
+            "m",
+            "standard",
+            ("dead_time",),
+            {},
+            errors,
+            3.5,
+            where,
+            (),
+            (make_map(1.0),),
+            moves,
+            20.0,
+        )
+    )
+    rows = text.splitlines()
+    assert "held-out error 3.5" in rows[0]
+    assert "without what was added: 20" in text
+    assert re.search(r"vq_v +35.4 mV +10.0 mV +3.5 +1 of 2 held out +b.mcap \(4.0\)", text)
+    assert "iq_a, on its own" in text
+    assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
+    assert re.search(r"r_ohm +320.0 ± 2.0 mΩ +310.0 ± 2.0 mΩ +-10.0", text)
+    assert "1 parameters stayed within 3 u" in text
