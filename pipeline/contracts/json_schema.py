@@ -168,6 +168,25 @@ def findings_schema() -> Schema:
     )
 
 
+def _error_map() -> Schema:
+    """Mean error over cells of one variable, or rows of cells of two."""
+    numbers = _list({"type": ["number", "null", "array"]})
+    bins = _object({"variable": NAME, "edges": _list(NUMBER, minItems=2)})
+    return _object(
+        {
+            "signal": NAME,
+            "unit": TEXT,
+            "x": bins,
+            "y": _or_null(bins),
+            "count": _list({"type": ["integer", "array"]}),
+            "mean": numbers,
+            "p_value": numbers,
+            "explained": SHARE,
+            "p_map": _or_null(SHARE),
+        }
+    )
+
+
 def comparison_schema() -> Schema:
     """`comparison/MOTOR.json`."""
     signals = ["vd_v", "vq_v", "torque_shaft_nm", "omega_mech_rad_s", "iq_a", "psi_d_wb"]
@@ -189,6 +208,17 @@ def comparison_schema() -> Schema:
             "noise_floor": _or_null(SPREAD),
             "n": COUNT,
             "n_eff": _or_null(SPREAD),
+        },
+        {"unit": TEXT, "kind": {"enum": ["equation", "free_run"]}},
+    )
+    before = _object({"value": NUMBER, "u": SPREAD})
+    moved = _object(
+        {
+            "parameter": NAME,
+            "unit": NAME,
+            "before": before,
+            "after": before,
+            "change_in_u": NUMBER,
         }
     )
     where = _object(
@@ -201,7 +231,8 @@ def comparison_schema() -> Schema:
             "errors": _list(error),
             "total": _object({"held_out": _or_null(SPREAD)}),
             "where": _list(where),
-        }
+        },
+        {"maps": _list(_error_map()), "moved": _list(moved)},
     )
     return _document("model-comparison/1", "A model held against a motor's captures", body)
 
@@ -224,7 +255,12 @@ def diagnosis_schema() -> Schema:
             "effects": _list(NAME),
             "held_out": _or_null(SPREAD),
             "signals": _map(_or_null(SPREAD)),
-        }
+        },
+        {
+            "errors": _map(_object({"rmse": SPREAD, "noise_floor": SPREAD, "unit": TEXT})),
+            "parameters": _map(_object({"value": NUMBER, "u": SPREAD, "unit": NAME})),
+            "maps": _list(_error_map()),
+        },
     )
     term = _object({"term": NAME, "coefficient": NUMBER, "unit": NAME})
     unknown = _object(

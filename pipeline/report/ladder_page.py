@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pipeline.physics.notation import MINUS, quantity, reading, significant
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect
 from pipeline.report.axis import quantity_words
+from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, heatmap
 from pipeline.report.page import render
 from pipeline.report.rung_chart import rung_chart
@@ -185,7 +186,28 @@ def _ranked(one: RankedEffect) -> dict[str, str]:
     }
 
 
-def _sketch(result: Diagnosis) -> list[tuple[str, str]]:
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """An unknown structure: its terms, and and where told its curve, formula and rivals."""
+
+    terms: tuple[tuple[str, str], ...]
+    curve: str
+    expression: str
+    alternatives: tuple[str, ...]
+
+
+def _sketch(result: Diagnosis) -> Sketch | None:
     if result.unknown is None:
-        return []
-    return [(term, quantity(value, unit, 4)) for term, value, unit in result.unknown.sketch]
+        return None
+    told = result.unknown.document()
+    points, sketch = told.get("curve", []), told["sketch"]
+    unit = sketch[0]["unit"] if sketch else "1"
+    return Sketch(
+        tuple((t["term"], quantity(t["coefficient"], t["unit"], 4)) for t in sketch),
+        curve_chart(told["variables"][0], unit, points) if len(points) > 1 else "",
+        told.get("expression", ""),
+        tuple(
+            f"{', '.join(one['variables'])} ({100 * one['share']:.0f} %)"
+            for one in told.get("alternatives", [])
+        ),
+    )
