@@ -114,14 +114,14 @@ def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator
             continue
         out = bool(np.isfinite(held.residual[mine]).all())
         residual = held.residual[mine] if out else around.residual[mine]
-        unit = around.unit[mine]
+        unit, soft = around.unit[mine], around.soft[mine]
         signal = told_signal(channel)
         yield SignalError(
             signal,
             found[number].capture,
             "held_out" if out else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
-            math.sqrt(float((unit**2).mean())),
+            math.sqrt(float(((unit * soft) ** 2).mean())),
             int(mine.sum()),
             effective(residual),
             unit_of(signal),

@@ -61,34 +61,45 @@ def unit_of(signal: str) -> str:
     return SUFFIX_UNITS.get(suffix_of(signal), "1")
 
 
-def window_errors(
-    found: Sequence[Segment], around: System, residual_over_floor: Array
-) -> tuple[Errors, ...]:
-    """Every signal's errors in the plain windows of all captures, from whitened ones [R]."""
+def window_errors(found: Sequence[Segment], around: System, whitened: Array) -> tuple[Errors, ...]:
+    """Every signal's errors in the plain windows of all captures, from whitened residuals [R]."""
     parts: dict[str, list[tuple[int, NDArray[np.bool_]]]] = {}
     for place, (number, channel, order) in enumerate(around.labels):
         mine = around.group == place
         if order == 0 and found[number].weak is not None and mine.any():
             parts.setdefault(told_signal(channel), []).append((number, mine))
     told = [window_variables(segment) for segment in found]
-    made = []
-    for signal, groups in sorted(parts.items()):
-        names = sorted({name for number, _ in groups for name in told[number]})
-        window = np.concatenate([around.window[mine] for _, mine in groups])
-        sigma = np.concatenate([around.unit[mine] for _, mine in groups])
-        error = np.concatenate([residual_over_floor[mine] for _, mine in groups]) * sigma
-        segment = np.concatenate([np.full(int(mine.sum()), number) for number, mine in groups])
-        at = {
-            name: np.concatenate(
-                [
-                    told[number].get(name, np.full(found[number].size, np.nan))[around.window[mine]]
-                    for number, mine in groups
-                ]
-            )
-            for name in names
-        }
-        made.append(Errors(signal, error, sigma, segment, window, at))
-    return tuple(made)
+    return tuple(
+        _errors_of(signal, groups, found, told, around, whitened)
+        for signal, groups in sorted(parts.items())
+    )
+
+
+def _errors_of(
+    signal: str,
+    groups: Sequence[tuple[int, NDArray[np.bool_]]],
+    found: Sequence[Segment],
+    told: Sequence[Mapping[str, Array]],
+    around: System,
+    whitened: Array,
+) -> Errors:
+    unit = np.concatenate([around.unit[mine] for _, mine in groups])
+    soft = np.concatenate([around.soft[mine] for _, mine in groups])
+
+    def variable(name: str, number: int, mine: NDArray[np.bool_]) -> Array:
+        values = told[number].get(name, np.full(found[number].size, np.nan))
+        chosen: Array = values[around.window[mine]]
+        return chosen
+
+    names = sorted({name for number, _ in groups for name in told[number]})
+    return Errors(
+        signal,
+        np.concatenate([whitened[mine] for _, mine in groups]) * unit,
+        unit * soft,
+        np.concatenate([np.full(int(mine.sum()), number) for number, mine in groups]),
+        np.concatenate([around.window[mine] for _, mine in groups]),
+        {name: np.concatenate([variable(name, *group) for group in groups]) for name in names},
+    )
 
 
 def window_variables(segment: Segment) -> dict[str, Array]:

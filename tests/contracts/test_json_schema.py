@@ -11,12 +11,14 @@ import pytest
 
 from pipeline.contracts.json_schema import build_schemas
 from pipeline.io.publish import canonical_json
+from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
 from pipeline.records.errors import CaptureError
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.finding import Finding
 from pipeline.records.uncertainty import type_a, type_b
 from pipeline.stages.schemas import build
+from tests.unit.ladders import make_diagnosis, make_map
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -211,3 +213,26 @@ def test_truth_of_the_rig_passes(campaign: str) -> None:
         pytest.skip(f"needs {path.name} of the shared rig data")
     document = json.loads(path.read_text()) | {"schema": "motor-truth/1"}
     assert complaints("motor-truth", document) == []
+
+
+def test_a_diagnosis_and_a_comparison_as_written_pass() -> None:
+    """Records with maps, parameters and free runs, and what is wrong with a spoilt map."""
+    diagnosis = json.loads(json.dumps(make_diagnosis(unknown=True).document(), allow_nan=False))
+    assert complaints("model-diagnosis", diagnosis) == []
+    diagnosis["ladder"][0]["maps"][0]["explained"] = 2.0
+    assert complaints("model-diagnosis", diagnosis) == ["$.ladder[0].maps[0].explained"]
+    errors = (
+        SignalError("iq_a", "a.mcap", "held_out", 0.02, 0.01, 10, 9.0, "A", "free_run"),
+        SignalError("id_a", "a.mcap", "held_out", 0.02, 0.01, 10, 9.0, "A", "free_run"),
+    )
+    where = (Dependence("vq_v", "iq_a", 0.8, None), Dependence("v_pair_v", "t_s", 0.1, 0.5))
+    moved = (Move("r_ohm", "ohm", 0.32, 0.001, 0.31, 0.001),)
+    result = Comparison(
+        "m", "standard", (), {}, errors, 2.0, where, (), (make_map(1.0),), moved, 20.0
+    )
+    document = json.loads(json.dumps(result.document(), allow_nan=False))
+    assert complaints("model-comparison", document) == []
+    # signals that the contract does not name stand aside
+    assert [e["signal"] for e in document["errors"]] == ["iq_a"]
+    assert [e["signal"] for e in document["errors_other"]] == ["id_a"]
+    assert document["moved"][0]["change_in_u"] == pytest.approx(-10.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.effect import Machine, Operating
+from pipeline.criticism.model import GAINS
 from pipeline.criticism.segments import Segment
 from pipeline.numerics.projection import projection
 
@@ -21,6 +22,7 @@ BASE = {
     "ripple_shift": 0.0,
     "ripple_torque": 0.0,
     "bench_angle_rad": 0.0,
+    **dict.fromkeys(GAINS, 0.0),
 }
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
 from pipeline.report.comparison_text import comparison_text
+from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, colour, heatmap
 from pipeline.report.ladder_page import render_ladder
 from pipeline.report.rung_chart import rung_chart
@@ -146,3 +147,20 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
     assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
     assert re.search(r"r_ohm +320.0 ± 2.0 mΩ +310.0 ± 2.0 mΩ +-10.0", text)
     assert "1 parameters stayed within 3 u" in text
+
+
+def test_a_curve_has_its_band_around_it() -> None:
+    points = [
+        {"at": a, "value": 0.01 * a, "low": 0.01 * a - 0.005, "high": 0.01 * a + 0.005}
+        for a in (-4.0, 0.0, 2.0, 4.0)
+    ]
+    root = ElementTree.fromstring(curve_chart("iq_a", "V", points))
+    paths = {p.attrib["class"]: p.attrib["d"] for p in root.iter("path")}
+    line = [float(y) for y in re.findall(r" ([\d.]+)", paths["fitted"])]
+    band = [float(y) for y in re.findall(r" ([\d.]+)", paths["band"])]
+    up, down = band[:4], band[7:3:-1]
+    assert line == pytest.approx([(u + d) / 2 for u, d in zip(up, down, strict=True)], abs=0.1)
+    assert min(d - u for u, d in zip(up, down, strict=True)) > 5.0
+    texts = [t.text for t in root.iter("text")]
+    assert "i_q [A]" in texts
+    assert "[mV]" in texts
