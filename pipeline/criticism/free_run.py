@@ -33,7 +33,7 @@ from pipeline.numerics.projection import bump
 ELECTRICAL = ("torque_map", "drive")
 MECHANICAL = ("spin_down",)
 SPEED = "omega_mech_rad_s"
-_REPLICATES, _POOLED = 3, 96
+_REPLICATES, _POOLED = 2, 96
 _OFFSET = 0.5
 _OFFSETS = ("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
 _SEED = 20261121
