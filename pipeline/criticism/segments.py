@@ -154,6 +154,7 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     window = _window(period, size)
     orders = electrical_orders(machine) if turned > 0.1 else ()
     noise = _prepared(found, period)
+    found["t_s"] = period * np.arange(size, dtype=np.float64)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     found, starts = thinned(found, keep, window, most)
