@@ -63,8 +63,8 @@ def test_what_the_others_leave_of_a_vector_is_its_part_off_their_plane():
     assert experiments._noncentrality(both.T @ both) == pytest.approx(off @ off, rel=1e-9)
 
 
-def test_an_exact_tie_is_parted_by_no_repetition_but_by_a_calibration():
-    """Torque gain against itself under another name: only the transducer's own gain parts them."""
+def test_a_twin_under_another_name_is_parted_by_nothing():
+    """No figure is given where none can be predicted; what the effect declares is told instead."""
     segments = (log(noise=1.0),)
     effect, fitted, wide, _ = state("torque_scale", 0.02, (), segments)
     twin = replace(effect, name="twin")
