@@ -18,7 +18,7 @@ from tests.unit.criticism.test_selection import fitted, with_drag
 
 def told(drag, tmp_path):
     """The structure found in two logs with a further drag, and its effect file as a module."""
-    segments = (with_drag(drag), with_drag(drag, 6))
+    segments = tuple(_cool(with_drag(drag, seed)) for seed in (5, 6))
     found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"], name="mine")
     path = tmp_path / "mine.py"
     path.write_text(found.source, encoding="utf-8")
@@ -26,6 +26,13 @@ def told(drag, tmp_path):
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return found, module.EFFECT
+
+
+def _cool(segment):
+    """Without the log's own warming, which runs along with its speed."""
+    cold = np.full(segment.size, 25.0)
+    columns = {"temp_winding_degc": cold, "temp_magnet_degc": cold}
+    return replace(segment, recorded={**segment.recorded, **columns})
 
 
 def _warmed(seed):
@@ -76,6 +83,16 @@ def test_the_effect_file_computes_the_expression_it_tells(tmp_path):
     assert np.abs(drag - brake(x.omega_rad_s, None)).max() < 1e-3
     none = effect.torque(x, {**scales, **dict.fromkeys(sizes, 0.0)})
     assert not np.any(none)
+
+
+def test_variables_that_run_along_with_each_other_are_all_told():
+    """In these logs temperature rises with speed: either could be the cause, and both are named."""
+    segments = (with_drag(brake), with_drag(brake, 6))
+    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"])
+    assert found.variables == ("omega_mech_rad_s",)
+    told_of = {name for names, _ in found.alternatives for name in names}
+    assert "temp_winding_degc" in told_of
+    assert "temp_winding_degc" in found.shape
 
 
 def test_two_variables_are_told_where_it_takes_two():
