@@ -99,6 +99,7 @@ class SimulateSettings(Settings):
     output: str = key("", "folder to write to", result=False)
     motor: str = key("gimbal-5208", "design of conf/motor/")
     effects: str = key("", "[name, name=size, name.parameter=value, ...]; a name alone is typical")
+    outside: str | None = key(None, "a term of nobody's library on top: eddy_brake, contact, ...")
     seed: int = key(1, "of every random draw")
     motor_id: str | None = key(None, "serial number; the design and the seed without it")
     lot: str = key("A", "lot")

@@ -9,10 +9,11 @@ import numpy as np
 from scipy.special import gammaincc
 
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.ladder import rung_record
 from pipeline.criticism.registry import effects
-from pipeline.criticism.rivals import detectable, experiment_for, rivals_of
+from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
 from pipeline.criticism.segments import Segment, segments
 from pipeline.criticism.selection import Candidate, Rung, Score, candidates, loss_without, search
 from pipeline.criticism.size import machine_of
@@ -69,7 +70,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
         sketch if verdict == "unknown" else None,
         left,
-        tuple(f"no test here excites {name}: {library[name].experiment}" for name in unseen),
+        tuple(_wanted(library[name]) for name in unseen),
     )
 
 
@@ -152,6 +153,12 @@ def _unseen(
     )
 
 
+def _wanted(effect: Effect) -> str:
+    """What to record for an effect that no capture here would show, by the test's name."""
+    tests = " or ".join(effect.tests)
+    return f"no test here excites {effect.name}: record {tests} ({effect.experiment})"
+
+
 def _ranking(
     rungs: Sequence[Rung],
     held: Sequence[HeldOut],
@@ -177,6 +184,15 @@ def _ranking(
                 f"{effect.words}; {effect.signature}",
                 experiment_for(effect, confused, library),
                 _parameters(last, effect),
+                separations(
+                    effect,
+                    confused,
+                    last.fitted,
+                    last.around,
+                    offered,
+                    captured,
+                    remedies(effect, confused, library),
+                ),
             )
         )
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]

@@ -59,11 +59,20 @@ def _refitted(
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:
     """The test or calibration that parts an effect from what it is confused with."""
-    told = []
-    for other in confused:
-        remedy = effect.rivals.get(other) or library[other].rivals.get(effect.name)
-        told.append(f"against {other}: {remedy or library[other].experiment}")
+    told = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
     return "; ".join(told) if told else effect.experiment
+
+
+def remedies(
+    effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]
+) -> dict[str, str]:
+    """What the effects themselves declare to part them from each other, by rival."""
+    return {
+        other: effect.rivals.get(other)
+        or library[other].rivals.get(effect.name)
+        or library[other].experiment
+        for other in confused
+    }
 
 
 def detectable(effect: Effect, fitted: Fitted, wide: System, offered: Sequence[Candidate]) -> float:

@@ -149,7 +149,7 @@ class Pursuit:
         return np.column_stack([np.empty((width, 0)), *(self.hats_of(t) for t in terms)])
 
     def fitted(self, curves: Array) -> tuple[Array, Array, Array, float]:
-        """Own step, amplitudes, residual [R] and misfit with curves [K, k] and own columns fitted."""
+        """Own step, amplitudes, residual [R] and misfit with curves [K, k] beside own columns."""
         around, own = self.around, self.own
         matrix = np.column_stack([around.matrix[:, :own], around.matrix[:, own:] @ curves])
         penalty = np.concatenate([around.penalty[:own], np.zeros(curves.shape[1])])
@@ -195,7 +195,7 @@ def expression(pursuit: Pursuit) -> Expression:
         tried.sort(key=lambda one: one[0])
         if not tried:
             break
-        now, _, terms = tried[0]
+        now = tried[0][0]
         if cost - now < max(_TIE, _WORTH * (start - now)):
             break
         chosen, cost = tried[0][1], now

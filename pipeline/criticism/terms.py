@@ -70,8 +70,8 @@ class Term:
     """One term of an expression, of unit amplitude, on one carrier.
 
     `kind` is the name of a shape, `sin` or `cos` (of `order`), `bump` (at `centre`, of width
-    `scale`), or `power` (`order` numbers the port's monomials). A shape is `even`, `odd` (times the sign of u), or `plain` (of u itself, no size).
-    `carrier` numbers the port's carriers.
+    `scale`), or `power` (`order` numbers the port's monomials). A shape is `even`, `odd` (times
+    the sign of u), or `plain` (of u itself, no size). `carrier` numbers the port's carriers.
     """
 
     kind: str

@@ -27,13 +27,18 @@ _SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A port with the misfit it removes less its price, in sample and held out."""
+    """A port with the misfit it removes less its price, in sample and held out.
+
+    `left` [R] is the residual after it, `step` [k] the model's constants and its coefficients,
+    `place` where it stands in the list of ports.
+    """
 
     port: Port
     gain: float
     held: float
     left: Array
     step: Array
+    place: int
 
 
 def unknown_structure(
@@ -105,7 +110,7 @@ def _ranked(
     price = math.log(wide.size)
     found = []
     first = own.size
-    for port, mine in zip(offered, columns, strict=True):
+    for place, (port, mine) in enumerate(zip(offered, columns, strict=True)):
         places = np.arange(first, first + len(mine))
         first += len(mine)
         live = places[np.any(wide.matrix[:, places] != 0.0, axis=0)]
@@ -120,7 +125,7 @@ def _ranked(
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
         held = reference - _held_out(wide, chosen, after, ridge, carried)
         if held > _TIE:
-            found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge)))
+            found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
@@ -136,10 +141,16 @@ def _ridge(columns: Sequence[Column], live: Array, fitted: Fitted) -> Array:
 
 
 def _simplest(found: Sequence[Found]) -> Found:
-    """Of the ports that do about as well as the best, the one of fewest variables."""
+    """Of the ports that do about as well as the best, the one of fewest variables.
+
+    Of several that no evidence parts it is the one listed first, the commonest in machines.
+    """
     enough = found[0].held - max(_TIE, _NEAR * found[0].held)
     close = [one for one in found if one.held >= enough]
-    return min(close, key=lambda one: (len(one.port.columns), -one.held, one.port.effect.name))
+    fewest = min(len(one.port.columns) for one in close)
+    simple = [one for one in close if len(one.port.columns) == fewest]
+    level = max(one.held for one in simple) - _TIE
+    return min((one for one in simple if one.held >= level), key=lambda one: one.place)
 
 
 def _segment_of(around: System) -> Array:

@@ -12,6 +12,21 @@ Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
 
 
 @dataclass(frozen=True, slots=True)
+class Separation:
+    """An experiment that parts two effects, with the power it is predicted to have at the 1 %
+    level; None where that cannot be predicted.
+    """
+
+    against: str
+    experiment: str
+    power: float | None
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {"against": self.against, "experiment": self.experiment, "power": self.power}
+
+
+@dataclass(frozen=True, slots=True)
 class RankedEffect:
     """One effect's evidence. `score`: fall of −2 log likelihood less the price of its parameters.
 
@@ -27,6 +42,7 @@ class RankedEffect:
     explanation: str
     experiment: str
     parameters: Mapping[str, tuple[float, float, str]]
+    separation: tuple[Separation, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -42,6 +58,7 @@ class RankedEffect:
                 name: {"value": value, "u": u, "unit": unit}
                 for name, (value, u, unit) in self.parameters.items()
             },
+            "separation": [one.document() for one in self.separation],
         }
 
 

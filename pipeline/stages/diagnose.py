@@ -59,6 +59,11 @@ def _lines(result: Diagnosis) -> list[str]:
         if ranked.confused_with:
             others = ", ".join(ranked.confused_with)
             told.append(f"  {ranked.effect} could as well be {others}; {ranked.experiment}")
+        told.extend(
+            f"    against {one.against}: {one.experiment}, predicted power {one.power:.0%}"
+            for one in ranked.separation
+            if one.power is not None
+        )
     if result.unknown is not None:
         told.append(f"  left over in {result.unknown.signal}: {result.unknown.shape}")
     if result.unknown is not None and result.unknown.sketch:

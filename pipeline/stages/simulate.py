@@ -24,6 +24,7 @@ from pipeline.simulator.catalogue import (
     with_effects,
 )
 from pipeline.simulator.design import EXACT, Bench, Motor, Recording
+from pipeline.simulator.outside import with_unknown
 from pipeline.simulator.truth import truth
 
 TRUTH = "truth.json"
@@ -81,6 +82,8 @@ def _single(settings: SimulateSettings) -> Iterable[Job]:
     motor = motor_from(document)
     name = settings.motor_id or f"{settings.motor}-{settings.seed}"
     motor = with_effects(replace(motor, lot=settings.lot, motor_id=name), settings.effects)
+    if settings.outside is not None:
+        motor = with_unknown(motor, settings.outside)
     bench = bench_from(document.get("bench") or {})
     if settings.exact:
         bench = replace(bench, instruments=EXACT)

@@ -26,7 +26,7 @@ def _torque(x: Operating, q: Values) -> Array:
 
 EFFECT = Effect(
     name="backlash",
-    words="twist of half a gap to the side that the torque presses to, and J_load/K in s² of spring",
+    words="twist of half a gap to the side that the torque presses to, and of a spring",
     signature="no torque at the shaft while the gap is crossed, a jump of the angle at reversals",
     tests=("drive", "torque_map"),
     experiment="reversals of torque with the angle recorded on the load side as well",

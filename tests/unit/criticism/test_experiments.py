@@ -1,0 +1,107 @@
+"""What would part two effects: predicted power against what follows from theory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import ncx2
+
+from pipeline.criticism import experiments
+from pipeline.criticism.experiments import separations
+from pipeline.criticism.linearise import noise_floor
+from pipeline.criticism.model import Model
+from pipeline.criticism.planned import PLANNED, planned
+from pipeline.criticism.registry import effects
+from pipeline.criticism.residuals import residual
+from pipeline.criticism.selection import candidates, widened
+from pipeline.criticism.system import Fitted, floors
+from tests.unit.criticism.machines import BASE, log, machine
+
+ALL = effects()
+
+
+def state(name, size, others, segments):
+    """A fit at known values that holds one effect, and the system with its rivals' columns."""
+    effect = ALL[name]
+    model = Model(machine(), (effect,))
+    parameter = effect.parameters[0]
+    values = {**dict.fromkeys(c.name for c in _base()), **BASE}
+    values = {k: 0.0 if v is None else v for k, v in values.items()}
+    values[f"{name}.{parameter.name}"] = size
+    fitted = Fitted(model, values, floors(segments, model, values))
+    offered = candidates({other: ALL[other] for other in others}, fitted)
+    return effect, fitted, widened(segments, fitted, offered), offered
+
+
+def _base():
+    from pipeline.criticism.model import BASE as CONSTANTS
+
+    return CONSTANTS
+
+
+def told(name, size, other, segments=None):
+    segments = segments or (log(noise=1.0),)
+    effect, fitted, wide, offered = state(name, size, (other,), segments)
+    return separations(effect, (other,), fitted, wide, offered, segments, {other: "as declared"})
+
+
+def test_power_is_that_of_a_chi_square_test_at_one_per_cent():
+    limit = ncx2.ppf(0.99, 2, 1e-12)
+    for noncentrality in (0.5, 4.0, 20.0):
+        expected = ncx2.sf(limit, 2, noncentrality)
+        assert experiments._power(noncentrality, 2) == pytest.approx(expected, rel=1e-4)
+    assert experiments._power(0.0, 1) == pytest.approx(0.01, rel=1e-6)
+
+
+def test_what_the_others_leave_of_a_vector_is_its_part_off_their_plane():
+    rng = np.random.default_rng(1)
+    plane, d = rng.normal(size=(40, 3)), rng.normal(size=40)
+    both = np.column_stack([d, plane])
+    off = d - plane @ np.linalg.lstsq(plane, d, rcond=None)[0]
+    assert experiments._noncentrality(both.T @ both) == pytest.approx(off @ off, rel=1e-9)
+
+
+def test_a_twin_under_another_name_is_parted_by_nothing():
+    """No figure is given where none can be predicted; what the effect declares is told instead."""
+    segments = (log(noise=1.0),)
+    effect, fitted, wide, _ = state("torque_scale", 0.02, (), segments)
+    twin = replace(effect, name="twin")
+    offered = candidates({"twin": twin}, fitted)
+    wide = widened(segments, fitted, offered)
+    found = separations(effect, ("twin",), fitted, wide, offered, segments, {"twin": "a lever"})
+    assert [(one.against, one.experiment, one.power) for one in found] == [
+        ("twin", "a lever", None)
+    ]
+
+
+def test_windage_and_eddy_drag_are_parted_by_more_speeds():
+    found = told("windage", 2e-3, "iron_eddy")
+    assert found
+    assert all(one.against == "iron_eddy" and 0.0 < one.power <= 1.0 for one in found)
+    assert [one.power for one in found] == sorted((one.power for one in found), reverse=True)
+    assert any("spin_down" in one.experiment or "torque" in one.experiment for one in found)
+
+
+def test_a_larger_effect_is_parted_with_more_power():
+    small, large = (told("windage", size, "iron_eddy") for size in (5e-4, 2e-3))
+    power = {one.experiment: one.power for one in small}
+    for one in large:
+        assert one.power >= power.get(one.experiment, 0.0)
+
+
+@pytest.mark.parametrize("test", sorted(PLANNED))
+def test_a_planned_test_obeys_the_model_it_is_planned_with(test):
+    model = Model(machine(), (ALL["coulomb_friction"],))
+    values = {c.name: BASE.get(c.name, 0.0) for c in _base()}
+    values["coulomb_friction.torque_nm"] = 0.01
+    segments = (log(),)
+    fitted = Fitted(model, values, floors(segments, model, values))
+    for segment in planned(test, fitted, segments):
+        left = residual(segment, model, values)
+        assert segment.weak is not None
+        assert segment.weak.starts.size
+        weak = segment.weak.project(left)[:, :, 0]
+        group = noise_floor(segment, model, values, 1)
+        assert np.abs(weak).max() < 3.0 * group.max()

@@ -1,0 +1,150 @@
+"""The sketch of an unknown: its terms, its curve, its effect file."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.curves import coarse, fine, variables
+from pipeline.criticism.ports import ports, refined
+from pipeline.criticism.terms import SHAPES, Term
+from pipeline.criticism.unknown import unknown_structure
+from tests.unit.criticism.machines import log, machine, operating
+from tests.unit.criticism.test_selection import fitted, with_drag
+
+
+def told(drag, tmp_path):
+    """The structure found in two logs with a further drag, and its effect file as a module."""
+    segments = tuple(_cool(with_drag(drag, seed)) for seed in (5, 6))
+    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"], name="mine")
+    path = tmp_path / "mine.py"
+    path.write_text(found.source, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("mine", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return found, module.EFFECT
+
+
+def _cool(segment):
+    """Without the log's own warming, which runs along with its speed."""
+    cold = np.full(segment.size, 25.0)
+    columns = {"temp_winding_degc": cold, "temp_magnet_degc": cold}
+    return replace(segment, recorded={**segment.recorded, **columns})
+
+
+def _warmed(seed):
+    segment = log(noise=1.0, seed=seed)
+    rng = np.random.default_rng(seed)
+    n = segment.size
+    theta = log().recorded["theta_mech_rad"]
+    omega = np.gradient(theta, 5e-5)
+    warm = 25.0 + 60.0 * np.abs(np.sin(np.arange(n) * 5e-5 * 9.0 + rng.uniform(0, 3)))
+    torque = segment.recorded["torque_shaft_nm"] - 0.1 * omega / 250 * np.exp(-(warm - 25) / 15)
+    columns = {"torque_shaft_nm": torque, "temp_winding_degc": warm}
+    return replace(segment, recorded={**segment.recorded, **columns})
+
+
+def brake(omega, _):
+    u = omega / 70.0
+    return 0.06 * u / (1.0 + u**2)
+
+
+def test_a_brake_comes_out_as_one_term_with_its_peak_and_speed(tmp_path):
+    found, _ = told(brake, tmp_path)
+    assert found.variables == ("omega_mech_rad_s",)
+    (term, size, unit) = found.sketch[0]
+    assert len(found.sketch) == 1
+    assert "2u/(1 + u²)" in term
+    assert float(term.split("/(")[-1].split(" rad")[0]) == pytest.approx(70.0, rel=0.03)
+    assert (size, unit) == (pytest.approx(0.03, rel=0.02), "N·m")
+    assert "maximum 0.03 N·m" in found.shape
+
+
+def test_the_curve_runs_through_the_truth_within_its_band(tmp_path):
+    found, _ = told(brake, tmp_path)
+    at = np.array([p.at for p in found.curve])
+    truth = brake(at, None)
+    assert all(p.low <= p.value <= p.high for p in found.curve)
+    assert np.abs(np.array([p.value for p in found.curve]) - truth).max() < 2e-3
+    inside = [p.low <= t <= p.high for p, t in zip(found.curve, truth, strict=True)]
+    assert np.mean(inside) > 0.6
+
+
+def test_the_effect_file_computes_the_expression_it_tells(tmp_path):
+    found, effect = told(brake, tmp_path)
+    x = operating()
+    scales = {p.name: p.scan[0] for p in effect.parameters if not p.amplitude}
+    sizes = [p.name for p in effect.parameters if p.amplitude]
+    values = dict(zip(sizes, (size for _, size, _ in found.sketch), strict=True))
+    drag = effect.torque(x, {**scales, **values})
+    assert np.abs(drag - brake(x.omega_rad_s, None)).max() < 1e-3
+    none = effect.torque(x, {**scales, **dict.fromkeys(sizes, 0.0)})
+    assert not np.any(none)
+
+
+def test_variables_that_run_along_with_each_other_are_all_told():
+    """In these logs temperature rises with speed: either could be the cause, and both are named."""
+    segments = (with_drag(brake), with_drag(brake, 6))
+    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"])
+    assert found.variables == ("omega_mech_rad_s",)
+    told_of = {name for names, _ in found.alternatives for name in names}
+    assert "temp_winding_degc" in told_of
+    assert "temp_winding_degc" in found.shape
+
+
+def test_two_variables_are_told_where_it_takes_two():
+    """A grease that melts: speed times a curve of temperature."""
+    segments = tuple(_warmed(seed) for seed in (5, 6))
+    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"])
+    assert set(found.variables) == {"temp_winding_degc", "omega_mech_rad_s"}
+    assert "omega_mech_rad_s" in found.times
+
+
+@pytest.mark.parametrize("name", sorted(variables(machine())))
+def test_smooth_curves_lie_in_the_hats(name):
+    """What a few smooth curves say, narrow hats can say as well."""
+    variable = variables(machine())[name]
+    few, many = coarse(variable, machine()), fine(variable, machine())
+    if not few.nodes.size:
+        return
+    weights = np.random.default_rng(2).normal(size=len(few.names))
+    hats = few.curve(many.nodes, weights)
+    at = np.linspace(many.nodes[0], many.nodes[-1], 701)
+    assert np.abs(many.curve(at, hats) - few.curve(at, weights)).max() < 1e-9
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda s: s.name)
+@pytest.mark.parametrize("parity", ["odd", "even", "plain"])
+def test_the_python_of_a_term_is_the_term(shape, parity):
+    term = Term(shape.name, parity=parity, scale=1.7)
+    v = np.linspace(-3.0, 4.0, 15)
+    code = term.code("1.7", "0.0")
+    written = eval(code, {"np": np, "v": v})
+    assert np.broadcast_to(written, v.shape) == pytest.approx(term.value(v))
+
+
+def test_a_straight_line_is_a_smooth_curve_of_speed():
+    """Viscous friction must be nothing that a port knows and the model does not."""
+    variable = variables(machine())["omega_mech_rad_s"]
+    basis = coarse(variable, machine())
+    at = np.linspace(-240.0, 240.0, 97)
+    columns = np.stack([basis.curve(at, row) for row in np.eye(len(basis.names))], axis=1)
+    fit = np.linalg.lstsq(columns, at, rcond=None)[0]
+    assert np.abs(columns @ fit - at).max() < 1e-6 * 240.0
+
+
+def test_every_port_is_zero_at_zero_and_has_a_name_of_its_own():
+    x = replace(operating(), psi_wb=np.full(60, 0.01 + 0j), torque_em_nm=np.ones(60))
+    offered = ports(machine())
+    assert len({port.effect.name for port in offered}) == len(offered)
+    for port in offered:
+        fine_port = refined(port, machine())
+        for one in (port, fine_port):
+            q = {p.name: 0.0 for p in one.effect.parameters}
+            hook = one.effect.coenergy or one.effect.drop or one.effect.torque
+            assert not np.any(hook(x, q))
+        if fine_port is not port:
+            assert fine_port.effect.name != port.effect.name
