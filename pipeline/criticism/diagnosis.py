@@ -50,7 +50,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     rungs = search(found, fitted, library)
     last = rungs[-1]
     offered = candidates(library, last.fitted)
-    held = [leave_out(r.around, len(own_columns(r.fitted.model))) for r in rungs]
+    held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     residual = last.around.residual
     left = remainder(last.around, found, residual)
     sketch = None
@@ -74,9 +74,11 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 
 
 def _enough(found: Sequence[Segment]) -> bool:
-    """Whether there is a test under current and one that turns: the base model needs both."""
+    """Whether there is a test under current and one that turns, or one that is both."""
     kinds = {segment.kind for segment in found}
-    return bool(kinds & {"dq", "terminal", "flux_map"}) and bool(kinds & {"dq", "shaft", "open"})
+    if kinds & {"dq", "q", "flux_map", "steady"}:
+        return True
+    return "terminal" in kinds and bool(kinds & {"shaft", "open"})
 
 
 def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effect]) -> Diagnosis:
@@ -163,7 +165,7 @@ def _ranking(
     last = rungs[-1]
     found = []
     for place, name in enumerate(last.added):
-        effect = library[name]
+        effect = next(e for e in last.fitted.model.effects if e.name == name)
         confused = rivals_of(name, last.fitted, last.around, offered, captured)
         loss = loss_without(last.around, last.fitted, (name,))
         dof = effect.dof(last.fitted.model.machine)
