@@ -108,7 +108,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
 
     White noise of each sensor's own level, and the rounding of an angle that is rounded, is added
-    to the recording and the residual computed again; the variance of the change is pooled over windows of one (channel, order).
+    to the recording and the residual computed again; the variance of the change is pooled over
+    windows of one (channel, order).
     """
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))

@@ -309,9 +309,7 @@ def _read_mcap(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | N
     return tables, source, layout.data_crc_holds
 
 
-def _read_foreign(
-    data: bytes, entry: Entry
-) -> tuple[list[RawTable], SourceMap | None, bool]:
+def _read_foreign(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:
     source = entry.source
     if source is None or source.reader is None:
         raise CaptureError("unknown_source", "no reader is named", "add a source map")

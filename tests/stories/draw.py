@@ -29,9 +29,7 @@ def holding() -> str:
         mine = mine[np.argsort(theta[mine])]
         left.add("dots", theta[mine], seen[0, mine], colour, name)
         left.add("line", theta[mine], told[0, mine], colour)
-    right = Panel(
-        "Error against the number of orders", "orders in the model", "rms [A]", log=True
-    )
+    right = Panel("Error against the number of orders", "orders in the model", "rms [A]", log=True)
     captures = found.of("holding_current")
     strongest = (72, 18, 12, 144, 24, 36, 48, 216)
     chosen = [k for k in strongest if k in holding_orders(captures, (12, 18))]
