@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.criticism.curves import coarse
 from pipeline.criticism.effect import Array
 from pipeline.criticism.effect_source import effect_source
 from pipeline.criticism.ports import Port

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pipeline.criticism.coupling import far_drag, passed_on, present
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
+
 _NEGLIGIBLE_PERIODS2 = 8.0
 
 
