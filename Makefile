@@ -4,7 +4,7 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-data test test-slow lint lock screenshots recovery clean
+.PHONY: help demo demo-data test test-slow lint lock screenshots stories recovery clean
 
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
@@ -14,6 +14,7 @@ help:
 	@echo "make demo-data simulate data/demo anew"
 	@echo "make screenshots  docs/images from the demo's report (needs chromium)"
 	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md; goes on after a stop"
+	@echo "make stories   figures of docs/real-recordings.md, from ../shared/data/real"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
 
@@ -41,6 +42,9 @@ test: $(READY)
 
 test-slow: $(READY)
 	$(PY) -m pytest -n logical --dist loadfile -m "slow or not slow"
+
+stories: $(READY)
+	$(PY) -m tests.stories.draw --into docs/images
 
 recovery: $(READY)
 	$(PY) -m tests.recovery.table --seeds 1000 --workers 2

@@ -62,7 +62,13 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
     "spin_down": _all("omega_mech_rad_s"),
     "heat_run": _all("temp_winding_degc"),
     "holding_current": _all("theta_mech_rad", "iq_a"),
-    "flux_map": _all("id_a", "iq_a", "psi_d_wb", "psi_q_wb"),
+    "flux_map": (
+        *_all("id_a"),
+        Requirement(
+            (("iq_a", "psi_d_wb", "psi_q_wb"), ("vq_v", "omega_mech_rad_s")),
+            "iq_a, psi_d_wb and psi_q_wb, or vq_v less the drop of iq_a at omega_mech_rad_s",
+        ),
+    ),
     "drive": (
         Requirement((DQ, ("vq_v", "iq_a")), "vq_v and iq_a, with vd_v and id_a where there"),
         _any("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad"),

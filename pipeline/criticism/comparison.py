@@ -11,7 +11,9 @@ from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, leave_out
 from pipeline.criticism.maps import all_maps, told_signal, unit_of
 from pipeline.criticism.model import BASE, PHYSICAL, Model
-from pipeline.criticism.segments import Segment, segments
+from pipeline.criticism.optional import trimmed
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import Fitted, System, first_fit, gauss_newton, own_columns
@@ -42,7 +44,8 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         note = "no capture holds what an equation needs: record a torque map"
         return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
     fitted, around = first_fit(found, asked)
-    held = leave_out(around, len(own_columns(asked)))
+    fitted, around = trimmed(found, fitted, around, names)
+    held = leave_out(around, len(own_columns(fitted.model)), found)
     simulated = simulate(found, fitted, around, held)
     residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
     maps = all_maps(found, around, residual, fitted)
@@ -70,10 +73,11 @@ def _parameters(fitted: Fitted, around: System) -> dict[str, ModelParameter]:
     own = np.arange(len(own_columns(model)))
     spread = np.sqrt(np.maximum(np.diag(around.covariance(own)), 0.0))
     u = {around.columns[n].name: float(spread[n]) for n in own}
+    heard = {c.name for n, c in enumerate(around.columns) if np.any(around.matrix[:, n] != 0.0)}
     told = {
         c.name: ModelParameter(fitted.values[c.name], u[c.name], c.unit)
         for c in BASE
-        if c.name in PHYSICAL
+        if c.name in PHYSICAL and c.name in heard
     }
     for name, (_, p) in model.parameters().items():
         scale, value = model.machine.scale(p), fitted.values[name]
@@ -102,7 +106,7 @@ def _bare(
         Move(name, one.unit, one.value, one.u, after[name].value, after[name].u)
         for name, one in before.items()
     )
-    total = leave_out(around, len(own_columns(without))).total
+    total = leave_out(around, len(own_columns(without)), found).total
     return (total if math.isfinite(total) else None), moved
 
 

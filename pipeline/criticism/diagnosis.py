@@ -14,7 +14,8 @@ from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.ladder import rung_record
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
-from pipeline.criticism.segments import Segment, segments
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import Candidate, Rung, Score, candidates, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
@@ -51,7 +52,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     rungs = search(found, fitted, library)
     last = rungs[-1]
     offered = candidates(library, last.fitted)
-    held = [leave_out(r.around, len(own_columns(r.fitted.model))) for r in rungs]
+    held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     residual = last.around.residual
     left = remainder(last.around, found, residual)
     sketch = None
@@ -75,9 +76,11 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 
 
 def _enough(found: Sequence[Segment]) -> bool:
-    """Whether there is a test under current and one that turns: the base model needs both."""
+    """Whether there is a test under current and one that turns, or one that is both."""
     kinds = {segment.kind for segment in found}
-    return bool(kinds & {"dq", "terminal", "flux_map"}) and bool(kinds & {"dq", "shaft", "open"})
+    if kinds & {"dq", "q", "flux_map", "steady"}:
+        return True
+    return "terminal" in kinds and bool(kinds & {"shaft", "open"})
 
 
 def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effect]) -> Diagnosis:
@@ -170,7 +173,7 @@ def _ranking(
     last = rungs[-1]
     found = []
     for place, name in enumerate(last.added):
-        effect = library[name]
+        effect = next(e for e in last.fitted.model.effects if e.name == name)
         confused = rivals_of(name, last.fitted, last.around, offered, captured)
         loss = loss_without(last.around, last.fitted, (name,))
         dof = effect.dof(last.fitted.model.machine)

@@ -27,7 +27,8 @@ class Parameter:
     `typical` is a size seen on real benches, `negligible` one that nobody would act on; both are
     magnitudes. `scan`: trial values of a shape parameter, which has no influence while the
     amplitudes of its effect are zero; empty for an amplitude. A `choice` takes one of these values
-    and is never fitted.
+    and is never fitted. `optional`: the parameters of one number above 0 form a term that the
+    effect can do without; without it they are zero.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Parameter:
     words: str = ""
     scan: tuple[float, ...] = ()
     choice: bool = False
+    optional: int = 0
 
     @property
     def amplitude(self) -> bool:
@@ -76,7 +78,8 @@ class Operating:
     speed are true shaft quantities. `inverter`: the machine is fed and logged by a drive, so that
     inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
     `ts_s` is the sample period, `travel_rad` the angle turned since the last reversal (infinite
-    before the first).
+    before the first). `q_alone`: the log tells of the q axis only, so that of a voltage's delay its
+    envelope is what shows.
     `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks. `held`: a
     dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
     """
@@ -94,6 +97,7 @@ class Operating:
     inverter: bool
     freq_hz: Array
     ts_s: float
+    q_alone: bool = False
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
     held: bool = False
@@ -160,13 +164,15 @@ class Effect:
     angle(x, q): recorded less true electrical angle [rad].
     current(r, q): true complex current from the recorded one [A].
     load(r, q): true shaft torque from the recorded one [N·m].
+    speed(ω, q, T): a drive's own recorded speed from the true one [rad/s], T the sample period.
     voltage(v, x, q, instrument): recorded voltage from the true one [V].
     shaft(t, q): recorded shaft torque from the true one [N·m].
 
     `parameters`, or `expand(machine)` where their number depends on the machine. `signals` are
     capture columns without which the effect cannot be seen, `tests` those that excite it, the
     best first. `rivals`: other effects and the test or calibration that parts them from this.
-    `allowed(q)` is False for parameters without physical meaning together.
+    `allowed(q)` is False for parameters without physical meaning together. `left_out`: the
+    numbers of the optional terms that this copy of the effect does without.
     """
 
     name: str
@@ -187,7 +193,9 @@ class Effect:
     load: LoadHook | None = None
     voltage: VoltageHook | None = None
     shaft: Callable[[Array, Values], Array] | None = None
+    speed: Callable[[Array, Values, float], Array] | None = None
     allowed: Callable[[Values], bool] | None = None
+    left_out: tuple[int, ...] = ()
 
     @property
     def hook(self) -> str:
@@ -200,6 +208,10 @@ class Effect:
 
     def parameters_of(self, machine: Machine) -> tuple[Parameter, ...]:
         """The parameters for one machine, `expand`ed where their number depends on it."""
+        return tuple(p for p in self.every(machine) if p.optional not in self.left_out)
+
+    def every(self, machine: Machine) -> tuple[Parameter, ...]:
+        """The parameters with those of the optional terms that are left out."""
         return self.expand(machine) if self.expand is not None else self.parameters
 
     def dof(self, machine: Machine) -> int:

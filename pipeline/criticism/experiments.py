@@ -20,7 +20,7 @@ from scipy.special import chdtri, chndtr
 from pipeline.criticism.effect import Array, Effect
 from pipeline.criticism.linearise import Column, linearise, noise_floor
 from pipeline.criticism.planned import PLANNED, planned
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import Candidate
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.diagnosis import Separation

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Values
 from pipeline.criticism.model import Model
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.trajectory import (
     ROUNDS,
     Batch,

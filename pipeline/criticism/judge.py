@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.linearise import channel_scale
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import System
 from pipeline.records.diagnosis import Remainder
 
 _GROWTH = 5.0
+_MOST_BLOCKS = 10_000
 _OVER = 1.0
 _MATERIAL = 5e-4
 _MATERIAL_BENCH = 1e-2
@@ -32,23 +34,24 @@ class HeldOut:
     steps: Mapping[int, Array] = field(default_factory=dict)
 
 
-def leave_out(around: System, own: int) -> HeldOut:
+def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> HeldOut:
     """Predicts every capture from all the others, by one weighted step from the full fit.
 
-    Noise weights stay those of the full fit, so that a capture cannot vote on its own weight.
+    Of `segments` that are parted in blocks, every block is predicted from all else. Noise weights
+    stay those of the full fit, so that a capture cannot vote on its own weight.
     """
     places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
     weight = 1.0 / np.maximum(around.spreads(around.residual), 1.0)[around.group]
     matrix = around.matrix[:, places]
-    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    unit = _units(around, segments)
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(around.penalty[places])
     slope = weighted.T @ around.residual + around.pull[places]
     spread = np.diag(np.linalg.pinv(_unit(normal), hermitian=True))
     left = np.full(around.size, np.nan)
     steps: dict[int, Array] = {}
-    for number in sorted(set(segment.tolist())):
-        mine = segment == number
+    for number in sorted(set(unit.tolist())):
+        mine = unit == number
         less = normal - weighted[mine].T @ matrix[mine]
         scale = np.sqrt(np.diag(normal))
         inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
@@ -62,6 +65,23 @@ def leave_out(around: System, own: int) -> HeldOut:
     told = (left / around.soft)[np.isfinite(left)]
     total = math.sqrt(float((told**2).mean())) if told.size else math.nan
     return HeldOut(left, total, steps)
+
+
+def _units(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
+    """Number of what is held out together, of every row [R]: a capture or a block of one.
+
+    Segments of one capture that are parted alike are held out together.
+    """
+    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    units = segment.astype(np.int64)
+    names = [s.capture for s in segments]
+    first = len(names)
+    for number, one in enumerate(segments):
+        if one.blocks is not None:
+            mine = segment == number
+            units[mine] = first + names.index(one.capture) * _MOST_BLOCKS
+            units[mine] += one.blocks[around.window[mine]]
+    return units
 
 
 def _unit(normal: Array) -> Array:
@@ -112,7 +132,7 @@ def remainder(
 
 def material_size(segment: Segment, channel: str, around: System) -> float:
     """Error [unit of the signal] below which nobody would act."""
-    bench = segment.kind in ("terminal", "lcr", "flux_map")
+    bench = segment.kind in ("terminal", "lcr", "flux_map", "standing")
     fitted = around.around
     scale = channel_scale(segment, channel, fitted.model, fitted.values)
     return (_MATERIAL_BENCH if bench else _MATERIAL) * scale

@@ -15,7 +15,7 @@ from pipeline.criticism.maps import (
     unit_of,
     window_errors,
 )
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import Rung
 from pipeline.criticism.system import own_columns
 from pipeline.records.diagnosis import LadderRung, RungError
@@ -46,7 +46,7 @@ def parameters_of(rung: Rung) -> dict[str, tuple[float, float, str]]:
     spread = np.sqrt(np.maximum(np.diag(rung.around.covariance(own)), 0.0))
     u = {rung.around.columns[n].name: float(spread[n]) for n in own}
     return {
-        name: (float(rung.fitted.values[name]), u[name], p.unit)
+        name: (float(rung.fitted.values[name]), u.get(name, 0.0), p.unit)
         for name, (_, p) in rung.fitted.model.parameters().items()
     }
 

@@ -26,7 +26,7 @@ from pipeline.criticism.model import (
 )
 from pipeline.criticism.noise import rounding_error
 from pipeline.criticism.residuals import RIPPLES, measured, operate, predicted, residual
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 
 _CHUNK = 32
 _REPLICATES = 2
@@ -35,6 +35,8 @@ _ALLOWANCE = 5e-5
 _MODEL_DRIVE = 1e-4
 _MODEL_BENCH = 2e-5
 _OFFSET = 0.5
+# what complex steps leave of a term that is zero
+_NOTHING = 1e-40
 _ZERO = 2e-3
 _ROUGH = 0.05
 _FORM = 0.02
@@ -106,7 +108,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
 
     White noise of each sensor's own level, and the rounding of an angle that is rounded, is added
-    to the recording and the residual computed again; the variance of the change is pooled over windows of one (channel, order).
+    to the recording and the residual computed again; the variance of the change is pooled over
+    windows of one (channel, order).
     """
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
@@ -132,7 +135,7 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
     """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
     _, _, _, groups = row_index(segment)
     scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
-    floor: Array = _ROUGH * _gain(segment) * np.array(scales)
+    floor: Array = _ROUGH * _gain(segment) / _told(segment, values) * np.array(scales)
     return floor
 
 
@@ -194,9 +197,14 @@ def linearise(
     both = np.column_stack([projected(segment, here)[valid] * whiten, kept])
     for offset in _offsets(segment, valid, whiten):
         both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
-    unit = 1.0 / (whiten * _gain(segment))
+    unit = _told(segment, values) / (whiten * _gain(segment))
     soft = floor * whiten
     return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, groups)
+
+
+def _told(segment: Segment, values: Values) -> float:
+    """The channel's own unit a unit of the residual: a free shaft's is an acceleration [rad/s²]."""
+    return values["j_kgm2"] if segment.kind == "motion" else 1.0
 
 
 def _gain(segment: Segment) -> float:
@@ -221,16 +229,16 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
         if channel == "torque_shaft_nm" and segment.kind == "dq":
             sizes.append(kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"]))
         elif channel in ("vd_v", "vq_v"):
-            names = ("vd_v", "vq_v") if segment.kind == "dq" else ("vab_v", "vbc_v")
+            names = ("vd_v", "vq_v") if segment.kind in ("dq", "q") else ("vab_v", "vbc_v")
             present = [segment.recorded[n] for n in names if n in segment.recorded]
             sizes.append(np.sqrt(sum(column**2 for column in present)))
         else:
             sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
     reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
     reading[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
-    part = _MODEL_DRIVE if segment.kind == "dq" else _MODEL_BENCH
+    part = _MODEL_DRIVE if segment.kind in ("dq", "q", "motion") else _MODEL_BENCH
     scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
-    own = part * _gain(segment) * np.array(scales)[:, None, None]
+    own = part * _gain(segment) / _told(segment, values) * np.array(scales)[:, None, None]
     both: Array = np.hypot(reading, own)
     if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
@@ -260,15 +268,19 @@ def channel_scale(segment: Segment, channel: str, model: Model, values: Values) 
     """The machine's own size in a channel's unit; of a bench meter its largest reading."""
     if channel == "torque_shaft_nm":
         return model.machine.scales["torque_nm"]
+    if channel == "omega_mech_rad_s" and segment.kind == "q":
+        return model.machine.scales["speed_rad_s"]
     if channel == "omega_mech_rad_s":
         return model.machine.scales["torque_nm"] / values["j_kgm2"]
-    if segment.kind in ("dq", "open"):
+    if segment.kind in ("dq", "q", "open", "steady"):
         return model.machine.scales["voltage_v"]
     return float(np.abs(segment.recorded[channel]).max())
 
 
 def _offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
     """Whitened weak samples of an offset of each channel's sensor, of its prior size."""
+    if segment.offsets is not None:
+        return [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
     if segment.weak is None:
         return []
     made = []
@@ -307,6 +319,10 @@ _NEEDS: dict[str, tuple[str, ...]] = {
     "terminal": ("r_ohm", "ld_h", "lq_h"),
     "lcr": ("r_ohm", "ld_h", "lq_h"),
     "flux_map": ("ld_h", "lq_h", "psi_wb"),
+    "q": ("r_ohm", "lq_h", "psi_wb"),
+    "motion": ("psi_wb", "j_kgm2", "b_nm_s_rad"),
+    "steady": ("r_ohm", "ld_h", "psi_wb"),
+    "standing": ("psi_wb",),
 }
 
 
@@ -357,11 +373,11 @@ class _Sampler:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
         kind, moved = self.segment.kind, dict(self.values)
         heard = {
-            "gain_torque": "torque_shaft_nm" in self.segment.channels,
+            "gain_torque": "torque_shaft_nm" in self.segment.channels and kind != "motion",
             "gain_lcr": kind == "lcr",
-            "gain_current": kind in ("dq", "terminal", "flux_map"),
+            "gain_current": kind not in ("shaft", "open", "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            self.segment.meter: kind in ("dq", "open", "terminal", "flux_map"),
+            self.segment.meter: kind in ("dq", "q", "open", "terminal", "flux_map", "steady"),
         }
         if not heard.get(column.name, False):
             return None
@@ -386,12 +402,13 @@ class _Sampler:
             return True
         kinds: tuple[str, ...] = ()
         if effect.angle is not None:
-            kinds += ("dq", "open", "shaft")
+            kinds += ("dq", "q", "open", "shaft", "motion")
         if effect.current is not None:
-            kinds += ("dq", "terminal", "flux_map")
+            kinds += ("dq", "q", "terminal", "flux_map", "motion", "steady", "standing")
         if effect.voltage is not None:
-            kinds += ("dq", "open", "terminal", "flux_map")
+            kinds += ("dq", "q", "open", "terminal", "flux_map", "steady")
         loaded = effect.load is not None or effect.shaft is not None
+        loaded = loaded and self.segment.kind != "motion"
         heard = loaded and "torque_shaft_nm" in self.segment.channels
         return heard or self.segment.kind in kinds
 
@@ -421,14 +438,14 @@ class _Sampler:
             drag[-1] = change.drag_nm / column.step
             return drag if np.any(drag) else None
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
-        if self.segment.kind == "shaft":
+        if self.segment.kind in ("q", "shaft", "motion", "standing"):
             still = self._pieces_of_nothing()
             there = predicted(self.segment, self.x, change, plain, self.values) - predicted(
                 self.segment, self.x, still, plain, self.values
             )
         else:
             there = predicted(self.segment, self.x, change, plain, self.quiet)
-        return -there / column.step if np.any(there) else None
+        return -there / column.step if np.any(np.abs(there) > _NOTHING) else None
 
     def _listens(self, effect: Effect) -> bool:
         kind = self.segment.kind
@@ -436,10 +453,12 @@ class _Sampler:
             return len(self.segment.channels) > (2 if kind == "dq" else 0) and kind in (
                 "dq",
                 "shaft",
+                "motion",
+                "standing",
             )
         if effect.hook == "drop":
-            return kind in ("dq", "terminal")
-        return kind in ("dq", "open", "terminal", "flux_map")
+            return kind in ("dq", "q", "terminal", "steady")
+        return kind in ("dq", "q", "open", "terminal", "flux_map", "motion", "steady", "standing")
 
     def _pieces_of_nothing(self) -> Pieces:
         nothing = np.zeros(self.x.omega_rad_s.shape)

@@ -101,8 +101,11 @@ class Model:
 
 
 def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, float]:
-    """One effect's parameters by their short names, in their units."""
-    return {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters_of(machine)}
+    """One effect's parameters by their short names, in their units; zero what is left out."""
+    found = {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters_of(machine)}
+    if not effect.left_out:
+        return found
+    return {p.name: 0.0 for p in effect.every(machine)} | found
 
 
 @dataclass(slots=True)

@@ -10,7 +10,8 @@ import numpy as np
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.segments import Segment, electrical_orders, slow_orders
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.segments import electrical_orders, slow_orders
 from pipeline.criticism.system import Fitted
 from pipeline.numerics.projection import projection, window_starts
 

@@ -13,15 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Machine, Operating, Recorded, Values
+from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Values
 from pipeline.criticism.model import Model, Pieces, air_gap_torque, evaluate, values_of
-from pipeline.criticism.segments import Segment, slow_orders
-from pipeline.criticism.traces import smoothed
+from pipeline.criticism.operate import angle_error, current_slope, operate
+from pipeline.criticism.segment import Segment
 
-_SPEED_S = 0.002
-_TURN_RAD = 0.7
-_FINEST = 48
-_ANGLE_ROUNDS = 2
 RIPPLES = ("ripple_edge", "ripple_shift", "ripple_torque")
 
 
@@ -35,162 +31,6 @@ def residual(
     return measured(segment, signals, model, values) - predicted(segment, x, pieces, model, values)
 
 
-def operate(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
-    """True currents, angle and speed [n] of a segment, the sensor effects taken out."""
-    if segment.kind in ("terminal", "lcr", "flux_map"):
-        return _operate_still(segment, signals, model, values)
-    theta, omega, freq = _motion(segment, signals, model)
-    current = np.zeros(theta.size, dtype=complex)
-    if segment.kind == "dq":
-        current = _true_current(_recorded(segment, signals, model), model, values)
-    x = _operating(segment, signals, model, values, current, theta, omega, freq)
-    if not any(effect.angle is not None for effect in model.effects):
-        return x
-    error = np.zeros(theta.size)
-    for _ in range(_ANGLE_ROUNDS):
-        nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
-        error = _angle_error(nearer, model, values)
-    true = theta - error / model.machine.pole_pairs
-    omega = _speed(true, segment.ts_s, theta.size // segment.size)
-    return _operating(
-        segment, signals, model, values, current * np.exp(1j * error), true, omega, freq
-    )
-
-
-def _motion(
-    segment: Segment, signals: Mapping[str, Array], model: Model
-) -> tuple[Array, Array, Array]:
-    """Angle, speed and electrical frequency [n·m]; m times finer where the shaft turns so far a
-    sample that a torque's order would be missed.
-    """
-    theta = signals["theta_mech_rad"]
-    finer = finer_of(segment, model.machine)
-    if finer > 1:
-        at = np.arange(theta.size * finer) / finer
-        theta = np.interp(at, np.arange(theta.size), theta)
-    omega = _speed(theta, segment.ts_s, finer)
-    return theta, omega, np.abs(omega) * model.machine.pole_pairs / (2 * math.pi)
-
-
-def _speed(theta: Array, period: float, finer: int) -> Array:
-    width = max(2 * round(_SPEED_S / period / 2) + 1, 5) * finer
-    return smoothed(np.gradient(theta, period / finer), width)
-
-
-def finer_of(segment: Segment, machine: Machine) -> int:
-    """How many points a sample the torque of a coasting shaft is averaged over."""
-    if segment.kind != "shaft" or segment.test == "cogging":
-        return 1
-    highest = max(*slow_orders(machine), 1)
-    turn = float(np.abs(np.diff(segment.recorded["theta_mech_rad"])).max())
-    return min(max(int(np.ceil(highest * turn / _TURN_RAD)), 1), _FINEST)
-
-
-def _operating(
-    segment: Segment,
-    signals: Mapping[str, Array],
-    model: Model,
-    values: Values,
-    current: Complex,
-    theta: Array,
-    omega: Array,
-    freq: Array,
-) -> Operating:
-    return Operating(
-        machine=model.machine,
-        base=values,
-        id_a=current.real,
-        iq_a=current.imag,
-        eps_rad=model.machine.pole_pairs * theta,
-        theta_rad=theta,
-        omega_rad_s=omega,
-        winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
-        magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size, values),
-        travel_rad=_travel(signals, theta.size),
-        inverter=segment.kind == "dq",
-        ts_s=segment.ts_s,
-        freq_hz=freq,
-        held=segment.test == "torque_map",
-    )
-
-
-def _warmth(
-    segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
-) -> Array:
-    if name not in signals:
-        return np.full(size, segment.fixed["ambient_k"])
-    return signals[name] - 25.0 - values["offset_temp_k"]
-
-
-def _travel(signals: Mapping[str, Array], size: int) -> Array:
-    since = signals.get("travel_rad")
-    return np.full(size, np.inf) if since is None or since.size != size else since
-
-
-def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:
-    theta = signals["theta_mech_rad"]
-    eps = model.machine.pole_pairs * theta
-    return Recorded(
-        i_a=signals["id_a"] + 1j * signals["iq_a"],
-        torque_nm=signals.get("torque_shaft_nm", np.zeros(theta.size)),
-        eps_rad=eps,
-        omega_e_rad_s=np.gradient(eps, segment.ts_s),
-        ts_s=segment.ts_s,
-        inverter=True,
-        instrument=segment.instrument,
-    )
-
-
-def _true_current(recorded: Recorded, model: Model, values: Values) -> Complex:
-    recorded = replace(recorded, i_a=recorded.i_a / (1.0 + values["gain_current"]))
-    for effect in model.effects:
-        if effect.current is not None:
-            q = values_of(effect, model.machine, values)
-            recorded = replace(recorded, i_a=effect.current(recorded, q))
-    return recorded.i_a
-
-
-def _angle_error(x: Operating, model: Model, values: Values) -> Array:
-    total = np.zeros(x.omega_rad_s.shape)
-    for effect in model.effects:
-        if effect.angle is not None:
-            total = total + effect.angle(x, values_of(effect, model.machine, values))
-    return total
-
-
-def _operate_still(
-    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
-) -> Operating:
-    n = next(iter(signals.values())).size
-    zero = np.zeros(n)
-    if segment.kind == "terminal":
-        eps = np.full(n, segment.fixed.get("theta_elec_rad", 0.0))
-        stationary = (
-            2
-            / math.sqrt(3)
-            * signals["i_pair_a"]
-            * np.exp(1j * (segment.fixed["pair_rad"] - math.pi / 6))
-        )
-        phase = int(segment.fixed["phase"])
-        bench = Recorded(
-            stationary, zero, eps, zero, segment.ts_s, False, segment.instrument, phase
-        )
-        current = _true_current(bench, model, values) * np.exp(-1j * eps)
-        freq = zero
-    elif segment.kind == "lcr":
-        eps, current = np.radians(signals["theta_elec_deg"]), np.zeros(n, dtype=complex)
-        freq = signals.get("freq_hz", zero)
-    else:
-        eps, freq = zero, zero
-        current = signals["id_a"] + 1j * signals["iq_a"]
-        table = Recorded(current, zero, eps, zero, segment.ts_s, False, segment.instrument)
-        current = _true_current(table, model, values)
-    x = _operating(segment, signals, model, values, current, zero, zero, freq)
-    return replace(x, eps_rad=eps)
-
-
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
     """Recorded signals [C, n] of the channels; only the torque is corrected, for its sensor's
     dynamics, and the open-circuit line voltages are turned into the rotor frame.
@@ -200,8 +40,11 @@ def measured(segment: Segment, signals: Mapping[str, Array], model: Model, value
         return np.stack([v.real, v.imag])
     rows = []
     for channel in segment.channels:
-        if channel == "omega_mech_rad_s":
+        if segment.kind == "motion" or (channel == "omega_mech_rad_s" and segment.kind == "shaft"):
             rows.append(np.zeros(segment.size))
+        elif segment.kind == "standing":
+            true = operate(segment, signals, model, values).i_a.imag
+            rows.append(true / current_slope(segment, model, values))
         elif channel == "torque_shaft_nm":
             rows.append(_true_load(segment, signals, model, values))
         else:
@@ -261,7 +104,17 @@ def predicted(
         # a flux linkage is a voltage's integral: the voltmeter's gain is in it
         psi = _recorded_voltage(pieces.psi_wb, segment, x, model, values)
         return np.stack([psi.real, psi.imag])
+    if segment.kind == "standing":
+        return _holding(x, pieces, values) / current_slope(segment, model, values)
+    if segment.kind == "steady":
+        steady = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb
+        return _recorded_voltage(steady, segment, x, model, values).imag[None]
     rows: list[Array] = []
+    if segment.kind == "q":
+        voltage = _rotor_voltage(segment, x, pieces, values)
+        rows.append(_recorded_voltage(voltage, segment, x, model, values).imag)
+        if len(segment.channels) > 1:
+            rows.append(_recorded_speed(segment, x, model, values))
     if segment.kind in ("dq", "open"):
         voltage = _rotor_voltage(segment, x, pieces, values)
         voltage = _recorded_voltage(voltage, segment, x, model, values)
@@ -290,7 +143,7 @@ def _shaft_torque(
     if finer > 1:
         shaft = _averaged(shaft, finer)
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
-    if segment.channels[-1] == "omega_mech_rad_s":
+    if segment.channels[-1] == "omega_mech_rad_s" or segment.kind == "motion":
         # in the angle sensor's units: a torque's noise floor would shrink with the inertia
         return shaft / values["j_kgm2"] - acceleration
     shaft = shaft - values["j_kgm2"] * acceleration
@@ -300,6 +153,25 @@ def _shaft_torque(
                 shaft = effect.shaft(shaft, values_of(effect, model.machine, values))
         shaft = shaft * (1.0 + values["gain_torque"])
     return shaft
+
+
+def _holding(x: Operating, pieces: Pieces, values: Values) -> Array:
+    """The q current [1, n] that holds the rotor against its drags: what it lacks in torque is
+    made up by more of it.
+    """
+    torque = air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
+    current: Array = x.i_a.imag - torque / (1.5 * x.machine.pole_pairs * values["psi_wb"])
+    return current[None]
+
+
+def _recorded_speed(segment: Segment, x: Operating, model: Model, values: Values) -> Array:
+    """Speed [n] of the angle as a drive's own estimate tells it [rad/s]."""
+    speed: Array = _central(x.theta_rad, segment.ts_s)
+    for effect in model.effects:
+        if effect.speed is not None:
+            q = values_of(effect, model.machine, values)
+            speed = effect.speed(speed, q, segment.ts_s)
+    return speed
 
 
 def _second_difference(theta: Array, period: float) -> Array:
@@ -348,6 +220,8 @@ def _rotor_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Value
     difference = _forward if held else _central
     psi, drop = pieces.psi_wb, pieces.drop_v
     slope, omega = difference(psi, period), difference(eps, period)
+    if segment.kind == "q":
+        omega = x.machine.pole_pairs * x.omega_rad_s
     if held:
         psi, drop = _ahead(psi), _ahead(drop)
     turn = x.machine.pole_pairs * x.omega_rad_s * period
@@ -381,8 +255,8 @@ def _recorded_voltage(
         if effect.voltage is not None:
             q = values_of(effect, model.machine, values)
             voltage = effect.voltage(voltage, x, q, segment.instrument)
-    if segment.kind in ("dq", "open") and any(e.angle is not None for e in model.effects):
-        voltage = voltage * np.exp(-1j * _angle_error(x, model, values))
+    if segment.kind in ("dq", "q", "open") and any(e.angle is not None for e in model.effects):
+        voltage = voltage * np.exp(-1j * angle_error(x, model, values))
     return voltage * (1.0 + values[segment.meter])
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import TIE, Candidate, loss_without, material
 from pipeline.criticism.system import Fitted, System, gauss_newton, own_columns
 

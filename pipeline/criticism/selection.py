@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.linearise import Column, effect_columns, zero
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.optional import trimmed
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import (
     Descent,
     Fitted,
@@ -101,9 +102,10 @@ class Standing:
 def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate, ...]:
     """Every effect that is not in the model, once for each combination of trial shapes."""
     model = fitted.model
+    inside = {effect.name for effect in model.effects}
     found = []
     for effect in library.values():
-        if effect in model.effects:
+        if effect.name in inside:
             continue
         shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
         grids = [[(p.name, v * model.machine.scale(p)) for v in p.scan] for p in shapes]
@@ -137,15 +139,24 @@ def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> t
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        dof = candidate.effect.dof(fitted.model.machine)
-        cost = dof * price + search_price
         score = _score(around, fitted, own, places, candidate, before, _GLANCE)
+        cost = paid_for(candidate.effect, fitted.model.machine, score) * price + search_price
         if score is not None and score.fall > _PROMISING * cost:
             score = _score(around, fitted, own, places, candidate, before, _THOROUGH)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known.fall):
             best[candidate.effect.name] = replace(score, price=cost)
     return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
+
+
+def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
+    """How many parameters a score costs: of optional terms those that the step makes use of."""
+    used = {} if score is None else score.step
+    return sum(
+        not p.optional or bool(used.get(f"{effect.name}.{p.name}"))
+        for p in effect.parameters_of(machine)
+        if not p.choice
+    )
 
 
 def _score(
@@ -241,7 +252,8 @@ def _chosen(
     for first in range(0, min(len(passing), _ROUNDS * _REFITS), _REFITS):
         best = _refit_best(segments, fitted, passing[first : first + _REFITS], wide)
         if best is not None:
-            return gauss_newton(segments, best[0])
+            named = [effect.name for effect in best[0].model.effects]
+            return trimmed(segments, *gauss_newton(segments, best[0]), named)
     return None
 
 
@@ -262,7 +274,9 @@ def _refit_best(
         start = {**fitted.values, **moved, **score.candidate.values, **score.step}
         values = clipped(model, start)
         tried = gauss_newton(segments, replace(fitted, model=model, values=values), before=wide)
-        cost = tried[1].misfit + score.price
+        # of two that tie, the one that some capture here was made to show
+        unsought = TIE if set(effect.tests).isdisjoint(wide.tests) else 0.0
+        cost = tried[1].misfit + score.price + unsought
         if material(tried[0], effect) and cost < min(least, wide.misfit):
             best, least = tried, cost
     return best

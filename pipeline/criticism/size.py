@@ -8,10 +8,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.orders import holding_orders
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
+_TABLES = ("flux_map", "holding_current")
 
 
 def machine_of(campaign: Campaign, start: Constants) -> Machine:
@@ -21,11 +23,15 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
     """
     pole_pairs = pole_pairs_of(campaign, start)
     slots = campaign.nameplate("slots")
-    logs = campaign.of(*_TRACED)
+    logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
     current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, ("ia_a", "ib_a"))
+    current = current or _largest(tables, ("id_a", "iq_a"))
     voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, ("vab_v",))
+    voltage = voltage or _largest(tables, ("vq_v",))
     speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
-    current, voltage = current or 1.0, voltage or 1.0
+    current = current or 1.0
+    flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
+    voltage = voltage or flux * pole_pairs * speed or 1.0
     psi = voltage / (pole_pairs * speed)
     known = start.best("psi_pm_wb")
     psi = known.number if known is not None else psi
@@ -40,7 +46,10 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
         "period_s2": period**2,
         "flux_wb": psi,
     }
-    orders = torque_orders(campaign.of("cogging"))
+    bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
+    orders = torque_orders(campaign.of("cogging")) or holding_orders(
+        campaign.of("holding_current"), bases
+    )
     return Machine(
         pole_pairs, int(str(slots)) if slots else None, scales, orders, stated_u(campaign)
     )
@@ -118,13 +127,13 @@ def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:
 
 
 def _speed(capture: Capture) -> float:
-    for name in ("omega_mech_rad_s", "theta_mech_rad"):
-        if capture.has("t_s", name):
-            found = capture.arrays("t_s", name)
-            signal = found[name]
-            if name == "theta_mech_rad":
-                signal = np.gradient(signal, found["t_s"])
-            return float(np.nanquantile(np.abs(signal), 0.999))
+    if capture.has("omega_mech_rad_s"):
+        speed = capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"]
+        return float(np.nanquantile(np.abs(speed), 0.999))
+    if capture.has("t_s", "theta_mech_rad"):
+        found = capture.arrays("t_s", "theta_mech_rad")
+        speed = np.gradient(found["theta_mech_rad"], found["t_s"])
+        return float(np.nanquantile(np.abs(speed), 0.999))
     return 0.0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.bounds import BASE_LIMITS, bounded_step
 from pipeline.criticism.effect import Array, Effect, Machine, Values
 from pipeline.criticism.linearise import (
     Column,
@@ -22,7 +23,8 @@ from pipeline.criticism.linearise import (
     zero,
 )
 from pipeline.criticism.model import BASE, Model
-from pipeline.criticism.segments import Segment, sparse
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.segments import sparse
 from pipeline.criticism.size import base_scales
 
 _TIE = 1e-11
@@ -181,7 +183,9 @@ class System:
 
 def _pseudo_inverse(normal: Array) -> Array:
     """Inverse of a normal matrix with directions that carry no information left at zero."""
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    told = np.diag(normal)
+    # a parameter that no capture tells of stays where it is, exactly
+    size = np.sqrt(np.where(told > 0.0, told, 1.0))
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     good = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
@@ -330,6 +334,8 @@ def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
     """Values moved inside their bounds."""
     inside = dict(values)
     inside["j_kgm2"] = max(values["j_kgm2"], 1e-3 * base_scales(model.machine)["j_kgm2"])
+    for name, (low, high) in BASE_LIMITS.items():
+        inside[name] = min(max(values[name], low), high)
     for name, (_, p) in model.parameters().items():
         scale = model.machine.scale(p)
         inside[name] = min(max(values[name], p.low * scale), p.high * scale)
@@ -350,7 +356,7 @@ def gauss_newton(
     """
     around = system(segments, fitted, before=before)
     for _ in range(iterations):
-        step = around.best(np.arange(len(around.columns))).step
+        step = bounded_step(around.best, around.columns, fitted.model, fitted.values)
         for _ in range(_HALVINGS):
             moved = _moved(fitted, around.columns, step)
             if renew:

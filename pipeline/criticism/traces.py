@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array
+from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.noise import sensor_noise
 from pipeline.numerics.projection import window_starts
 from pipeline.records.capture import Capture
 
+_WINDOW_S = 0.02
+_WINDOW_SAMPLES = 40
+_SMOOTHING_S = 0.05
+SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 PAD = 24
 _SENSE_S = 0.001
 
@@ -77,7 +83,11 @@ def travel(theta: Array, period: float) -> Array:
 
 
 def thinned(
-    found: Mapping[str, Array], keep: NDArray[np.bool_], length: int, most: int
+    found: Mapping[str, Array],
+    keep: NDArray[np.bool_],
+    length: int,
+    most: int,
+    pad: int = PAD,
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
     """Signals cut to an even selection of `most` windows, and their first samples in them.
 
@@ -85,9 +95,51 @@ def thinned(
     samples on each side of a window keep what is smoothed or differenced out of its weights.
     """
     starts = window_starts(keep, length, length, most)
-    if starts.size * (length + 2 * PAD) >= keep.size:
+    if starts.size * (length + 2 * pad) >= keep.size:
         return dict(found), window_starts(keep, length)
-    starts = starts[(starts >= PAD) & (starts + length + PAD <= keep.size)]
-    rows = (starts[:, None] - PAD + np.arange(length + 2 * PAD)[None, :]).ravel()
+    starts = starts[(starts >= pad) & (starts + length + pad <= keep.size)]
+    rows = (starts[:, None] - pad + np.arange(length + 2 * pad)[None, :]).ravel()
     cut = {name: column[rows] for name, column in found.items()}
-    return cut, PAD + (length + 2 * PAD) * np.arange(starts.size)
+    return cut, pad + (length + 2 * pad) * np.arange(starts.size)
+
+
+def window_of(period: float, size: int) -> int:
+    """Samples a window: 20 ms, but 40 samples at least and four windows in the capture."""
+    wanted = max(round(_WINDOW_S / period), _WINDOW_SAMPLES)
+    return max(min(wanted, size // 4), 8)
+
+
+def with_angle(capture: Capture, names: list[str]) -> list[str]:
+    """The columns and the first there is of those that tell of the angle."""
+    for name in ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s"):
+        if capture.has(name):
+            return [*names, name]
+    return names
+
+
+def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> None:
+    """Puts `theta_mech_rad` [n] into the columns, from whatever tells of the angle."""
+    if "theta_mech_rad" in found:
+        return
+    if "theta_elec_rad" in found:
+        found["theta_mech_rad"] = found.pop("theta_elec_rad") / machine.pole_pairs
+    elif "omega_mech_rad_s" in found:
+        speed = found.pop("omega_mech_rad_s")
+        found["theta_mech_rad"] = np.concatenate(
+            [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
+        )
+    else:
+        found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
+
+
+def prepared(found: dict[str, Array], period: float) -> dict[str, float]:
+    """Noise of every column; smooths the temperatures and adds the travel since a reversal."""
+    noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
+    width = max(2 * round(_SMOOTHING_S / period) + 1, 51)
+    for name in SMOOTHED:
+        if name in found:
+            found[name] = smoothed(found[name], width)
+            noise[name] /= math.sqrt(width)
+    if "theta_mech_rad" in found:
+        found["travel_rad"] = travel(found["theta_mech_rad"], period)
+    return noise

@@ -22,7 +22,7 @@ from pipeline.criticism.linearise import reading_error
 from pipeline.criticism.maps import disjoint
 from pipeline.criticism.model import Model, air_gap_torque, evaluate
 from pipeline.criticism.residuals import measured, operate, predicted
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 
 ROUNDS = 15
 _STATE = ("id_a", "iq_a", "theta_mech_rad")

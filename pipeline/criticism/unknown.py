@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.effect import Array
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.ports import Port, ports, refined
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.sketch import Pursuit, expression
 from pipeline.criticism.system import Fitted, System, clipped, own_columns, system
 from pipeline.criticism.telling import told

@@ -18,6 +18,7 @@ from pipeline.io.columns import foreign_unit, last_part, to_frame
 from pipeline.io.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
 from pipeline.io.files import list_files, read_whole
+from pipeline.io.foreign import find_reader
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.metadata import MANIFEST, SIDECAR_SUFFIX, capture_meta, manifest, merge, sidecar
@@ -28,7 +29,7 @@ from pipeline.records.capture import Capture, CaptureMeta, Integrity
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding
 
-Form = Literal["mcap", "csv"]
+Form = Literal["mcap", "csv", "foreign"]
 METADATA_RECORD = "capture"
 _MCAP_SUFFIX = ".mcap"
 _TEXT_SUFFIXES = frozenset({".csv", ".txt", ".tsv", ".log", ".dat", ".asc"})
@@ -163,6 +164,8 @@ def _entry(
     source, known = _source(path, own, beside, listed, head, topics, sources)
     if not known:
         return None
+    if source is not None and source.reader is not None:
+        form, own = "foreign", dict(find_reader(source.reader).metadata(data))
     fixed = {} if source is None else source.metadata_for(path)
     if source is not None:
         own = {key: value for key, value in own.items() if key in METADATA}
@@ -260,6 +263,8 @@ def read_capture(folder: Path, entry: Entry) -> Capture:
     meta = capture_meta(entry.said)
     if entry.form == "mcap":
         raw, source, verified = _read_mcap(data, entry)
+    elif entry.form == "foreign":
+        raw, source, verified = _read_foreign(data, entry)
     else:
         raw, source, verified = _read_csv(data, entry)
     frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
@@ -302,6 +307,13 @@ def _read_mcap(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | N
                 "correct `messages` in the source map",
             )
     return tables, source, layout.data_crc_holds
+
+
+def _read_foreign(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:
+    source = entry.source
+    if source is None or source.reader is None:
+        raise CaptureError("unknown_source", "no reader is named", "add a source map")
+    return [find_reader(source.reader).read(data)], source, False
 
 
 def _read_csv(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:

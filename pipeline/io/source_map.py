@@ -60,7 +60,10 @@ TIME_FROM_FIELD = TimeMap()
 
 @dataclass(frozen=True, slots=True)
 class SourceMap:
-    """How to recognise a bench's files and turn them into the contract's columns."""
+    """How to recognise a bench's files and turn them into the contract's columns.
+
+    `reader` names the plug-in that reads a form that is neither MCAP nor a text table.
+    """
 
     name: str
     files: tuple[str, ...] = ()
@@ -71,6 +74,7 @@ class SourceMap:
     time: TimeMap = TIME_FROM_FIELD
     messages: MessageForm = "auto"
     joint: str | None = None
+    reader: str | None = None
     metadata: tuple[tuple[str, str], ...] = ()
     per_file: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = ()
 
@@ -141,6 +145,7 @@ def parse_source_map(data: bytes, name: str) -> SourceMap:
         time=_time(top.section("time")),
         messages=top.choice("messages", get_args(MessageForm), "auto"),
         joint=top.text("joint"),
+        reader=top.text("reader"),
         metadata=_pairs(top.section("metadata")),
         per_file=_per_file(top.section("per_file")),
     )

@@ -81,7 +81,8 @@ def _heat_run(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 def _flux_map(capture: Capture, options: Mapping[str, float]) -> Passed:
     del options
-    for name in ("id_a", "iq_a"):
+    # steady voltages of levels of d current carry no q current
+    for name in ("id_a", "iq_a") if capture.has("iq_a") else ("id_a",):
         levels = np.unique(_finite(capture, name)[name].round(9))
         if levels.size < 2:
             raise CaptureError(

@@ -39,13 +39,15 @@ EFFECT = Effect(
     tests=("open_circuit", "torque_map"),
     experiment="an open-circuit spin",
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 4",
-    parameters=tuple(
-        Parameter(f"{axis}{order}_{wave}", "1", 0.06 / order, 0.0003, low=-0.3, high=0.3)
-        for order in (6, 12)
-        for axis in "dq"
-        for wave in ("cos", "sin")
-    )
-    + (Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),),
+    parameters=(
+        *(
+            Parameter(f"{axis}{order}_{wave}", "1", 0.06 / order, 0.0003, low=-0.3, high=0.3)
+            for order in (6, 12)
+            for axis in "dq"
+            for wave in ("cos", "sin")
+        ),
+        Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+    ),
     rivals={"cogging": "a slow turn without current"},
     coenergy=_coenergy,
 )

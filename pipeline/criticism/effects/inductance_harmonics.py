@@ -47,12 +47,14 @@ EFFECT = Effect(
     tests=("torque_map",),
     experiment="a torque map, or a slow turn under current",
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 5",
-    parameters=tuple(
-        Parameter(f"{name}_{wave}", "1", 0.03, 0.003, low=-0.5, high=0.5)
-        for name in ("q6", "d6", "cross6")
-        for wave in ("cos", "sin")
-    )
-    + (Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),),
+    parameters=(
+        *(
+            Parameter(f"{name}_{wave}", "1", 0.03, 0.003, low=-0.5, high=0.5)
+            for name in ("q6", "d6", "cross6")
+            for wave in ("cos", "sin")
+        ),
+        Parameter("ripple_share", "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True),
+    ),
     signals=("id_a", "iq_a"),
     rivals={"bemf_harmonics": "an open-circuit spin", "dead_time": "two speeds"},
     coenergy=_coenergy,

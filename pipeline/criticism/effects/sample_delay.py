@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
 
 
 def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
     if not x.inverter:
         return v_v
     turn = x.machine.pole_pairs * x.omega_rad_s * q["delay_s"]
+    if x.q_alone:
+        # what is turned into the q axis cannot be known without the d axis
+        late: Complex = v_v + 1j * q["delay_s"] / x.ts_s * np.gradient(v_v.imag)
+        return late
     turned: Complex = v_v * np.exp(1j * turn)
     return turned
 
 
+def _speed(omega: Array, q: Values, period: float) -> Array:
+    late: Array = omega - q["delay_s"] / period * np.gradient(omega)
+    return late
+
+
 EFFECT = Effect(
     name="sample_delay",
-    words="recorded dq voltage = true one turned by ω_e τ",
+    words="recorded dq voltage = true one turned by ω_e τ; of the q axis alone, v(t + τ), ω(t − τ)",
     signature="v_d error proportional to ω_e v_q, hence even in speed",
     tests=("torque_map", "drive"),
     experiment="constant speeds in both senses, at two speeds at least",
@@ -29,4 +38,5 @@ EFFECT = Effect(
         "current_delay": "current steps at standstill",
     },
     voltage=_voltage,
+    speed=_speed,
 )

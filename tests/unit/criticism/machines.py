@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.model import GAINS
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.numerics.projection import projection
 
 BASE = {

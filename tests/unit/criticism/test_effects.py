@@ -101,13 +101,16 @@ def test_phase_imbalance_is_three_resistances_in_the_abc_frame():
     assert drop == pytest.approx(total * np.exp(-1j * x.eps_rad), abs=1e-12)
 
 
-def test_saturation_bends_the_flux_by_its_polynomial():
+@pytest.mark.parametrize("bend", [0.0, 1e-5, 1e-3, 4.6])
+def test_saturation_bends_the_flux_by_its_rational_curve(bend):
+    """Down to no bend at all, where it is a cubic and the closed form a quotient of zeros."""
     x, size = operating(), 16.0
-    q = {"q_cubic": 0.1, "q_quintic": 0.02, "d_square": 0.05, "d_cubic": 0.07}
+    q = {"q_fall": 0.1, "q_bend": bend, "d_odd": 0.05, "d_fall": 0.07, "d_bend": bend}
     flux, _ = effect_flux(LIBRARY["saturation"], x, q)
     s, d = x.iq_a / size, x.id_a / size
-    assert flux.imag == pytest.approx(-BASE["lq_h"] * x.iq_a * (0.1 * s**2 - 0.02 * s**4))
-    assert flux.real == pytest.approx(-BASE["ld_h"] * size * (0.05 * d**2 + 0.07 * d**3))
+    lost_q, lost_d = (0.1 * s**2 / (1 + bend * s**2), 0.07 * d**2 / (1 + bend * d**2))
+    assert flux.imag == pytest.approx(-BASE["lq_h"] * x.iq_a * lost_q, rel=1e-6)
+    assert flux.real == pytest.approx(-BASE["ld_h"] * size * d * (0.05 * d + lost_d), rel=1e-6)
 
 
 def test_torque_comes_from_the_co_energy_of_the_linear_machine():

@@ -13,7 +13,7 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.free_run import Run, free_run
 from pipeline.criticism.model import Model
 from pipeline.criticism.registry import effects
-from pipeline.criticism.segments import Segment
+from pipeline.criticism.segment import Segment
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, machine
 

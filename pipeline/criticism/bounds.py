@@ -1,0 +1,67 @@
+"""Steps of a fit that respect bounds: a parameter that leans on one is not in the step.
+
+Reference: Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), 16.5, active sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Values
+from pipeline.criticism.linearise import Column
+from pipeline.criticism.model import Model
+
+_AT = 1e-9
+# a resistance or inductance below zero stands for an effect that is not in the model
+BASE_LIMITS = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
+
+
+class Step(Protocol):
+    """What a best step along some columns has to tell."""
+
+    @property
+    def step(self) -> Array:
+        """Change [k] of the parameters."""
+        ...
+
+
+Best = Callable[[NDArray[np.int64]], Step]
+
+
+def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Values) -> Array:
+    """Best step [P] along all columns in which nothing that is at a bound moves out of it.
+
+    `best` gives the best step along some of the columns. The others take up what a parameter at
+    its bound would have done.
+    """
+    limits = dict(BASE_LIMITS)
+    limits |= {
+        name: (p.low * model.machine.scale(p), p.high * model.machine.scale(p))
+        for name, (_, p) in model.parameters().items()
+    }
+    live = np.arange(len(columns))
+    step = np.zeros(len(columns))
+    while live.size:
+        moved = best(live).step
+        out = [
+            int(n)
+            for n, change in zip(live, moved, strict=True)
+            if _leaves(values[columns[n].name], float(change), limits.get(columns[n].name))
+        ]
+        if not out:
+            step[live] = moved
+            break
+        live = np.setdiff1d(live, out)
+    return step
+
+
+def _leaves(value: float, change: float, limits: tuple[float, float] | None) -> bool:
+    if limits is None:
+        return False
+    low, high = limits
+    near = _AT * abs(value)
+    return (change < 0.0 and value <= low + near) or (change > 0.0 and value >= high - near)

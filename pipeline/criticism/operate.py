@@ -1,0 +1,223 @@
+"""True currents, angle and speed of a segment: what the sensors said, their effects taken out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Complex, Machine, Operating, Recorded, Values
+from pipeline.criticism.model import Model, values_of
+from pipeline.criticism.segment import Segment, slow_orders
+from pipeline.criticism.traces import smoothed
+
+_SPEED_S = 0.002
+_TURN_RAD = 0.7
+_FINEST = 48
+_FINEST_LOG = 6
+_ANGLE_ROUNDS = 2
+_CRAWL = 1e-9
+
+
+def operate(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True currents, angle and speed [n] of a segment, the sensor effects taken out."""
+    if segment.kind in ("terminal", "lcr", "flux_map"):
+        return _operate_still(segment, signals, model, values)
+    if segment.kind in ("steady", "standing"):
+        return _operate_table(segment, signals, model, values)
+    theta, omega, freq = _motion(segment, signals, model)
+    current = np.zeros(theta.size, dtype=complex)
+    if segment.kind in ("dq", "q", "motion"):
+        current = _true_current(_recorded(segment, signals, model), model, values)
+    if current.size < theta.size:
+        at = np.arange(theta.size) * (current.size / theta.size)
+        current = np.interp(at, np.arange(current.size), current)
+    if segment.kind == "q" and "omega_mech_rad_s" in signals:
+        omega = signals["omega_mech_rad_s"]
+    x = _operating(segment, signals, model, values, current, theta, omega, freq)
+    if not any(effect.angle is not None for effect in model.effects):
+        return x
+    error = np.zeros(theta.size)
+    for _ in range(_ANGLE_ROUNDS):
+        nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
+        error = angle_error(nearer, model, values)
+    true = theta - error / model.machine.pole_pairs
+    omega = _speed(true, segment.ts_s, theta.size // segment.size)
+    return _operating(
+        segment, signals, model, values, current * np.exp(1j * error), true, omega, freq
+    )
+
+
+def _motion(
+    segment: Segment, signals: Mapping[str, Array], model: Model
+) -> tuple[Array, Array, Array]:
+    """Angle, speed and electrical frequency [n·m]; m times finer where the shaft turns so far a
+    sample that a torque's order would be missed.
+    """
+    theta = signals["theta_mech_rad"]
+    finer = finer_of(segment, model.machine)
+    if finer > 1:
+        at = np.arange(theta.size * finer) / finer
+        theta = np.interp(at, np.arange(theta.size), theta)
+    omega = _speed(theta, segment.ts_s, finer)
+    return theta, omega, np.abs(omega) * model.machine.pole_pairs / (2 * math.pi)
+
+
+def _speed(theta: Array, period: float, finer: int) -> Array:
+    width = max(2 * round(_SPEED_S / period / 2) + 1, 5) * finer
+    return smoothed(np.gradient(theta, period / finer), width)
+
+
+def finer_of(segment: Segment, machine: Machine) -> int:
+    """How many points a sample the torque of a coasting shaft is averaged over."""
+    if segment.kind not in ("shaft", "motion") or segment.test == "cogging":
+        return 1
+    highest = max(*slow_orders(machine), 1)
+    turn = float(np.abs(np.diff(segment.recorded["theta_mech_rad"])).max())
+    finest = _FINEST if segment.kind == "shaft" else _FINEST_LOG
+    return min(max(int(np.ceil(highest * turn / _TURN_RAD)), 1), finest)
+
+
+def _operating(
+    segment: Segment,
+    signals: Mapping[str, Array],
+    model: Model,
+    values: Values,
+    current: Complex,
+    theta: Array,
+    omega: Array,
+    freq: Array,
+) -> Operating:
+    return Operating(
+        machine=model.machine,
+        base=values,
+        id_a=current.real,
+        iq_a=current.imag,
+        eps_rad=model.machine.pole_pairs * theta,
+        theta_rad=theta,
+        omega_rad_s=omega,
+        winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
+        magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size, values),
+        travel_rad=_travel(signals, theta.size),
+        inverter=segment.kind in ("dq", "q"),
+        q_alone=segment.kind == "q",
+        ts_s=segment.ts_s,
+        freq_hz=freq,
+        held=segment.test == "torque_map",
+    )
+
+
+def _warmth(
+    segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
+) -> Array:
+    if name not in signals:
+        return np.full(size, segment.fixed["ambient_k"])
+    return signals[name] - 25.0 - values["offset_temp_k"]
+
+
+def _travel(signals: Mapping[str, Array], size: int) -> Array:
+    since = signals.get("travel_rad")
+    return np.full(size, np.inf) if since is None or since.size != size else since
+
+
+def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:
+    theta = signals["theta_mech_rad"]
+    eps = model.machine.pole_pairs * theta
+    return Recorded(
+        i_a=signals.get("id_a", np.zeros(theta.size)) + 1j * signals["iq_a"],
+        torque_nm=signals.get("torque_shaft_nm", np.zeros(theta.size)),
+        eps_rad=eps,
+        omega_e_rad_s=np.gradient(eps, segment.ts_s),
+        ts_s=segment.ts_s,
+        inverter=True,
+        instrument=segment.instrument,
+    )
+
+
+def _true_current(recorded: Recorded, model: Model, values: Values) -> Complex:
+    recorded = replace(recorded, i_a=recorded.i_a / (1.0 + values["gain_current"]))
+    for effect in model.effects:
+        if effect.current is not None:
+            q = values_of(effect, model.machine, values)
+            recorded = replace(recorded, i_a=effect.current(recorded, q))
+    return recorded.i_a
+
+
+def angle_error(x: Operating, model: Model, values: Values) -> Array:
+    """Recorded less true electrical angle [n, rad] by the sensor effects of a model."""
+    total = np.zeros(x.omega_rad_s.shape)
+    for effect in model.effects:
+        if effect.angle is not None:
+            total = total + effect.angle(x, values_of(effect, model.machine, values))
+    return total
+
+
+def _operate_still(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    n = next(iter(signals.values())).size
+    zero = np.zeros(n)
+    if segment.kind == "terminal":
+        eps = np.full(n, segment.fixed.get("theta_elec_rad", 0.0))
+        stationary = (
+            2
+            / math.sqrt(3)
+            * signals["i_pair_a"]
+            * np.exp(1j * (segment.fixed["pair_rad"] - math.pi / 6))
+        )
+        phase = int(segment.fixed["phase"])
+        bench = Recorded(
+            stationary, zero, eps, zero, segment.ts_s, False, segment.instrument, phase
+        )
+        current = _true_current(bench, model, values) * np.exp(-1j * eps)
+        freq = zero
+    elif segment.kind == "lcr":
+        eps, current = np.radians(signals["theta_elec_deg"]), np.zeros(n, dtype=complex)
+        freq = signals.get("freq_hz", zero)
+    else:
+        eps, freq = zero, zero
+        current = signals["id_a"] + 1j * signals["iq_a"]
+        table = Recorded(current, zero, eps, zero, segment.ts_s, False, segment.instrument)
+        current = _true_current(table, model, values)
+    x = _operating(segment, signals, model, values, current, zero, zero, freq)
+    return replace(x, eps_rad=eps)
+
+
+def _operate_table(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """A held rotor, which creeps the way it came, or levels of d current at steady speeds."""
+    n = next(iter(signals.values())).size
+    zero = np.zeros(n)
+    theta = signals.get("theta_mech_rad", zero)
+    omega = signals["omega_mech_rad_s"] if segment.kind == "steady" else _CRAWL * signals["sense"]
+    eps = model.machine.pole_pairs * theta
+    recorded = Recorded(
+        signals.get("id_a", zero) + 1j * signals.get("iq_a", zero),
+        zero,
+        eps,
+        model.machine.pole_pairs * omega,
+        segment.ts_s,
+        False,
+        segment.instrument,
+    )
+    current = _true_current(recorded, model, values)
+    freq = np.abs(omega) * model.machine.pole_pairs / (2 * math.pi)
+    return _operating(segment, signals, model, values, current, theta, omega, freq)
+
+
+def current_slope(segment: Segment, model: Model, values: Values) -> float:
+    """True q ampere a recorded one: residuals of a current stay in the sensor's own units, or a
+    gain would win by shrinking what it is blamed for.
+    """
+    zero = np.zeros(4)
+    nothing = Recorded(
+        zero.astype(np.complex128), zero, zero, zero, segment.ts_s, False, segment.instrument
+    )
+    ampere = replace(nothing, i_a=np.full(4, 1j))
+    moved = _true_current(ampere, model, values) - _true_current(nothing, model, values)
+    return float(moved[0].imag)

@@ -1,0 +1,93 @@
+"""Terms inside an effect: those that the captures do not pay for are left out.
+
+Reference: Schwarz, Ann. Stat. 6 (1978), the price of a parameter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.system import Fitted, System, gauss_newton, own_columns
+
+
+def trimmed(
+    segments: Sequence[Segment], fitted: Fitted, around: System, names: Sequence[str]
+) -> tuple[Fitted, System]:
+    """The fit with the optional terms of the named effects that do not pay left out.
+
+    A term pays when −2 log L falls by more than ln n a parameter. What to first order does not pay
+    is left out in one refit; if that loses more than foreseen, the cheapest term alone is. One term
+    with an amplitude always stays.
+    """
+    price = math.log(max(around.size, 2))
+    for name in names:
+        effect = next(e for e in fitted.model.effects if e.name == name)
+        spare = _spare(fitted, around, effect, price)
+        for terms in (spare, spare[:1]) if len(spare) > 1 else (spare,):
+            if not terms:
+                break
+            parameters = _parameters(fitted, effect, terms)
+            tried = _without(segments, fitted, around, effect, terms)
+            if tried[1].misfit - around.misfit < price * len(parameters):
+                fitted, around = tried
+                break
+    return fitted, around
+
+
+def _parameters(fitted: Fitted, effect: Effect, terms: Sequence[int]) -> tuple[str, ...]:
+    """Full names of the parameters of some terms."""
+    mine = effect.parameters_of(fitted.model.machine)
+    return tuple(f"{effect.name}.{p.name}" for p in mine if p.optional in terms)
+
+
+def _spare(fitted: Fitted, around: System, effect: Effect, price: float) -> tuple[int, ...]:
+    """The optional terms that do not pay to first order, the cheapest first."""
+    parameters = effect.parameters_of(fitted.model.machine)
+    left = sorted({p.optional for p in parameters} - {0})
+    gone: list[int] = []
+    while True:
+        costs = []
+        for term in left:
+            if any(p.amplitude and p.optional not in (*gone, term) for p in parameters):
+                names = _parameters(fitted, effect, (*gone, term))
+                more = len(names) * price
+                costs.append((_loss(fitted, around, names) - more, term))
+        cheapest = min(costs, default=(0.0, 0))
+        if cheapest[0] >= 0.0:
+            return tuple(gone)
+        gone.append(cheapest[1])
+        left.remove(cheapest[1])
+
+
+def _loss(fitted: Fitted, around: System, names: Sequence[str]) -> float:
+    """Rise of misfit, to first order, when these parameters go to zero and the rest refits."""
+    own = np.arange(len(own_columns(fitted.model)))
+    out = np.array([n for n in own if around.columns[n].name in names], dtype=int)
+    stay = np.setdiff1d(own, out)
+    move = np.array([-fitted.values[around.columns[n].name] for n in out])
+    moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
+    return moved.best(stay).misfit - around.misfit
+
+
+def _without(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    around: System,
+    effect: Effect,
+    terms: Sequence[int],
+) -> tuple[Fitted, System]:
+    """The refit without some terms; columns of all else are taken over."""
+    gone = _parameters(fitted, effect, terms)
+    less = replace(effect, left_out=tuple(sorted({*effect.left_out, *terms})))
+    effects = tuple(less if e.name == effect.name else e for e in fitted.model.effects)
+    values = {name: v for name, v in fitted.values.items() if name not in gone}
+    start = replace(fitted, model=replace(fitted.model, effects=effects), values=values)
+    own = f"{effect.name}."
+    named = [replace(c, name=f"-{c.name}") if c.name.startswith(own) else c for c in around.columns]
+    return gauss_newton(segments, start, before=replace(around, columns=tuple(named)))

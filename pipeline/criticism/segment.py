@@ -1,0 +1,108 @@
+"""One capture's signals for one kind of equation: what every residual is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.noise import rounding_step
+from pipeline.numerics.projection import Projection
+from pipeline.records.capture import Capture
+
+Kind = Literal[
+    "dq", "q", "shaft", "motion", "open", "terminal", "lcr", "flux_map", "steady", "standing"
+]
+_REFERENCE_DEGC = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One capture's signals [n] for one kind of equation, with its weak form.
+
+    `recorded` holds capture columns on an even clock of period `ts_s`; `noise` the standard
+    deviation of each one's sensor. `channels` are the equations: the recorded signal that each
+    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` the
+    nuisance that is its voltmeter's gain; `angle_step_rad` is the resolution of an angle whose
+    noise is its rounding. `blocks` [W]
+    numbers the parts of a capture that are held out one by one where there is no other capture to
+    predict it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the
+    capture may have.
+    """
+
+    capture: str
+    test: str
+    kind: Kind
+    instrument: str
+    timing: str
+    ts_s: float
+    recorded: Mapping[str, Array]
+    noise: Mapping[str, float]
+    channels: tuple[str, ...]
+    weak: Projection | None
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    meter: str = "gain_voltage"
+    angle_step_rad: float = 0.0
+    blocks: NDArray[np.int64] | None = None
+    offsets: Array | None = None
+
+    @property
+    def size(self) -> int:
+        """Samples."""
+        return int(next(iter(self.recorded.values())).size)
+
+
+def segment_of(
+    capture: Capture,
+    kind: Kind,
+    instrument: str,
+    period: float,
+    found: Mapping[str, Array],
+    noise: Mapping[str, float],
+    channels: tuple[str, ...],
+    weak: Projection | None,
+    blocks: NDArray[np.int64] | None = None,
+    offsets: Array | None = None,
+    **fixed: float,
+) -> Segment:
+    """A segment with what the capture's metadata says of it."""
+    stated = capture.meta.ambient_degc
+    ambient = 0.0 if stated is None else stated - _REFERENCE_DEGC
+    timing = capture.meta.voltage_timing
+    return Segment(
+        capture.path,
+        capture.meta.test,
+        kind,
+        instrument,
+        timing,
+        period,
+        found,
+        noise,
+        channels,
+        weak,
+        {"ambient_k": ambient, **fixed},
+        "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage",
+        rounding_step(found["theta_mech_rad"]) if "theta_mech_rad" in found else 0.0,
+        blocks,
+        offsets,
+    )
+
+
+def electrical_orders(machine: Machine) -> tuple[int, ...]:
+    """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn."""
+    p = machine.pole_pairs
+    return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p}))
+
+
+def slow_orders(machine: Machine) -> tuple[int, ...]:
+    """Orders a turn looked at in a slow turn."""
+    seen = set(electrical_orders(machine)) | set(machine.torque_orders)
+    if machine.slots:
+        cogging = math.lcm(machine.slots, 2 * machine.pole_pairs)
+        seen |= {machine.slots, cogging, 2 * cogging}
+    return tuple(sorted(seen))

@@ -1,0 +1,86 @@
+"""A rotor held at many angles: the holding current, averaged in cells of angle and sense."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.segment import Segment, segment_of
+from pipeline.numerics.orders import TURN_RAD, passes
+from pipeline.records.capture import Capture
+
+_CELLS = 1024
+_SECTORS = 24
+_FEW = 4
+
+
+def standing(capture: Capture, _: Machine) -> Segment | None:
+    """Mean angle, current and sense of arrival of every cell; sectors are held out one by one.
+
+    The noise of a cell's mean comes from the scatter within cells about a straight line, with its
+    correlation from sample to sample; a loop that holds does not repeat better than that.
+    """
+    if not capture.has("theta_mech_rad", "iq_a"):
+        return None
+    found = capture.arrays("theta_mech_rad", "iq_a")
+    fine = np.isfinite(found["theta_mech_rad"]) & np.isfinite(found["iq_a"])
+    theta, current = found["theta_mech_rad"][fine], found["iq_a"][fine]
+    rows, spread = [], []
+    for part, sense in passes(theta):
+        cells, left = _cells(theta[part], current[part])
+        rows.append(np.column_stack([cells, np.full(cells.shape[0], float(sense))]))
+        spread += left
+    if not rows or sum(len(r) for r in rows) < _SECTORS:
+        return None
+    table = np.concatenate(rows)
+    recorded = {"theta_mech_rad": table[:, 0], "iq_a": table[:, 1], "sense": table[:, 2]}
+    noise = {"iq_a": _noise(spread, current)}
+    sectors = sectors_of(table[:, 0])
+    return segment_of(
+        capture, "standing", "drive", 1.0, recorded, noise, ("iq_a",), None, blocks=sectors
+    )
+
+
+def _cells(theta: Array, current: Array) -> tuple[Array, list[Array]]:
+    """Mean angle and current [K, 2] of the cells of one pass, and the scatter in each."""
+    number = np.floor(theta / TURN_RAD * _CELLS).astype(np.int64)
+    order = np.argsort(number, kind="stable")
+    edges = np.flatnonzero(np.diff(number[order])) + 1
+    means, left = [], []
+    for rows in np.split(order, edges):
+        means.append((theta[rows].mean(), current[rows].mean()))
+        if rows.size >= _FEW:
+            left.append(_about_a_line(theta[rows], current[rows]))
+    return np.array(means), left
+
+
+def _about_a_line(theta: Array, current: Array) -> Array:
+    at = theta - theta.mean()
+    power = float(at @ at)
+    slope = float(at @ current) / power if power > 0 else 0.0
+    rest: Array = current - current.mean() - slope * at
+    return rest
+
+
+def _noise(spread: list[Array], current: Array) -> float:
+    """Standard deviation [A] of a cell's mean; never below a ten-thousandth of the largest."""
+    least = 1e-4 * float(np.abs(current).max())
+    if not spread:
+        return max(least, 1e-12)
+    power = sum(float(s @ s) for s in spread)
+    n = sum(s.size for s in spread)
+    after = sum(float(s[1:] @ s[:-1]) for s in spread)
+    alike = min(max(after / power, 0.0), 0.99) if power > 0 else 0.0
+    a_cell = n / len(spread)
+    free = max(a_cell * (1.0 - alike) / (1.0 + alike), 1.0)
+    scatter = math.sqrt(power / max(n - 2 * len(spread), 1))
+    return max(scatter / math.sqrt(free), least)
+
+
+def sectors_of(theta: Array) -> NDArray[np.int64]:
+    """Number of the sector of the turn that each angle [n] is in."""
+    turn = np.mod(theta, TURN_RAD) / TURN_RAD
+    return np.minimum((turn * _SECTORS).astype(np.int64), _SECTORS - 1)

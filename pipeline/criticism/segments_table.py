@@ -1,0 +1,91 @@
+"""Tables without a clock: flux linkages of currents, or the steady voltages they make at speed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.segment import Segment, segment_of
+from pipeline.records.capture import Capture
+
+_FLUX_NOISE = 1e-3
+_LEAST_NOISE = 1e-5
+_FEW_LEVELS = 4
+
+
+def flux_table(capture: Capture, _: Machine) -> Segment | None:
+    """The segment of a `flux_map` capture: flux linkages where there are any, else voltages."""
+    if capture.has("id_a", "iq_a", "psi_d_wb", "psi_q_wb"):
+        return _linkages(capture)
+    if capture.has("id_a", "omega_mech_rad_s", "vq_v"):
+        return _steady(capture)
+    return None
+
+
+def _linkages(capture: Capture) -> Segment:
+    names = ("id_a", "iq_a", "psi_d_wb", "psi_q_wb")
+    found = capture.arrays(*names)
+    noise = {name: _FLUX_NOISE * float(np.ptp(found[name])) for name in names}
+    levels = levels_of(found["id_a"])
+    # rows of one d current are held out together: a map is often its own mirror image in i_q
+    blocks = levels if levels.max(initial=0) + 1 >= _FEW_LEVELS else None
+    channels = ("psi_d_wb", "psi_q_wb")
+    return segment_of(
+        capture, "flux_map", "drive", 1.0, found, noise, channels, None, blocks=blocks
+    )
+
+
+def _steady(capture: Capture) -> Segment | None:
+    """Levels of d current, each run at several speeds: v_q, the drop of i_q taken off.
+
+    Each level has its own offset, which is free: what the inverter loses along q turns with the
+    current. The noise is the scatter of a level's voltages about a straight line over speed.
+    """
+    found = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
+    levels = levels_of(found["id_a"])
+    count = int(levels.max(initial=0)) + 1
+    freedom = found["vq_v"].size - 2 * count
+    if freedom < count:
+        return None
+    volts = found["vq_v"]
+    power = sum(
+        _scatter(found["omega_mech_rad_s"][levels == k], volts[levels == k]) for k in range(count)
+    )
+    least = _LEAST_NOISE * float(np.abs(volts).max())
+    noise = {"vq_v": max(math.sqrt(power / freedom), least)}
+    offsets = np.abs(volts).max() * (levels[None, :] == np.arange(count)[:, None])
+    return segment_of(
+        capture,
+        "steady",
+        "drive",
+        1.0,
+        found,
+        noise,
+        ("vq_v",),
+        None,
+        blocks=levels,
+        offsets=offsets.astype(float),
+    )
+
+
+def _scatter(speed: Array, volts: Array) -> float:
+    """Sum of squares of one level's voltages about a straight line over speed."""
+    design = np.column_stack([np.ones(speed.size), speed])
+    left = volts - design @ np.linalg.lstsq(design, volts, rcond=None)[0]
+    return float(left @ left)
+
+
+def levels_of(current: Array) -> NDArray[np.int64]:
+    """Number of the level [n] that each current is at; levels are parted by a gap between them.
+
+    A gap is a step of the sorted currents of more than a hundredth of their range.
+    """
+    order = np.argsort(current, kind="stable")
+    parted = np.diff(current[order]) > 1e-2 * float(np.ptp(current))
+    number = np.concatenate([[0], np.cumsum(parted)])
+    levels = np.empty(current.size, dtype=np.int64)
+    levels[order] = number
+    return levels

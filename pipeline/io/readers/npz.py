@@ -1,0 +1,58 @@
+"""numpy archives: every numeric array is a field, a complex one two, in row order."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.io.foreign import Reader
+from pipeline.io.raw_table import RawTable
+from pipeline.records.errors import CaptureError
+
+_MOST_BYTES = 1 << 30
+
+
+def read(data: bytes) -> RawTable:
+    """Fields `NAME`, or `NAME.real` and `NAME.imag`; tables are laid out row after row.
+
+    Objects are never unpickled. Raises CaptureError for what is no archive, or too large unpacked.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(member.file_size for member in archive.infolist()) > _MOST_BYTES:
+                raise CaptureError("limit", "it unpacks to more than 1 GiB", "split it")
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            fields = _fields({name: arrays[name] for name in sorted(arrays.files)})
+    except (zipfile.BadZipFile, ValueError, KeyError, EOFError, OSError) as fault:
+        raise CaptureError(
+            "not_npz",
+            f"it is no numpy archive of plain arrays: {fault}",
+            "save it with numpy.savez",
+        ) from fault
+    if len({values.size for values in fields.values()}) > 1:
+        raise CaptureError(
+            "lengths", "its arrays differ in length", "save arrays of one length together"
+        )
+    return RawTable("npz", fields)
+
+
+def _fields(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    found: dict[str, np.ndarray] = {}
+    for name, values in arrays.items():
+        if np.iscomplexobj(values):
+            found[f"{name}.real"] = values.real.ravel()
+            found[f"{name}.imag"] = values.imag.ravel()
+        elif np.issubdtype(values.dtype, np.number):
+            found[name] = values.ravel()
+    return found
+
+
+def metadata(_: bytes) -> Mapping[str, str]:
+    """An archive says nothing of itself."""
+    return {}
+
+
+READER = Reader("npz", read, metadata)

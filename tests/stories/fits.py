@@ -1,0 +1,64 @@
+"""Models fitted to the shared real recordings, with their errors on what was held out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.criticism.judge import leave_out, signal_errors
+from pipeline.criticism.optional import trimmed
+from pipeline.criticism.residuals import measured, residual
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.segments import segments
+from pipeline.criticism.size import machine_of
+from pipeline.criticism.specification import model_of
+from pipeline.criticism.system import Fitted, System, first_fit, own_columns
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.stages.campaigns import campaigns, start_constants
+
+REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One model of one motor: its segments, values, and rms of each signal held out."""
+
+    segments: tuple[Segment, ...]
+    fitted: Fitted
+    around: System
+    held_out: Mapping[str, float]
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        return self.fitted.values
+
+    def segment(self, kind: str) -> Segment:
+        return next(s for s in self.segments if s.kind == kind)
+
+    def curves(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
+        """Measured and modelled signals [C, n] of a segment."""
+        segment = self.segment(kind)
+        seen = measured(segment, segment.recorded, self.fitted.model, self.values)
+        return seen, seen - residual(segment, self.fitted.model, self.values)
+
+
+def campaign(folder: str, motor: str | None = None) -> Campaign:
+    return campaigns(str(REAL / folder), motor=motor)[0][0]
+
+
+def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bool = True) -> Fit:
+    """The ideal model with effects, optional terms left out where they do not pay."""
+    start = start_constants(found)
+    machine = machine_of(found, start)
+    parts = tuple(s for s in segments(found, machine) if not kinds or s.kind in kinds)
+    if not offsets:
+        parts = tuple(replace(s, offsets=None) for s in parts)
+    model = model_of(ModelSpec("ideal", effects), machine)
+    fitted, around = trimmed(parts, *first_fit(parts, model), effects)
+    held = leave_out(around, len(own_columns(fitted.model)), parts)
+    left = np.where(np.isfinite(held.residual), held.residual, around.residual)
+    return Fit(parts, fitted, around, signal_errors(around, left))

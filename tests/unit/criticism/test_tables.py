@@ -1,0 +1,144 @@
+"""Captures without a clock of their own, logs of one axis, bounds and optional terms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.bounds import bounded_step
+from pipeline.criticism.effect import Machine
+from pipeline.criticism.linearise import Column
+from pipeline.criticism.model import Model, values_of
+from pipeline.criticism.orders import holding_orders, sector_errors
+from pipeline.criticism.registry import effects
+from pipeline.criticism.segments_log import q_log
+from pipeline.criticism.segments_standing import standing
+from pipeline.criticism.segments_table import flux_table, levels_of
+from pipeline.records.capture import Capture, CaptureMeta
+
+MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
+
+
+def capture(test: str, **columns) -> Capture:
+    table = pl.DataFrame({name: np.asarray(c, float) for name, c in columns.items()})
+    return Capture(f"{test}.csv", "0", "unverified", CaptureMeta("m", test), (table,))
+
+
+def held(orders: dict[int, float], noise: float, seed: int = 1) -> Capture:
+    """One turn forwards and back, 6000 holds each, friction of 0.05 A."""
+    turn = np.linspace(0.0, 2 * np.pi, 6000)
+    theta = np.concatenate([turn, turn[::-1]])
+    sense = np.repeat([1.0, -1.0], 6000)
+    rng = np.random.default_rng(seed)
+    current = 0.05 * sense + rng.normal(0.0, noise, theta.size)
+    current += sum(a * np.sin(k * theta + k) for k, a in orders.items())
+    return capture("holding_current", theta_mech_rad=theta, iq_a=current)
+
+
+def test_cells_of_a_held_rotor_keep_the_sense_of_arrival_and_their_own_noise():
+    segment = standing(held({30: 0.1}, 0.01), MACHINE)
+    forward = segment.recorded["sense"] > 0
+    assert abs(forward.sum() - (~forward).sum()) <= 2
+    mean = segment.recorded["iq_a"][forward].mean()
+    assert mean == pytest.approx(0.05, abs=0.002)
+    # six holds a cell
+    assert segment.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(6000 / 1024), rel=0.2)
+    assert set(segment.blocks.tolist()) == set(range(24))
+
+
+def test_orders_that_repeat_are_found_and_noise_adds_none():
+    true = {5: 0.01, 12: 0.02, 30: 0.1}
+    assert holding_orders([held(true, 0.01)], (5, 6)) == (5, 12, 30)
+    assert holding_orders([held({}, 0.01)], (5, 6)) == ()
+
+
+def test_held_out_sectors_expose_orders_that_only_fit():
+    some = [held({30: 0.1}, 0.01)]
+    fitted, out = sector_errors(some, (30,))
+    many, trap = sector_errors(some, range(1, 200))
+    assert out < 1.05 * fitted
+    assert many < fitted
+    assert trap > 3 * fitted
+
+
+def test_levels_are_parted_by_gaps_whatever_their_order():
+    current = np.array([0.0, -10.01, -5.0, -9.99, 0.01, -5.02])
+    assert levels_of(current).tolist() == [2, 0, 1, 0, 2, 1]
+
+
+def test_steady_voltages_have_an_offset_a_level_and_are_held_out_by_level():
+    current = np.repeat([0.0, -4.0, -8.0, -12.0], 6)
+    speed = np.tile(np.linspace(50.0, 100.0, 6), 4)
+    volts = 0.1 * (current == 0.0) + 5 * speed * (0.01 + 1e-4 * current)
+    segment = flux_table(
+        capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts), MACHINE
+    )
+    assert segment.kind == "steady"
+    assert segment.offsets.shape == (4, 24)
+    assert segment.blocks.tolist() == levels_of(current).tolist()
+
+
+def test_readings_that_came_late_are_set_aside_in_a_log_of_the_q_axis():
+    time = np.arange(4000) * 1e-3
+    time[2000:2007] = time[2006] + np.arange(7) * 1e-4
+    theta = 20.0 * time
+    log = capture(
+        "drive",
+        t_s=time,
+        vq_v=np.sin(time),
+        iq_a=np.cos(time),
+        theta_mech_rad=theta,
+        omega_mech_rad_s=np.full(4000, 20.0),
+    )
+    voltage, motion = q_log(log, MACHINE)
+    assert voltage.channels == ("vq_v", "omega_mech_rad_s")
+    assert motion.channels == ("torque_shaft_nm",)
+    starts, length = voltage.weak.starts, voltage.weak.length
+    assert not np.any((starts <= 2003) & (starts + length > 2003))
+    assert starts.min() < 500 and starts.max() > 3500
+    assert q_log(capture("drive", t_s=time, vq_v=theta, iq_a=theta), MACHINE) is None
+
+
+@dataclass
+class Quadratic:
+    """The least of (x − target)' A (x − target) along some of the coordinates, from `at`."""
+
+    a: np.ndarray
+    target: np.ndarray
+    at: np.ndarray
+
+    def best(self, places):
+        slope = self.a @ (self.at - self.target)
+        part = self.a[np.ix_(places, places)]
+
+        @dataclass
+        class End:
+            step: np.ndarray
+
+        return End(-np.linalg.solve(part, slope[places]))
+
+
+def test_the_others_take_up_what_a_parameter_at_its_bound_cannot_do():
+    """Windage may not be negative; Coulomb friction goes to its best value without it."""
+    both = tuple(effects()[n] for n in ("coulomb_friction", "windage"))
+    model = Model(Machine(1, None, {"torque_nm": 1.0}), both)
+    columns = [Column("coulomb_friction.torque_nm", 1.0), Column("windage.drag_nm", 1.0)]
+    a = np.array([[2.0, 1.5], [1.5, 2.0]])
+    target, at = np.array([0.5, -0.3]), np.array([0.1, 0.0])
+    values = {c.name: float(v) for c, v in zip(columns, at, strict=True)}
+    step = bounded_step(Quadratic(a, target, at).best, columns, model, values)
+    assert step[1] == 0.0
+    alone = target[0] + a[0, 1] / a[0, 0] * target[1]
+    assert at[0] + step[0] == pytest.approx(alone)
+
+
+def test_a_term_that_is_left_out_is_zero_and_no_parameter():
+    full = effects()["saturation"]
+    less = replace(full, left_out=(2, 5))
+    names = [p.name for p in less.parameters_of(MACHINE)]
+    assert names == ["q_fall", "d_odd", "d_fall"]
+    q = values_of(less, MACHINE, {f"saturation.{n}": 0.1 for n in names})
+    assert q == {"q_fall": 0.1, "q_bend": 0.0, "d_odd": 0.1, "d_fall": 0.1, "d_bend": 0.0}
