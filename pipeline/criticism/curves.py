@@ -153,7 +153,7 @@ def fine(variable: Variable, machine: Machine) -> Basis:
     """Hats narrow enough for any curve that the sketch may try, and the waves they miss."""
     nodes = _nodes(variable)
     periodic = variable.kind == "turn"
-    high = ()
+    high: tuple[int, ...] = ()
     if periodic:
         high = tuple(k for k in _orders(variable, machine) if k > LOWEST[-1])
     names = tuple(f"k{n}" for n in range(nodes.size)) + _wave_names(high)

@@ -25,7 +25,8 @@ from pipeline.criticism.model import (
     values_of,
 )
 from pipeline.criticism.noise import rounding_error
-from pipeline.criticism.residuals import RIPPLES, measured, operate, predicted, residual
+from pipeline.criticism.operate import operate
+from pipeline.criticism.residuals import RIPPLES, measured, predicted, residual
 from pipeline.criticism.segment import Segment
 
 _CHUNK = 32

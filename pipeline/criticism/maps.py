@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import Segment
-from pipeline.criticism.segments import slow_orders
+from pipeline.criticism.segment import Segment, slow_orders
 from pipeline.criticism.system import Fitted, System
 from pipeline.numerics.cell_means import cell_means, visits_of
 from pipeline.physics.glossary import suffix_of

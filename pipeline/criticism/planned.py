@@ -10,8 +10,7 @@ import numpy as np
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import Segment
-from pipeline.criticism.segments import electrical_orders, slow_orders
+from pipeline.criticism.segment import Segment, electrical_orders, slow_orders
 from pipeline.criticism.system import Fitted
 from pipeline.numerics.projection import projection, window_starts
 
@@ -77,7 +76,7 @@ def _torque_map(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     keep = np.tile(np.arange(_DWELL) > _DWELL // 4, len(levels))
     made = []
     for speed in _SPEEDS:
-        theta = speed * machine.scales["speed_rad_s"] * period * np.arange(i_d.size)
+        theta: Array = speed * machine.scales["speed_rad_s"] * period * np.arange(i_d.size)
         recorded = {
             "id_a": current * i_d,
             "iq_a": current * i_q,
@@ -140,7 +139,7 @@ def _spin_down(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     length = tau * math.log((top + rest) / (0.1 * top + rest))
     period = length / _COAST
     t = period * np.arange(_COAST)
-    theta = (top + rest) * tau * (1.0 - np.exp(-t / tau)) - rest * t
+    theta: Array = (top + rest) * tau * (1.0 - np.exp(-t / tau)) - rest * t
     return [
         _shaft(
             f"planned spin_down {sign}",
@@ -159,7 +158,7 @@ def _cogging(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     orders = slow_orders(fitted.model.machine)
     n = _SAMPLES_AN_ORDER * max(orders)
     period = 2 * math.pi / _SLOW_RAD_S / n
-    theta = _SLOW_RAD_S * period * np.arange(n + 3)
+    theta: Array = _SLOW_RAD_S * period * np.arange(n + 3)
     return [
         _shaft(
             f"planned cogging {sign}",

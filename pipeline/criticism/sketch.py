@@ -72,7 +72,9 @@ class Expression:
         if not rows:
             return np.zeros(np.shape(v))
         slope = np.stack(rows)
-        return np.sqrt(np.maximum(np.einsum("iv,ij,jv->v", slope, self.covariance, slope), 0.0))
+        variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
+        found: Array = np.sqrt(np.maximum(variance, 0.0))
+        return found
 
     def u(self, term: int, name: str) -> float:
         """Standard uncertainty of a term's amplitude or scale."""
@@ -241,8 +243,10 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
         found = [list(group) for group in groups]
         for (g, n, name), one in zip(places, z, strict=True):
             old = groups[g][n]
-            fresh = old.scale * math.exp(one) if name == "scale" else old.centre + one
-            found[g][n] = replace(found[g][n], **{name: fresh})
+            if name == "scale":
+                found[g][n] = replace(found[g][n], scale=old.scale * math.exp(one))
+            else:
+                found[g][n] = replace(found[g][n], centre=old.centre + one)
         return [tuple(group) for group in found]
 
     def loss(z: Array) -> float:

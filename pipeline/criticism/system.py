@@ -22,7 +22,7 @@ from pipeline.criticism.linearise import (
     rough_floor,
     zero,
 )
-from pipeline.criticism.model import BASE, Model
+from pipeline.criticism.model import BASE, PHYSICAL, Model
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import sparse
 from pipeline.criticism.size import base_scales
@@ -32,6 +32,7 @@ _ITERATIONS = 8
 _SEED = 20260302
 _THREADS = 2
 _MOVED = 0.05
+_REACH = 1.0
 _STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm", "j_kgm2")
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 _CONVERGED = 1.0
@@ -356,7 +357,8 @@ def gauss_newton(
     """
     around = system(segments, fitted, before=before)
     for _ in range(iterations):
-        step = bounded_step(around.best, around.columns, fitted.model, fitted.values)
+        damped = replace(around, penalty=around.penalty + _ridge(fitted, around.columns))
+        step = bounded_step(damped.best, around.columns, fitted.model, fitted.values)
         for _ in range(_HALVINGS):
             moved = _moved(fitted, around.columns, step)
             if renew:
@@ -373,6 +375,22 @@ def gauss_newton(
         if not renew and gain < _CONVERGED:
             break
     return fitted, around
+
+
+def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:
+    """Inverse variance [P] of one step, not of where it ends: what the captures hardly know does
+    not leap out of the range in which the equations are near their tangent.
+
+    References: [1] Marquardt, SIAM J. Appl. Math. 11 (1963).
+    """
+    machine = fitted.model.machine
+    reach = {name: _REACH * abs(fitted.values[name]) for name in PHYSICAL}
+    for name, (_, p) in fitted.model.parameters().items():
+        if p.amplitude:
+            reach[name] = 3.0 * max(abs(fitted.values[name]), p.typical * machine.scale(p))
+    spans = np.array([reach.get(column.name, np.inf) for column in columns])
+    ridge: Array = np.maximum(spans, 1e-30) ** -2
+    return ridge
 
 
 def _moved(fitted: Fitted, columns: Sequence[Column], step: Array) -> Fitted:

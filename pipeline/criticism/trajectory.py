@@ -21,7 +21,8 @@ from pipeline.criticism.effect import Array, Complex, Operating, Values
 from pipeline.criticism.linearise import reading_error
 from pipeline.criticism.maps import disjoint
 from pipeline.criticism.model import Model, air_gap_torque, evaluate
-from pipeline.criticism.residuals import measured, operate, predicted
+from pipeline.criticism.operate import operate
+from pipeline.criticism.residuals import measured, predicted
 from pipeline.criticism.segment import Segment
 
 ROUNDS = 15

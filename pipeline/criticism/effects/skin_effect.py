@@ -9,7 +9,7 @@ def _drop(x: Operating, q: Values) -> Complex:
     relative = x.freq_hz / x.machine.scales["freq_hz"]
     rise = q["rise"] * relative**2 / (1.0 + (relative / q["knee"]) ** 2)
     if not x.inverter:
-        rise = q["meter_rise"] * (x.freq_hz > 0.0)
+        rise = q["meter_rise"] * (x.freq_hz > 0.0).astype(float)
     drop: Complex = x.base["r_ohm"] * rise * x.i_a
     return drop
 
