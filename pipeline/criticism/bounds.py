@@ -48,9 +48,9 @@ def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Va
     while live.size:
         moved = best(live).step
         out = [
-            int(n)
-            for n, change in zip(live, moved, strict=True)
-            if _leaves(values[columns[n].name], float(change), limits.get(columns[n].name))
+            n
+            for n, change in zip(live.tolist(), moved.tolist(), strict=True)
+            if _leaves(values[columns[n].name], change, limits.get(columns[n].name))
         ]
         if not out:
             step[live] = moved

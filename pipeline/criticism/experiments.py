@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, chndtr
 
 from pipeline.criticism.effect import Array, Effect
-from pipeline.criticism.linearise import Column, linearise, noise_floor
+from pipeline.criticism.floors import noise_floor
+from pipeline.criticism.linearise import Column, linearise
 from pipeline.criticism.planned import PLANNED, planned
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import Candidate

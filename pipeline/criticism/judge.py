@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
-from pipeline.criticism.linearise import channel_scale
+from pipeline.criticism.floors import channel_scale
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import System
 from pipeline.records.diagnosis import Remainder

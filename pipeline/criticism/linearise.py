@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
+from pipeline.criticism.floors import offsets, reading_error, told_unit, window_gain
 from pipeline.criticism.model import (
     BASE,
     GAINS,
@@ -23,25 +24,15 @@ from pipeline.criticism.model import (
     evaluate,
     mean_current,
     values_of,
+    zero,
 )
-from pipeline.criticism.noise import rounding_error
 from pipeline.criticism.operate import operate
 from pipeline.criticism.residuals import RIPPLES, measured, predicted, residual
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, projected, row_index
 
 _CHUNK = 32
-_REPLICATES = 2
-_POOLED = 128
-_ALLOWANCE = 5e-5
-_MODEL_DRIVE = 1e-4
-_MODEL_BENCH = 2e-5
-_OFFSET = 0.5
 # what complex steps leave of a term that is zero
 _NOTHING = 1e-40
-_ZERO = 2e-3
-_ROUGH = 0.05
-_FORM = 0.02
-_LINE = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,86 +71,6 @@ class Rows:
     groups: tuple[tuple[str, int], ...]
 
 
-def projected(segment: Segment, sampled: Array) -> Array:
-    """Weak samples [C, W, M] of sampled channels [C, n]; a table is its own projection."""
-    if segment.weak is None:
-        return sampled[:, :, None]
-    return segment.weak.project(sampled)
-
-
-def row_index(
-    segment: Segment,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], tuple[tuple[str, int], ...]]:
-    """Group and window of every weak sample [C, W, M], which are valid, and the group names."""
-    weak = segment.weak
-    orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
-    windows = segment.size if weak is None else weak.starts.size
-    valid = np.ones((windows, 1), dtype=bool) if weak is None else weak.valid
-    distinct = sorted(set(orders.tolist()))
-    groups = tuple((c, k) for c in segment.channels for k in distinct)
-    number = {group: n for n, group in enumerate(groups)}
-    shape = (len(segment.channels), windows, orders.size)
-    table = np.array([[number[(c, k)] for k in orders.tolist()] for c in segment.channels])
-    group = np.broadcast_to(table[:, None, :], shape)
-    window = np.broadcast_to(np.arange(windows)[None, :, None], shape)
-    return group, window, np.broadcast_to(valid[None], shape), groups
-
-
-def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
-    """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
-
-    White noise of each sensor's own level, and the rounding of an angle that is rounded, is added
-    to the recording and the residual computed again; the variance of the change is pooled over
-    windows of one (channel, order).
-    """
-    group, _, valid, groups = row_index(segment)
-    plain = projected(segment, residual(segment, model, values))
-    total, count = np.zeros(len(groups)), np.zeros(len(groups))
-    wanted = _POOLED // max(int(valid.sum()) // max(len(groups), 1), 1)
-    for replicate in range(min(max(wanted, _REPLICATES), _POOLED)):
-        generator = np.random.default_rng([seed, replicate])
-        noisy = {
-            name: column + generator.normal(0.0, segment.noise.get(name, 0.0), column.size)
-            for name, column in segment.recorded.items()
-        }
-        if segment.angle_step_rad:
-            theta = segment.recorded["theta_mech_rad"]
-            shift = generator.uniform(-0.5, 0.5)
-            noisy["theta_mech_rad"] = theta + rounding_error(theta, segment.angle_step_rad, shift)
-        change = projected(segment, residual(segment, model, values, noisy)) - plain
-        np.add.at(total, group[valid], change[valid] ** 2)
-        np.add.at(count, group[valid], 1.0)
-    return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
-
-
-def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
-    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
-    _, _, _, groups = row_index(segment)
-    scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
-    floor: Array = _ROUGH * _gain(segment) / _told(segment, values) * np.array(scales)
-    return floor
-
-
-def form_tolerance(
-    segment: Segment, model: Model, values: Values, added: Sequence[Effect]
-) -> Array:
-    """What the forms of the effects that were added may be wrong by [groups], as weak samples.
-
-    No formula of an effect is better than a fiftieth of what the effect does. Error below that,
-    where a found effect acts, tells of its form and names no further effect.
-    """
-    group, _, valid, groups = row_index(segment)
-    total = np.zeros(len(groups))
-    here = residual(segment, model, values) if added else np.zeros(0)
-    for effect in added:
-        without = residual(segment, model, {**values, **zero(effect, model)})
-        power = projected(segment, without - here)[valid] ** 2
-        count = np.bincount(group[valid], minlength=len(groups))
-        total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
-    floor: Array = _FORM * np.sqrt(total)
-    return floor
-
-
 def linearise(
     segment: Segment,
     model: Model,
@@ -196,106 +107,11 @@ def linearise(
             flush()
     flush()
     both = np.column_stack([projected(segment, here)[valid] * whiten, kept])
-    for offset in _offsets(segment, valid, whiten):
+    for offset in offsets(segment, valid, whiten):
         both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
-    unit = _told(segment, values) / (whiten * _gain(segment))
+    unit = told_unit(segment, values) / (whiten * window_gain(segment))
     soft = floor * whiten
     return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, groups)
-
-
-def _told(segment: Segment, values: Values) -> float:
-    """The channel's own unit a unit of the residual: a free shaft's is an acceleration [rad/s²]."""
-    return values["j_kgm2"] if segment.kind == "motion" else 1.0
-
-
-def _gain(segment: Segment) -> float:
-    """Weak sample that a constant of one makes in the plain window."""
-    weak = segment.weak
-    return 1.0 if weak is None or weak.starts.size == 0 else float(weak.functions[0, 0].sum())
-
-
-def reading_error(segment: Segment, model: Model, values: Values) -> Array:
-    """What no model of a bench gets right to, as weak samples [C, W, M].
-
-    5e-5 of the reading in a window, since no sensor is more linear than that, and a part of the
-    machine's own scale for what happens between samples: 1e-4 under a drive, 2e-5 on a bench. An
-    effect that hides in this is nobody's concern, and structure that is smaller names nothing.
-    """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros((len(segment.channels), segment.size, 1))
-    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
-    sizes = []
-    for channel in segment.channels:
-        if channel == "torque_shaft_nm" and segment.kind == "dq":
-            sizes.append(kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"]))
-        elif channel in ("vd_v", "vq_v"):
-            names = ("vd_v", "vq_v") if segment.kind in ("dq", "q") else ("vab_v", "vbc_v")
-            present = [segment.recorded[n] for n in names if n in segment.recorded]
-            sizes.append(np.sqrt(sum(column**2 for column in present)))
-        else:
-            sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
-    reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
-    reading[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
-    part = _MODEL_DRIVE if segment.kind in ("dq", "q", "motion") else _MODEL_BENCH
-    scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
-    own = part * _gain(segment) / _told(segment, values) * np.array(scales)[:, None, None]
-    both: Array = np.hypot(reading, own)
-    if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
-        place = segment.channels.index("torque_shaft_nm")
-        both[place] = np.hypot(both[place], _encoder_lines(segment, values))
-    return both
-
-
-def _encoder_lines(segment: Segment, values: Values) -> Array:
-    """Torque [W, M] that a line of the encoder's own error makes on an order k, as weak samples.
-
-    Rounding at steady speed is periodic in the angle; of its harmonics, some beat with the sampling
-    on to any order. J (k ω)² times 0.03 steps is the 10th of them [Widrow & Kollar (2008), ch. 20].
-    """
-    weak = segment.weak
-    if weak is None:
-        return np.zeros((segment.size, 1))
-    theta = segment.recorded["theta_mech_rad"]
-    span = (weak.length - 1) * segment.ts_s
-    omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
-    step = math.sqrt(12.0) * segment.noise["theta_mech_rad"]
-    wave = _gain(segment) / math.sqrt(2.0) * _LINE * step * values["j_kgm2"]
-    lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
-    return lines
-
-
-def channel_scale(segment: Segment, channel: str, model: Model, values: Values) -> float:
-    """The machine's own size in a channel's unit; of a bench meter its largest reading."""
-    if channel == "torque_shaft_nm":
-        return model.machine.scales["torque_nm"]
-    if channel == "omega_mech_rad_s" and segment.kind == "q":
-        return model.machine.scales["speed_rad_s"]
-    if channel == "omega_mech_rad_s":
-        return model.machine.scales["torque_nm"] / values["j_kgm2"]
-    if segment.kind in ("dq", "q", "open", "steady"):
-        return model.machine.scales["voltage_v"]
-    return float(np.abs(segment.recorded[channel]).max())
-
-
-def _offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
-    """Whitened weak samples of an offset of each channel's sensor, of its prior size."""
-    if segment.offsets is not None:
-        return [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
-    if segment.weak is None:
-        return []
-    made = []
-    for place, channel in enumerate(segment.channels):
-        names = ("vab_v",) if segment.kind == "open" else (channel,)
-        prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
-        if segment.kind == "terminal":
-            prior = math.hypot(prior, _ZERO * float(np.abs(segment.recorded[channel]).max()))
-        if segment.kind == "open" or prior == 0.0:
-            continue
-        constant = np.zeros((len(segment.channels), segment.size))
-        constant[place] = prior
-        made.append(projected(segment, constant)[valid] * whiten)
-    return made
 
 
 def _absorbed(power: float) -> float:
@@ -417,7 +233,10 @@ class _Sampler:
         effect = column.effect
         if effect is None or effect in self.model.effects:
             return self.model, self.values
-        return self.model.with_effects(effect), {**self.values, **zero(effect, self.model, column)}
+        return self.model.with_effects(effect), {
+            **self.values,
+            **zero(effect, self.model, column.at),
+        }
 
     def _hook(self, column: Column, effect: Effect) -> Array | None:
         if not self._listens(effect):
@@ -476,17 +295,6 @@ class _Sampler:
         drop = still if effect.drop is None else effect.drop(self.mean, q)
         drag = nothing if effect.torque is None else effect.torque(x, q)
         return Pieces(flux, slope, drop, drag)
-
-
-def zero(effect: Effect, model: Model, column: Column | None = None) -> dict[str, float]:
-    """Values of an effect that is not there: amplitudes zero, shapes at `column.at` or first."""
-    shapes = {} if column is None else dict(column.at)
-    found = {}
-    for p in effect.parameters_of(model.machine):
-        name = f"{effect.name}.{p.name}"
-        scale = model.machine.scale(p)
-        found[name] = 0.0 if p.amplitude else shapes.get(p.name, p.scan[0] * scale)
-    return found
 
 
 def base_columns(scales: Mapping[str, float]) -> list[Column]:

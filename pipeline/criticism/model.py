@@ -12,7 +12,7 @@ Woodson & Melcher, Electromechanical Dynamics (1968), ch. 3 (torque from co-ener
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -194,3 +194,14 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
         if effect.torque is not None:
             drag = drag + effect.torque(x, q)
     return Pieces(flux, slope, drop, drag)
+
+
+def zero(effect: Effect, model: Model, at: Iterable[tuple[str, float]] = ()) -> dict[str, float]:
+    """Values of an effect that is not there: amplitudes zero, shapes as in `at` or the first."""
+    shapes = dict(at)
+    found = {}
+    for p in effect.parameters_of(model.machine):
+        name = f"{effect.name}.{p.name}"
+        scale = model.machine.scale(p)
+        found[name] = 0.0 if p.amplitude else shapes.get(p.name, p.scan[0] * scale)
+    return found

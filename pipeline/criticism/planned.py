@@ -76,7 +76,7 @@ def _torque_map(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     keep = np.tile(np.arange(_DWELL) > _DWELL // 4, len(levels))
     made = []
     for speed in _SPEEDS:
-        theta: Array = speed * machine.scales["speed_rad_s"] * period * np.arange(i_d.size)
+        theta = speed * machine.scales["speed_rad_s"] * period * np.arange(i_d.size, dtype=float)
         recorded = {
             "id_a": current * i_d,
             "iq_a": current * i_q,
@@ -158,7 +158,7 @@ def _cogging(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     orders = slow_orders(fitted.model.machine)
     n = _SAMPLES_AN_ORDER * max(orders)
     period = 2 * math.pi / _SLOW_RAD_S / n
-    theta: Array = _SLOW_RAD_S * period * np.arange(n + 3)
+    theta = _SLOW_RAD_S * period * np.arange(n + 3, dtype=float)
     return [
         _shaft(
             f"planned cogging {sign}",

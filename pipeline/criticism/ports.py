@@ -117,13 +117,18 @@ def _torque_ports(machine: Machine) -> list[Port]:
     ]
 
 
+def _constant(unit: complex) -> Callable[[Operating], Any]:
+    return lambda _: unit
+
+
+def _with_speed(unit: complex, speed_rad_s: float) -> Callable[[Operating], Any]:
+    return lambda x: unit * x.omega_rad_s / float(f"{speed_rad_s:.6g}")
+
+
 def _drop_ports(machine: Machine) -> list[Port]:
     """Drops of a drive's log: along an axis, along the current, at right angles to the flux."""
     speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
-    d, q = (
-        Carrier((), "", code, lambda _, unit=unit: unit)
-        for code, unit in (("1.0", 1.0), ("1j", 1j))
-    )
+    d, q = (Carrier((), "", code, _constant(unit)) for code, unit in (("1.0", 1.0), ("1j", 1j)))
     along = Carrier(
         ("id_a", "iq_a"),
         f"(id_a + j iq_a)/({current:.4g} A)",
@@ -135,7 +140,7 @@ def _drop_ports(machine: Machine) -> list[Port]:
             ("omega_mech_rad_s",),
             f"omega_mech_rad_s/({speed:.4g} rad/s)",
             f"{code} * x.omega_rad_s / {speed:.6g}",
-            lambda x, unit=unit: unit * x.omega_rad_s / float(f"{speed:.6g}"),
+            _with_speed(unit, speed),
         )
         for code, unit in (("1.0", 1.0), ("1j", 1j))
     ]

@@ -93,6 +93,31 @@ def segment_of(
     )
 
 
+def projected(segment: Segment, sampled: Array) -> Array:
+    """Weak samples [C, W, M] of sampled channels [C, n]; a table is its own projection."""
+    if segment.weak is None:
+        return sampled[:, :, None]
+    return segment.weak.project(sampled)
+
+
+def row_index(
+    segment: Segment,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], tuple[tuple[str, int], ...]]:
+    """Group and window of every weak sample [C, W, M], which are valid, and the group names."""
+    weak = segment.weak
+    orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
+    windows = segment.size if weak is None else weak.starts.size
+    valid = np.ones((windows, 1), dtype=bool) if weak is None else weak.valid
+    distinct = sorted(set(orders.tolist()))
+    groups = tuple((c, k) for c in segment.channels for k in distinct)
+    number = {group: n for n, group in enumerate(groups)}
+    shape = (len(segment.channels), windows, orders.size)
+    table = np.array([[number[(c, k)] for k in orders.tolist()] for c in segment.channels])
+    group = np.broadcast_to(table[:, None, :], shape)
+    window = np.broadcast_to(np.arange(windows)[None, :, None], shape)
+    return group, window, np.broadcast_to(valid[None], shape), groups
+
+
 def electrical_orders(machine: Machine) -> tuple[int, ...]:
     """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn."""
     p = machine.pole_pairs

@@ -207,7 +207,17 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
     if capture.meta.test == "resistance":
         weak = _settled(weak, amps, noise["i_pair_a"])
     return segment_of(
-        capture, "terminal", "bench", period, found, noise, ("v_pair_v",), weak, **fixed
+        capture,
+        "terminal",
+        "bench",
+        period,
+        found,
+        noise,
+        ("v_pair_v",),
+        weak,
+        blocks=None,
+        offsets=None,
+        **fixed,
     )
 
 

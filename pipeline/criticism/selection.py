@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
-from pipeline.criticism.linearise import Column, effect_columns, zero
+from pipeline.criticism.linearise import Column, effect_columns
+from pipeline.criticism.model import zero
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import (

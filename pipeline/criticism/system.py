@@ -12,17 +12,9 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.bounds import BASE_LIMITS, bounded_step
 from pipeline.criticism.effect import Array, Effect, Machine, Values
-from pipeline.criticism.linearise import (
-    Column,
-    base_columns,
-    effect_columns,
-    form_tolerance,
-    linearise,
-    noise_floor,
-    rough_floor,
-    zero,
-)
-from pipeline.criticism.model import BASE, PHYSICAL, Model
+from pipeline.criticism.floors import form_tolerance, noise_floor, rough_floor
+from pipeline.criticism.linearise import Column, base_columns, effect_columns, linearise
+from pipeline.criticism.model import BASE, PHYSICAL, Model, zero
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import sparse
 from pipeline.criticism.size import base_scales

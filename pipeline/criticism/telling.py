@@ -130,7 +130,8 @@ def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
         first = 2 * few.orders.index(order)
         block[:, first : first + 2] = 0.0
         block[fine.nodes.size + 2 * n, first] = block[fine.nodes.size + 2 * n + 1, first + 1] = 1.0
-    return np.kron(np.eye(len(pursuit.port.carriers)), block)
+    every: Array = np.asarray(np.kron(np.eye(len(pursuit.port.carriers)), block), dtype=float)
+    return every
 
 
 def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:

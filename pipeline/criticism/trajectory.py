@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Operating, Values
-from pipeline.criticism.linearise import reading_error
+from pipeline.criticism.floors import reading_error
 from pipeline.criticism.maps import disjoint
 from pipeline.criticism.model import Model, air_gap_torque, evaluate
 from pipeline.criticism.operate import operate

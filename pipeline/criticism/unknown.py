@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.linearise import Column, effect_columns
@@ -129,7 +130,7 @@ def _ranked(
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
-def _ridge(columns: Sequence[Column], live: Array, fitted: Fitted) -> Array:
+def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fitted: Fitted) -> Array:
     """Inverse prior variance [k] of a port's coefficients: the machine's own scale."""
     machine = fitted.model.machine
     scales = []
@@ -153,11 +154,11 @@ def _simplest(found: Sequence[Found]) -> Found:
     return min((one for one in simple if one.held >= level), key=lambda one: one.place)
 
 
-def _segment_of(around: System) -> Array:
+def _segment_of(around: System) -> NDArray[np.int64]:
     return np.array([number for number, _, _ in around.labels])[around.group]
 
 
-def _carried(around: System, own: Array, left: Array) -> frozenset[int]:
+def _carried(around: System, own: NDArray[np.int64], left: Array) -> frozenset[int]:
     """Segments without which some constant of the model is lost: they are always in the fit."""
     weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
     live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
@@ -176,7 +177,7 @@ def _carried(around: System, own: Array, left: Array) -> frozenset[int]:
     return frozenset(carried)
 
 
-def _calm(around: System, places: Array, left: Array, ridge: Array) -> Array:
+def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
     """Step [k] of least misfit in which a curve and a constant of one shape do not run away."""
     weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
     matrix = around.matrix[:, places]
@@ -189,7 +190,7 @@ def _calm(around: System, places: Array, left: Array, ridge: Array) -> Array:
 
 
 def _held_out(
-    around: System, places: Array, left: Array, ridge: Array, carried: frozenset[int]
+    around: System, places: NDArray[np.int64], left: Array, ridge: Array, carried: frozenset[int]
 ) -> float:
     """Misfit of every capture as predicted without it, by the columns at `places`.
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.effects import cogging
-from pipeline.criticism.linearise import zero
-from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of
+from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of, zero
 from pipeline.criticism.registry import chosen, effects
 from pipeline.physics.glossary import COLUMNS, TESTS
 from pipeline.records.errors import UsageError

@@ -10,7 +10,7 @@ from scipy.stats import ncx2
 
 from pipeline.criticism import experiments
 from pipeline.criticism.experiments import separations
-from pipeline.criticism.linearise import noise_floor
+from pipeline.criticism.floors import noise_floor
 from pipeline.criticism.model import Model
 from pipeline.criticism.planned import PLANNED, planned
 from pipeline.criticism.registry import effects

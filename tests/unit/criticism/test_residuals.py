@@ -5,18 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.criticism.linearise import (
-    effect_columns,
-    linearise,
-    noise_floor,
-    projected,
-    row_index,
-    zero,
-)
-from pipeline.criticism.model import Model
+from pipeline.criticism.floors import noise_floor
+from pipeline.criticism.linearise import effect_columns, linearise
+from pipeline.criticism.model import Model, zero
 from pipeline.criticism.noise import sensor_noise
 from pipeline.criticism.registry import effects
 from pipeline.criticism.residuals import residual
+from pipeline.criticism.segment import projected, row_index
 from tests.unit.criticism.machines import BASE, log, machine
 
 LIBRARY = effects()
@@ -53,13 +48,14 @@ def test_a_column_is_the_change_of_the_whole_residual(name):
     """The hook's own column against a residual computed anew with the effect in the model."""
     effect, segment = LIBRARY[name], log()
     sigma = noise_floor(segment, PLAIN, BASE, 1)
+    strict = np.zeros(sigma.size)
     columns = effect_columns(effect, PLAIN)
     model = PLAIN.with_effects(effect)
     start = {**BASE, **zero(effect, model)}
-    before = linearise(segment, PLAIN, BASE, columns, sigma)
+    before = linearise(segment, PLAIN, BASE, columns, sigma, strict)
     for n, column in enumerate(columns):
         moved = {**start, column.name: start[column.name] + column.step}
-        after = linearise(segment, model, moved, [], sigma)
+        after = linearise(segment, model, moved, [], sigma, strict)
         expected = (after.residual - before.residual) / column.step
         size = np.abs(expected).max()
         assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)

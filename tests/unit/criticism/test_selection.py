@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.judge import leave_out, remainder
-from pipeline.criticism.linearise import zero
-from pipeline.criticism.model import Model
+from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.selection import candidates, score_all, search, widened

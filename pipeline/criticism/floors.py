@@ -1,0 +1,176 @@
+"""What no model of a bench gets right to: noise of the sensors, reading errors, offsets, form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array, Effect, Values
+from pipeline.criticism.model import Model, zero
+from pipeline.criticism.noise import rounding_error
+from pipeline.criticism.residuals import residual
+from pipeline.criticism.segment import Segment, projected, row_index
+
+_REPLICATES = 2
+_POOLED = 128
+_ALLOWANCE = 5e-5
+_MODEL_DRIVE = 1e-4
+_MODEL_BENCH = 2e-5
+_OFFSET = 0.5
+_ZERO = 2e-3
+_ROUGH = 0.05
+_FORM = 0.02
+_LINE = 0.03
+
+
+def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
+    """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
+
+    White noise of each sensor's own level, and the rounding of an angle that is rounded, is added
+    to the recording and the residual computed again; the variance of the change is pooled over
+    windows of one (channel, order).
+    """
+    group, _, valid, groups = row_index(segment)
+    plain = projected(segment, residual(segment, model, values))
+    total, count = np.zeros(len(groups)), np.zeros(len(groups))
+    wanted = _POOLED // max(int(valid.sum()) // max(len(groups), 1), 1)
+    for replicate in range(min(max(wanted, _REPLICATES), _POOLED)):
+        generator = np.random.default_rng([seed, replicate])
+        noisy = {
+            name: column + generator.normal(0.0, segment.noise.get(name, 0.0), column.size)
+            for name, column in segment.recorded.items()
+        }
+        if segment.angle_step_rad:
+            theta = segment.recorded["theta_mech_rad"]
+            shift = generator.uniform(-0.5, 0.5)
+            noisy["theta_mech_rad"] = theta + rounding_error(theta, segment.angle_step_rad, shift)
+        change = projected(segment, residual(segment, model, values, noisy)) - plain
+        np.add.at(total, group[valid], change[valid] ** 2)
+        np.add.at(count, group[valid], 1.0)
+    return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
+
+
+def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
+    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
+    _, _, _, groups = row_index(segment)
+    scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
+    floor: Array = _ROUGH * window_gain(segment) / told_unit(segment, values) * np.array(scales)
+    return floor
+
+
+def form_tolerance(
+    segment: Segment, model: Model, values: Values, added: Sequence[Effect]
+) -> Array:
+    """What the forms of the effects that were added may be wrong by [groups], as weak samples.
+
+    No formula of an effect is better than a fiftieth of what the effect does. Error below that,
+    where a found effect acts, tells of its form and names no further effect.
+    """
+    group, _, valid, groups = row_index(segment)
+    total = np.zeros(len(groups))
+    here = residual(segment, model, values) if added else np.zeros(0)
+    for effect in added:
+        without = residual(segment, model, {**values, **zero(effect, model)})
+        power = projected(segment, without - here)[valid] ** 2
+        count = np.bincount(group[valid], minlength=len(groups))
+        total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
+    floor: Array = _FORM * np.sqrt(total)
+    return floor
+
+
+def reading_error(segment: Segment, model: Model, values: Values) -> Array:
+    """What no model of a bench gets right to, as weak samples [C, W, M].
+
+    5e-5 of the reading in a window, since no sensor is more linear than that, and a part of the
+    machine's own scale for what happens between samples: 1e-4 under a drive, 2e-5 on a bench. An
+    effect that hides in this is nobody's concern, and structure that is smaller names nothing.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros((len(segment.channels), segment.size, 1))
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+    sizes = []
+    for channel in segment.channels:
+        if channel == "torque_shaft_nm" and segment.kind == "dq":
+            sizes.append(kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"]))
+        elif channel in ("vd_v", "vq_v"):
+            names = ("vd_v", "vq_v") if segment.kind in ("dq", "q") else ("vab_v", "vbc_v")
+            present = [segment.recorded[n] for n in names if n in segment.recorded]
+            sizes.append(np.sqrt(sum(column**2 for column in present)))
+        else:
+            sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
+    reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
+    reading[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
+    part = _MODEL_DRIVE if segment.kind in ("dq", "q", "motion") else _MODEL_BENCH
+    scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
+    own = part * window_gain(segment) / told_unit(segment, values) * np.array(scales)[:, None, None]
+    both: Array = np.hypot(reading, own)
+    if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
+        place = segment.channels.index("torque_shaft_nm")
+        both[place] = np.hypot(both[place], _encoder_lines(segment, values))
+    return both
+
+
+def _encoder_lines(segment: Segment, values: Values) -> Array:
+    """Torque [W, M] that a line of the encoder's own error makes on an order k, as weak samples.
+
+    Rounding at steady speed is periodic in the angle; of its harmonics, some beat with the sampling
+    on to any order. J (k ω)² times 0.03 steps is the 10th of them [Widrow & Kollar (2008), ch. 20].
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros((segment.size, 1))
+    theta = segment.recorded["theta_mech_rad"]
+    span = (weak.length - 1) * segment.ts_s
+    omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
+    step = math.sqrt(12.0) * segment.noise["theta_mech_rad"]
+    wave = window_gain(segment) / math.sqrt(2.0) * _LINE * step * values["j_kgm2"]
+    lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
+    return lines
+
+
+def channel_scale(segment: Segment, channel: str, model: Model, values: Values) -> float:
+    """The machine's own size in a channel's unit; of a bench meter its largest reading."""
+    if channel == "torque_shaft_nm":
+        return model.machine.scales["torque_nm"]
+    if channel == "omega_mech_rad_s" and segment.kind == "q":
+        return model.machine.scales["speed_rad_s"]
+    if channel == "omega_mech_rad_s":
+        return model.machine.scales["torque_nm"] / values["j_kgm2"]
+    if segment.kind in ("dq", "q", "open", "steady"):
+        return model.machine.scales["voltage_v"]
+    return float(np.abs(segment.recorded[channel]).max())
+
+
+def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
+    """Whitened weak samples of an offset of each channel's sensor, of its prior size."""
+    if segment.offsets is not None:
+        return [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
+    if segment.weak is None:
+        return []
+    made = []
+    for place, channel in enumerate(segment.channels):
+        names = ("vab_v",) if segment.kind == "open" else (channel,)
+        prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
+        if segment.kind == "terminal":
+            prior = math.hypot(prior, _ZERO * float(np.abs(segment.recorded[channel]).max()))
+        if segment.kind == "open" or prior == 0.0:
+            continue
+        constant = np.zeros((len(segment.channels), segment.size))
+        constant[place] = prior
+        made.append(projected(segment, constant)[valid] * whiten)
+    return made
+
+
+def told_unit(segment: Segment, values: Values) -> float:
+    """The channel's own unit a unit of the residual: a free shaft's is an acceleration [rad/s²]."""
+    return values["j_kgm2"] if segment.kind == "motion" else 1.0
+
+
+def window_gain(segment: Segment) -> float:
+    """Weak sample that a constant of one makes in the plain window."""
+    weak = segment.weak
+    return 1.0 if weak is None or weak.starts.size == 0 else float(weak.functions[0, 0].sum())
