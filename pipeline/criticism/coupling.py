@@ -14,10 +14,11 @@ References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutma
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from pipeline.criticism.effect import Array, Operating
 
@@ -60,9 +61,21 @@ def present(amplitude: float, negligible: float) -> float:
 
 
 def _smooth(signal: Array, period_s: float, derivative: int) -> Array:
-    """A signal [n] or its derivative by a local quartic."""
+    """A signal [n] or its derivative by a local quartic; zero where it has no room."""
     width = max(min(2 * round(_WIDTH_S / period_s / 2) + 1, _MOST), _LEAST)
+    found = np.zeros(signal.size)
     if signal.size < width:
-        return np.zeros(signal.size)
-    found: Array = savgol_filter(signal, width, _DEGREE, deriv=derivative, delta=period_s)
+        return found
+    half = width // 2
+    inner = np.convolve(signal, _quartic(width, derivative), mode="valid")
+    found[half : signal.size - half] = inner / period_s**derivative
     return found
+
+
+@cache
+def _quartic(width: int, derivative: int) -> Array:
+    """Weights [width], last sample first, of a local quartic's derivative at its middle [3]."""
+    at = np.arange(width) - width // 2
+    rows: Array = np.linalg.pinv(np.vander(at, _DEGREE + 1, increasing=True).astype(float))
+    weights: Array = math.factorial(derivative) * rows[derivative][::-1]
+    return weights

@@ -67,6 +67,20 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
     return HeldOut(left, total, steps)
 
 
+def held_out_fall(
+    before: System, own: int, after: System, segments: Sequence[Segment] = ()
+) -> float:
+    """Fall of misfit from one system, of `own` columns, to another of the same rows, every capture
+    predicted from all the others; those that are always in the fit count as fitted.
+    """
+    misfits = []
+    for around, count in ((before, own), (after, len(after.columns))):
+        held = leave_out(around, count, segments).residual
+        left = np.where(np.isfinite(held), held, around.residual)
+        misfits.append(around.misfit_of(around.spreads(left)) + float(around.prior_costs().sum()))
+    return misfits[0] - misfits[1]
+
+
 def _units(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
     """Number of what is held out together, of every row [R]: a capture or a block of one.
 

@@ -156,6 +156,7 @@ class _Sampler:
         self.segment, self.model, self.values, self.here = segment, model, values, here
         self.x = operate(segment, segment.recorded, model, values)
         pieces = self.pieces = evaluate(model, self.x, values)
+        self.own: dict[str, Pieces] = {}
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         # a hook's own column does without the small terms between samples
@@ -245,7 +246,9 @@ class _Sampler:
         moved = {**start, column.name: start[column.name] + column.step}
         change = self._pieces(effect, moved)
         if effect in self.model.effects:
-            before = self._pieces(effect, start)
+            if effect.name not in self.own:
+                self.own[effect.name] = self._pieces(effect, start)
+            before = self.own[effect.name]
             change = Pieces(
                 change.psi_wb - before.psi_wb,
                 change.slope_wb - before.slope_wb,

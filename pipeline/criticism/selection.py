@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
+from pipeline.criticism.judge import held_out_fall
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.model import zero
 from pipeline.criticism.optional import trimmed
@@ -33,9 +34,10 @@ from pipeline.criticism.system import (
 
 LEAST_SHARE = 0.1
 TIE = 12.0
-_MOST = 8
+_MOST = 6
 _REFITS = 3
 _ROUNDS = 2
+_HELD = 0.5
 _CLOSE = 0.7
 _WORTH = 30.0
 _GLANCE = ((1.0,), 3)
@@ -263,8 +265,10 @@ def _refit_best(
 ) -> tuple[Fitted, System] | None:
     """Refits with the best candidates, those close to the best fall, and takes the best.
 
-    A candidate must keep the promise of its score: the misfit falls by more than its price.
+    A candidate must keep the promise of its score: the misfit falls by more than its price, and
+    with captures predicted from all the others by half of it at least.
     """
+    own = len(own_columns(fitted.model))
     close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
     least = math.inf
@@ -278,7 +282,9 @@ def _refit_best(
         # of two that tie, the one that some capture here was made to show
         unsought = TIE if set(effect.tests).isdisjoint(wide.tests) else 0.0
         cost = tried[1].misfit + score.price + unsought
-        if material(tried[0], effect) and cost < min(least, wide.misfit):
+        if not material(tried[0], effect) or cost >= min(least, wide.misfit):
+            continue
+        if held_out_fall(wide, own, tried[1], segments) > _HELD * score.price:
             best, least = tried, cost
     return best
 

@@ -12,16 +12,17 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 def _coenergy(x: Operating, q: Values) -> Any:
     total = 0.0
     for order in (6, 12):
-        cosine, sine = np.cos(order * x.eps_rad), np.sin(order * x.eps_rad)
-        for current, axis in ((x.id_a, "d"), (x.iq_a, "q")):
-            for wave, shape in (("cos", cosine), ("sin", sine)):
-                if size := q[f"{axis}{order}_{wave}"]:
-                    total = total + size * current * shape
+        for wave, shape in (("cos", np.cos), ("sin", np.sin)):
+            d, quadrature = q[f"d{order}_{wave}"], q[f"q{order}_{wave}"]
+            if d or quadrature:
+                total = total + (d * x.id_a + quadrature * x.iq_a) * shape(order * x.eps_rad)
     return x.base["psi_wb"] * total
 
 
 def _torque(x: Operating, q: Values) -> Array:
     slope = np.zeros(x.omega_rad_s.shape)
+    if q["ripple_share"] == 1.0:
+        return slope
     for order in (6, 12):
         cosine, sine = np.cos(order * x.eps_rad), np.sin(order * x.eps_rad)
         for current, axis in ((x.id_a, "d"), (x.iq_a, "q")):

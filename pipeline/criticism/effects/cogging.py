@@ -12,6 +12,8 @@ from pipeline.criticism.effect import Array, Effect, Machine, Operating, Paramet
 def _torque(x: Operating, q: Values) -> Array:
     drag = np.zeros(x.omega_rad_s.shape)
     for name, value in q.items():
+        if value == 0.0:
+            continue
         wave, order = name.split("_")[:2]
         angle = int(order) * x.theta_rad
         drag += value * (np.sin(angle) if wave == "sin" else np.cos(angle))

@@ -24,6 +24,8 @@ def _coenergy(x: Operating, q: Values) -> Any:
 
 
 def _torque(x: Operating, q: Values) -> Array:
+    if q["ripple_share"] == 1.0:
+        return np.zeros(x.omega_rad_s.shape)
     ld, lq = x.base["ld_h"], x.base["lq_h"]
     cosine, sine = np.cos(6 * x.eps_rad), np.sin(6 * x.eps_rad)
     products = {
