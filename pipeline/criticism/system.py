@@ -23,9 +23,9 @@ _TIE = 1e-11
 _ITERATIONS = 8
 _SEED = 20260302
 _THREADS = 2
-_MOVED = 0.05
 _REACH = 1.0
-_STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm", "j_kgm2")
+# how far a constant may move before columns are computed anew; of J the final ones are anyway
+_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05, "j_kgm2": 0.5}
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 _CONVERGED = 1.0
 _HALVINGS = 3
@@ -289,8 +289,8 @@ def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
 
 
 def _moved_base(before: Values, now: Values) -> bool:
-    """Whether a physical constant moved by more than a twentieth since."""
-    return any(abs(now[n] - before[n]) > _MOVED * abs(before[n]) for n in _STEADY)
+    """Whether a physical constant moved too far since for columns to be kept."""
+    return any(abs(now[n] - before[n]) > far * abs(before[n]) for n, far in _STEADY.items())
 
 
 def _linear(column: Column, model: Model) -> bool:

@@ -81,13 +81,21 @@ def test_a_drag_of_the_wrong_sign_is_no_friction():
 
 
 def test_an_unexplained_torque_does_not_move_the_flux():
-    """Noise weights alone would trade ψ for the torque equation's error."""
+    """Noise weights alone would trade ψ for the torque equation's error.
+
+    With no gain stated, ψ is known as the voltmeter reads it; the gains stay within 3 of their u.
+    """
 
     def drag(omega, _):
         return 0.3 * np.tanh(omega / 20.0) ** 3
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    assert fitted(segments).values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=2e-4)
+    found = fitted(segments)
+    read = found.values["psi_wb"] * (1.0 + found.values["gain_voltage"])
+    assert read == pytest.approx(BASE["psi_wb"], rel=2e-4)
+    priors = found.model.priors()
+    for name in ("gain_current", "gain_voltage", "gain_torque"):
+        assert abs(found.values[name]) < 3.0 * priors[name][1]
 
 
 def test_a_capture_left_out_is_predicted_from_the_others():
