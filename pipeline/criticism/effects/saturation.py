@@ -14,16 +14,21 @@ _STRAIGHT = 1e-4
 def _lost(square: Any, bend: float) -> Any:
     """∫ s³/(1 + bend s²) ds over s², a series where the bend is next to nothing."""
     if bend < _STRAIGHT:
-        return square**2 / 4 - bend * square**3 / 6
+        return square * square * (0.25 - bend / 6 * square)
     return (bend * square - np.log1p(bend * square)) / (2 * bend**2)
 
 
 def _coenergy(x: Operating, q: Values) -> Any:
     size = x.machine.scales["current_a"]
     d, s = x.id_a / size, x.iq_a / size
-    lost_q = x.base["lq_h"] * q["q_fall"] * _lost(s**2, q["q_bend"])
-    lost_d = x.base["ld_h"] * (q["d_odd"] * d**3 / 3 + q["d_fall"] * _lost(d**2, q["d_bend"]))
-    return -(size**2) * (lost_q + lost_d)
+    lost = 0.0
+    if q["q_fall"]:
+        lost = lost + x.base["lq_h"] * q["q_fall"] * _lost(s * s, q["q_bend"])
+    if q["d_odd"]:
+        lost = lost + x.base["ld_h"] * q["d_odd"] / 3 * d * d * d
+    if q["d_fall"]:
+        lost = lost + x.base["ld_h"] * q["d_fall"] * _lost(d * d, q["d_bend"])
+    return -(size**2) * lost
 
 
 EFFECT = Effect(
