@@ -15,7 +15,7 @@ from pipeline.criticism.effect import Array, Effect, Machine, Values
 from pipeline.criticism.floors import form_tolerance, noise_floor, rough_floor
 from pipeline.criticism.linearise import Column, base_columns, effect_columns, linearise
 from pipeline.criticism.model import BASE, PHYSICAL, Model, zero
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, row_index
 from pipeline.criticism.segments import sparse
 from pipeline.criticism.size import base_scales
 
@@ -24,6 +24,12 @@ _ITERATIONS = 8
 _SEED = 20260302
 _THREADS = 2
 _REACH = 1.0
+_SHORT = 8
+_SILENT = 1e4
+_SIDES = (
+    ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
+    ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
+)
 # how far a constant may move before columns are computed anew; of J the final ones are anyway
 _STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05, "j_kgm2": 0.5}
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
@@ -403,4 +409,23 @@ def first_fit(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System
     rough = tuple(rough_floor(segment, model, values) for segment in few)
     near, _ = gauss_newton(few, Fitted(model, values, rough))
     floor = floors(segments, model, near.values)
-    return gauss_newton(segments, replace(near, sigma=floor))
+    ends = [gauss_newton(segments, replace(near, sigma=floor))]
+    if len(segments) <= _SHORT:
+        ends += [_one_side_first(segments, replace(near, sigma=floor), side) for side in _SIDES]
+    return min(ends, key=lambda end: end[1].misfit)
+
+
+def _one_side_first(
+    segments: Sequence[Segment], near: Fitted, side: tuple[str, ...]
+) -> tuple[Fitted, System]:
+    """A fit that begins with the equations of some signals alone.
+
+    A short programme holds its equations little together: which of them is given up, where they
+    contradict each other, must not hang on where the fit began.
+    """
+    alone = tuple(
+        np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, _SILENT * sigma)
+        for segment, sigma in zip(segments, near.sigma, strict=True)
+    )
+    begun, _ = gauss_newton(segments, replace(near, sigma=alone))
+    return gauss_newton(segments, replace(begun, sigma=near.sigma))
