@@ -234,6 +234,8 @@ def search(
         scores = score_all(wide, fitted, offered)
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
+        if len(rungs) == _MOST:
+            break
         chosen = _chosen(segments, fitted, [s for s in scores if s.passes], wide)
         if chosen is None:
             break
