@@ -45,7 +45,8 @@ COPPER_1_K = 1.0 / 259.5
 MAGNET_1_K = -0.0011
 U_UNKNOWN_K = 15.0
 HOLD = "assumed:voltage_hold"
-CANDIDATES = ("zero", "acceleration", "turned", "d flux", "cross flux")
+D_FLUX = "d flux"
+CANDIDATES = ("zero", "acceleration", "turned", "cross flux")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     """Ke and R of v_q = R i_q + Ke w + L di_q/dt + V_0 sign(i_q) + w_e L_d i_d + lateness.
 
     The weak form takes w and di_q/dt without differentiating; w is the angle's own rate, since a
-    bench's speed estimate lags. Lateness of the voltage against the angle shows as Ke tau dw/dt
+    bench's speed estimate lags. The flux of the d current stands in the equation wherever i_d is
+    logged and parts from the speed. Lateness of the voltage against the angle shows as Ke tau dw/dt
     and joins, as a zero error and a turned frame do, where the data demand it. Without
     temperatures the values hold for those of the log. Reference: Messenger and Bortz 2021 (weak
     form); dq equations of IEEE Std 1812-2014.
@@ -167,7 +169,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         "acceleration": weak.integral(theta, 2),
     }
     if capture.has("id_a"):
-        found["d flux"] = weak.integral(speed * i_d)
+        found[D_FLUX] = weak.integral(speed * i_d)
     if v_d is not None:
         found["turned"] = weak.integral(speed * v_d)
     return found
@@ -217,6 +219,9 @@ def _design(
     speed = rows.speed_rad_s * (1.0 + magnet * warmer) + magnet * rows.warm_speed_k_rad_s
     extra = [rows.columns[name] for name in chosen]
     columns = [speed, cold * current, rows.columns["inductive"] * current, rows.columns["drop"]]
+    flux = rows.columns.get(D_FLUX)
+    if flux is not None and linear_fit(np.column_stack([*columns, flux]), flux).full_rank:
+        columns.append(flux)
     return np.column_stack([*columns, *extra])
 
 
@@ -225,7 +230,8 @@ def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
     candidates = {name: rows.columns[name] for name in CANDIDATES if name in rows.columns}
     candidates = {n: c for n, c in candidates.items() if n == "zero" or float(np.ptp(c)) > 0.0}
     sigma = np.ones(rows.voltage_v.size)
-    tau = autocorrelation_time(linear_fit(base, rows.voltage_v).residuals, 200)
+    rich = np.column_stack([base, *candidates.values()])
+    tau = autocorrelation_time(linear_fit(rich, rows.voltage_v).residuals, 200)
     return needed_columns(base, candidates, rows.voltage_v, sigma, level, None, tau)
 
 
