@@ -8,6 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.contracts.gates import phase_sum
+from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.validate import validate
 from pipeline.records.capture import Capture
 from tests.faults.healthy import (
@@ -133,6 +135,15 @@ def test_line_currents_sampled_too_slowly_are_not_called_swapped(rng: np.random.
     assert "swapped_phases" not in [finding.code for finding in found]
 
 
+def test_a_few_clean_rows_show_a_wrong_current_sum(rng: np.random.Generator) -> None:
+    """Warned: a thousand rows are enough for 5 % of one gain where there is little noise."""
+    few = with_rows(_three_currents(drive(MOTOR, rng), 1.05), np.arange(40000) < 1000)
+    table = few.tables[0].select("ia_a", "ib_a", "ic_a")
+    assert phase_sum.sum_share(table, LINE_CURRENTS, 3.0) > 0.01
+    white = pl.DataFrame({name: rng.normal(size=1000) for name in LINE_CURRENTS})
+    assert phase_sum.sum_share(white, LINE_CURRENTS, 0.0) == 0.0
+
+
 def test_voltages_that_do_not_sum_to_zero(rng: np.random.Generator) -> None:
     """Refused: one probe at ten to one where the others are at one to one."""
     capture = open_circuit(MOTOR, rng)
@@ -198,6 +209,14 @@ def test_speed_against_angle(
     error = refused(with_column(capture, name, factor * column(capture, name)))
     assert error.code == "speed_against_angle"
     assert words in error.message
+
+
+def test_speed_against_angle_of_a_shaft_that_ends_where_it_began(rng: np.random.Generator) -> None:
+    """Refused: a reversing drive turns as far back as forth, and is in rpm all the same."""
+    capture = drive(MOTOR, rng)
+    speed = 9.5493 * column(capture, "omega_mech_rad_s")
+    error = refused(with_column(capture, "omega_mech_rad_s", speed))
+    assert error.code == "speed_against_angle"
 
 
 def test_speed_a_tenth_off(rng: np.random.Generator) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from pipeline.fit.estimators.drive_voltage import ESTIMATOR
 from pipeline.records.constants import Constants
 from tests.recovery.simulated import MOTOR, recorded
+from tests.unit.fit.signals import capture, estimates, known_value
 
 
 @pytest.mark.parametrize("seed", [6, 37, 43, 52])
@@ -18,3 +20,35 @@ def test_the_flux_of_a_d_current_never_hides_in_the_correlation_that_it_causes(s
     assert estimate.name == "ke_phase_peak_v_s_rad"
     assert estimate.value == pytest.approx(seen, rel=3e-3)
     assert estimate.u == pytest.approx(1.1e-3 * seen, rel=0.3), "one set of terms, one uncertainty"
+
+
+@pytest.mark.parametrize("timing", ["instant", "held"])
+def test_a_mean_over_a_period_is_taken_back_to_its_instant(timing: str) -> None:
+    """At 0.6 rad (electrical) a period the mean of a turning voltage lacks 1.5 % of it."""
+    pole_pairs, ke, r, period = 10, 0.2, 0.5, 1e-3
+    t = np.arange(0.0, 8.0, period)
+    speed = 60.0 * np.sin(2.0 * np.pi * t / 4.0)
+    iq = 2.0 * np.cos(2.0 * np.pi * t / 0.7)
+    ends = (t[:, None] + period * np.linspace(0.0, 1.0, 201)).T
+    ahead = pole_pairs * 60.0 * 4.0 / (2.0 * np.pi)
+    turned = ahead * (np.cos(2.0 * np.pi * t / 4.0) - np.cos(2.0 * np.pi * ends / 4.0))
+    vector = 1j * (ke * speed + r * iq) + 0.0 * ends
+    if timing == "held":
+        vector = np.trapezoid(vector * np.exp(1j * turned), dx=1.0 / 200.0, axis=0)
+    else:
+        vector = vector[0]
+    noise = 1e-4 * np.random.default_rng(3).standard_normal((2, t.size))
+    log = capture(
+        "drive",
+        voltage_timing=timing,
+        pole_pairs=pole_pairs,
+        t_s=t,
+        theta_mech_rad=(60.0 * 4.0 / (2.0 * np.pi)) * (1.0 - np.cos(2.0 * np.pi * t / 4.0)),
+        vd_v=vector.real + noise[0],
+        vq_v=vector.imag + noise[1],
+        iq_a=iq,
+    )
+    pairs = Constants((known_value("pole_pairs", pole_pairs),))
+    found = estimates(ESTIMATOR, log, known=pairs)
+    assert found["ke_phase_peak_v_s_rad"].number == pytest.approx(ke, rel=1e-3)
+    assert found["r_phase_ohm"].number == pytest.approx(r, rel=3e-3)
