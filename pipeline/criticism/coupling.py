@@ -5,8 +5,9 @@ The far angle is θ less the twist, so that with a load at the far end
 
     T_load = S − f J (θ″ − twist″) = [T − drags − J θ″] + f J twist″,
 
-while a dynamometer that holds the far end reads S itself, [T − drags − J θ″] + f J θ″. Motor angle
-and load are recorded; the twist is a function of S. A coasting shaft passes on next to nothing.
+while a dynamometer that holds the far end, or a transducer in the coupling, reads S itself,
+[T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S. A
+coasting shaft passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
 (2002), backlash as a dead zone of the twist; [3] Savitzky & Golay, Anal. Chem. 36 (1964).
@@ -23,7 +24,7 @@ import numpy as np
 from pipeline.criticism.effect import Array, Operating
 
 _WIDTH_S = 0.004
-_MOST = 41
+_MOST = 23
 _LEAST = 7
 _DEGREE = 4
 
@@ -39,25 +40,19 @@ def passed_on(x: Operating, share: float) -> Array:
     return torque
 
 
-def far_drag(x: Operating, share: float, twist_rad: Callable[[], Array]) -> Array:
-    """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m]."""
+def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
+    """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m].
+
+    `between`: the transducer stands between the two parts, and reads S whatever holds the far end.
+    """
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
-    if not x.held:
+    if not (x.held or between):
         return -far * _smooth(twist_rad(), x.ts_s, 2)
     acceleration = np.zeros(x.theta_rad.size)
     acceleration[1:-1] = np.diff(x.theta_rad, 2) / x.ts_s**2
     return -far * acceleration
-
-
-def present(amplitude: float, negligible: float) -> float:
-    """How much of a far inertia there is, 0 to 1: all of it from 5 negligible sizes on.
-
-    What a dynamometer reads depends on the inertia behind the coupling, however stiff that is; the
-    ramp makes the effect vanish with its amplitude.
-    """
-    return min(max(amplitude / (5.0 * negligible), 0.0), 1.0)
 
 
 def _smooth(signal: Array, period_s: float, derivative: int) -> Array:

@@ -78,8 +78,9 @@ class Operating:
     speed are true shaft quantities. `inverter`: the machine is fed and logged by a drive, so that
     inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
     `ts_s` is the sample period, `travel_rad` the angle turned since the last reversal (infinite
-    before the first). `q_alone`: the log tells of the q axis only, so that of a voltage's delay its
-    envelope is what shows.
+    before the first), `run` the number of reversals before and `runs_rad` [runs] the angle turned
+    from each to the next, negative backwards. `q_alone`: the log tells of the q axis only, so that
+    of a voltage's delay its envelope is what shows.
     `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks. `held`: a
     dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
     """
@@ -101,6 +102,8 @@ class Operating:
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
     held: bool = False
+    run: NDArray[np.int64] | None = None
+    runs_rad: Array | None = None
 
     @property
     def i_a(self) -> Complex:

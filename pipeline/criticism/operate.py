@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Machine, Operating, Recorded, Values
 from pipeline.criticism.model import Model, values_of
@@ -103,6 +104,8 @@ def _operating(
         winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
         magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size, values),
         travel_rad=_travel(signals, theta.size),
+        run=_run(signals, theta.size),
+        runs_rad=segment.runs_rad,
         inverter=segment.kind in ("dq", "q"),
         q_alone=segment.kind == "q",
         ts_s=segment.ts_s,
@@ -122,6 +125,13 @@ def _warmth(
 def _travel(signals: Mapping[str, Array], size: int) -> Array:
     since = signals.get("travel_rad")
     return np.full(size, np.inf) if since is None or since.size != size else since
+
+
+def _run(signals: Mapping[str, Array], size: int) -> NDArray[np.int64]:
+    run = signals.get("run")
+    if run is None or run.size != size:
+        return np.zeros(size, dtype=np.int64)
+    return run.astype(np.int64)
 
 
 def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:

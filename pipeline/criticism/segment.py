@@ -32,7 +32,8 @@ class Segment:
     noise is its rounding. `blocks` [W]
     numbers the parts of a capture that are held out one by one where there is no other capture to
     predict it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the
-    capture may have.
+    capture may have; `runs_rad` the angles turned between reversals, of which the column `run`
+    numbers the one at hand.
     """
 
     capture: str
@@ -50,6 +51,7 @@ class Segment:
     angle_step_rad: float = 0.0
     blocks: NDArray[np.int64] | None = None
     offsets: Array | None = None
+    runs_rad: Array | None = None
 
     @property
     def size(self) -> int:
@@ -68,6 +70,7 @@ def segment_of(
     weak: Projection | None,
     blocks: NDArray[np.int64] | None = None,
     offsets: Array | None = None,
+    runs_rad: Array | None = None,
     **fixed: float,
 ) -> Segment:
     """A segment with what the capture's metadata says of it."""
@@ -90,6 +93,7 @@ def segment_of(
         rounding_step(found["theta_mech_rad"]) if "theta_mech_rad" in found else 0.0,
         blocks,
         offsets,
+        runs_rad,
     )
 
 

@@ -22,9 +22,9 @@ from pipeline.criticism.traces import (
     prepared,
     shaft_angle,
     thinned,
-    travel,
     window_of,
     with_angle,
+    with_travel,
 )
 from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Campaign, Capture
@@ -105,12 +105,12 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     size = found["vd_v"].size
     window = window_of(period, size)
     orders = electrical_orders(machine) if turned > 0.1 else ()
-    noise = prepared(found, period)
+    noise, runs = prepared(found, period)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
-    return segment_of(capture, "dq", "drive", period, found, noise, channels, weak)
+    return segment_of(capture, "dq", "drive", period, found, noise, channels, weak, runs_rad=runs)
 
 
 def _shaft(capture: Capture, machine: Machine) -> Segment | None:
@@ -127,9 +127,11 @@ def _shaft(capture: Capture, machine: Machine) -> Segment | None:
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, found, keep, channel)
     window = window_of(period, keep.size)
-    noise = prepared(found, period)
+    noise, runs = prepared(found, period)
     weak = projection(found["theta_mech_rad"], window_starts(keep, window), window, ())
-    return segment_of(capture, "shaft", "bench", period, found, noise, (channel,), weak)
+    return segment_of(
+        capture, "shaft", "bench", period, found, noise, (channel,), weak, runs_rad=runs
+    )
 
 
 def _slow_turn(
@@ -149,7 +151,7 @@ def _slow_turn(
     noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
     found = {name: decimated(column, factor) for name, column in found.items()}
-    found["travel_rad"] = travel(found["theta_mech_rad"], period * factor)
+    runs = with_travel(found, noise)
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
@@ -158,7 +160,9 @@ def _slow_turn(
     # the first and the last sample have no neighbours
     starts = 1 + window_starts(keep[1:-1], window)
     weak = projection(found["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
-    return segment_of(capture, "shaft", "bench", period * factor, found, noise, (channel,), weak)
+    return segment_of(
+        capture, "shaft", "bench", period * factor, found, noise, (channel,), weak, runs_rad=runs
+    )
 
 
 def _open(capture: Capture, machine: Machine) -> Segment | None:
@@ -172,7 +176,7 @@ def _open(capture: Capture, machine: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)
     window = window_of(period, keep.size)
-    noise = prepared(found, period)
+    noise = prepared(found, period)[0]
     found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, found["theta_mech_rad"]))
@@ -191,7 +195,7 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra))
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    noise = prepared(found, period)
+    noise = prepared(found, period)[0]
     fixed = {"pair_rad": _PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:
@@ -217,6 +221,7 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
         weak,
         blocks=None,
         offsets=None,
+        runs_rad=None,
         **fixed,
     )
 

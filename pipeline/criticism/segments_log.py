@@ -37,14 +37,18 @@ def q_log(capture: Capture, machine: Machine) -> tuple[Segment, ...] | None:
     if speed is not None:
         found["omega_mech_rad_s"] = speed
     window = window_of(period, keep.size)
-    noise = prepared(found, period)
+    noise, runs = prepared(found, period)
     starts = window_starts(keep, window)
     weak = projection(found["theta_mech_rad"], starts, window, ())
     blocks = _in_time(weak.starts + window // 2, keep.size)
     channels = ("vq_v", "omega_mech_rad_s") if speed is not None and angle else ("vq_v",)
-    made = [segment_of(capture, "q", "drive", period, found, noise, channels, weak, blocks=blocks)]
+    made = [
+        segment_of(
+            capture, "q", "drive", period, found, noise, channels, weak, blocks, runs_rad=runs
+        )
+    ]
     if angle and not capture.has("torque_shaft_nm"):
-        made.append(_motion(capture, period, found, noise, keep))
+        made.append(_motion(capture, period, found, noise, keep, runs))
     return tuple(made)
 
 
@@ -54,9 +58,10 @@ def _motion(
     found: dict[str, Array],
     noise: dict[str, float],
     keep: NDArray[np.bool_],
+    runs_rad: Array,
 ) -> Segment:
     """The shaft's motion, in a selection of the windows: waves of the angle are dear at speed."""
-    names = ("theta_mech_rad", "iq_a", "travel_rad")
+    names = ("theta_mech_rad", "iq_a", "travel_rad", "run")
     shaft = {n: found[n] for n in names}
     shaft["row"] = np.arange(keep.size, dtype=float)
     window = window_of(period, keep.size)
@@ -65,7 +70,7 @@ def _motion(
     blocks = _in_time(shaft.pop("row")[starts + window // 2], keep.size)
     channels = ("torque_shaft_nm",)
     return segment_of(
-        capture, "motion", "drive", period, shaft, noise, channels, weak, blocks=blocks
+        capture, "motion", "drive", period, shaft, noise, channels, weak, blocks, None, runs_rad
     )
 
 

@@ -30,8 +30,8 @@ _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
 )
-# how far a constant may move before columns are computed anew; of J the final ones are anyway
-_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05, "j_kgm2": 0.5}
+# how far a constant may move before columns are computed anew
+_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05, "j_kgm2": 0.05}
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 _CONVERGED = 1.0
 _HALVINGS = 3

@@ -18,7 +18,7 @@ _WINDOW_SAMPLES = 40
 _SMOOTHING_S = 0.05
 SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 PAD = 24
-_SENSE_S = 0.001
+_SLACK = 6.0
 
 
 def even_clock(
@@ -69,17 +69,46 @@ def decimated(signal: Array, factor: int) -> Array:
     return mean
 
 
-def travel(theta: Array, period: float) -> Array:
-    """Angle [n] turned since the last reversal, infinite before the first one [rad]."""
-    width = max(2 * round(_SENSE_S / period) + 1, 5)
-    sense = np.sign(smoothed(np.gradient(theta), width))
-    turned = np.flatnonzero(sense[1:] * sense[:-1] < 0) + 1
-    if turned.size == 0:
-        return np.full(theta.size, np.inf)
-    last = np.searchsorted(turned, np.arange(theta.size), side="right") - 1
-    since: Array = np.abs(theta - theta[turned[np.maximum(last, 0)]])
-    since[last < 0] = np.inf
-    return since
+def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
+    """First samples of the runs after each reversal: the extremes that an angle [n, rad] then
+    leaves by more than `slack`, which is what its noise may do.
+    """
+    step = np.diff(theta)
+    moving = np.flatnonzero(step)
+    sense = step[moving] > 0
+    extremes = moving[1:][sense[1:] != sense[:-1]]
+    found: list[int] = []
+    going, best = 0, 0
+    values = theta[extremes].tolist()
+    at = [0, *extremes.tolist(), theta.size - 1]
+    lowest = highest = (float(theta[0]), 0)
+    for place, value in zip(at, [float(theta[0]), *values, float(theta[-1])], strict=True):
+        lowest, highest = min(lowest, (value, place)), max(highest, (value, place))
+        if going <= 0 and value > lowest[0] + slack:
+            best = lowest[1]
+        elif going >= 0 and value < highest[0] - slack:
+            best = highest[1]
+        else:
+            continue
+        if going:
+            found.append(best)
+        going = 1 if value > theta[best] else -1
+        lowest = highest = (value, place)
+    return np.array(found, dtype=np.int64)
+
+
+def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
+    """Angle [n] turned since the last reversal, infinite before the first one; number of the run
+    [n]; and the angle turned in each run [runs], negative backwards [rad].
+    """
+    starts = np.concatenate([[0], reversals(theta, slack)])
+    run = np.searchsorted(starts, np.arange(theta.size), side="right") - 1
+    since = np.abs(theta - theta[starts[run]])
+    since[run == 0] = np.inf
+    ends = np.concatenate([starts[1:], [theta.size - 1]])
+    turned = theta[ends] - theta[starts]
+    turned[0] = math.copysign(math.inf, turned[0])
+    return since, run.astype(float), turned
 
 
 def thinned(
@@ -132,14 +161,24 @@ def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> Non
         found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
 
 
-def prepared(found: dict[str, Array], period: float) -> dict[str, float]:
-    """Noise of every column; smooths the temperatures and adds the travel since a reversal."""
+def prepared(found: dict[str, Array], period: float) -> tuple[dict[str, float], Array]:
+    """Noise of every column, and the shaft's runs [runs, rad]; smooths the temperatures and adds
+    the travel since a reversal.
+    """
     noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
     width = max(2 * round(_SMOOTHING_S / period) + 1, 51)
     for name in SMOOTHED:
         if name in found:
             found[name] = smoothed(found[name], width)
             noise[name] /= math.sqrt(width)
+    runs = np.array([math.inf])
     if "theta_mech_rad" in found:
-        found["travel_rad"] = travel(found["theta_mech_rad"], period)
-    return noise
+        runs = with_travel(found, noise)
+    return noise, runs
+
+
+def with_travel(found: dict[str, Array], noise: Mapping[str, float]) -> Array:
+    """Adds travel and run to the columns; returns the runs [runs, rad]."""
+    slack = _SLACK * noise["theta_mech_rad"]
+    found["travel_rad"], found["run"], runs = travel(found["theta_mech_rad"], slack)
+    return runs

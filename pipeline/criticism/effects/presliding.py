@@ -8,14 +8,31 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    missing = np.exp(-x.travel_rad / q["travel_rad"])
-    drag: Array = -2.0 * q["torque_nm"] * missing * np.sign(x.omega_rad_s)
+    drag: Array = q["torque_nm"] * (_state(x, q["travel_rad"]) - np.sign(x.omega_rad_s))
     return drag
+
+
+def _state(x: Operating, travel_rad: float) -> Array:
+    """Dahl's friction [n] over what it tends to, −1 to 1.
+
+    Within a run of sense s it is s (1 − c exp(−|Δθ|/θ_s)); of the run before there remains
+    c_r = 2 − c_(r−1) exp(−|A_(r−1)|/θ_s), A the angle turned in that run.
+    """
+    if x.run is None or x.runs_rad is None:
+        lack, sense = np.full(x.travel_rad.size, 2.0), np.sign(x.omega_rad_s)
+    else:
+        fading = np.exp(-np.abs(x.runs_rad) / travel_rad)
+        lacks = [2.0]
+        for left in fading[:-1].tolist():
+            lacks.append(2.0 - lacks[-1] * left)
+        lack, sense = np.array(lacks)[x.run], np.sign(x.runs_rad)[x.run]
+    state: Array = sense * (1.0 - lack * np.exp(-x.travel_rad / travel_rad))
+    return state
 
 
 EFFECT = Effect(
     name="presliding",
-    words="after a reversal drag swings over as T (1 − 2 exp(−|Δθ|/θ_s)), Dahl's solution",
+    words="after a reversal drag swings over as T (1 − c exp(−|Δθ|/θ_s)), Dahl's solution",
     signature="hysteresis of torque against angle within a small angle of a reversal",
     tests=("drive",),
     experiment="slow reversals under load",

@@ -1,0 +1,111 @@
+"""Drags that remember the shaft's past, and a shaft in two parts, against integration of their
+own differential equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism import coupling
+from pipeline.criticism.registry import effects
+from pipeline.criticism.traces import PAD, reversals, travel
+from tests.unit.criticism.machines import BASE, operating
+
+LIBRARY = effects()
+TS = 5e-5
+
+
+def shaft(theta: np.ndarray):
+    """An operating point that follows an angle [n], at rest in every other respect."""
+    n = theta.size
+    since, run, runs = travel(theta, 1e-9)
+    return replace(
+        operating(n),
+        id_a=np.zeros(n),
+        theta_rad=theta,
+        eps_rad=7 * theta,
+        omega_rad_s=np.gradient(theta, TS),
+        travel_rad=since,
+        run=run.astype(np.int64),
+        runs_rad=runs,
+        ts_s=TS,
+    )
+
+
+def test_dahls_friction_in_loops_within_loops():
+    """dz/dθ = (1 − z sgn ω)/θ_s, by small Euler steps, over strokes of 0.2 to 5 times θ_s."""
+    t = np.arange(12000) * TS
+    theta = 0.02 * np.sin(20 * t) + 0.004 * np.sin(131 * t) + 0.001 * np.sin(640 * t)
+    q = {"torque_nm": 0.01, "travel_rad": 0.004}
+    x = shaft(theta)
+    assert x.runs_rad.size > 25
+    z, found = 1.0, []
+    for step in np.diff(theta):
+        for _ in range(10):
+            z += (step - abs(step) * z) / 10 / q["travel_rad"]
+        found.append(z)
+    told = LIBRARY["presliding"].torque(x, q) + q["torque_nm"] * np.sign(x.omega_rad_s)
+    assert told[1:] == pytest.approx(q["torque_nm"] * np.array(found), abs=2e-4)
+
+
+def test_noise_of_an_encoder_makes_no_reversal():
+    rng = np.random.default_rng(2)
+    t = np.linspace(0.0, 1.0, 20001)
+    theta = np.sin(2 * np.pi * t) + 1e-4 * rng.standard_normal(t.size)
+    found = t[reversals(theta, 6e-4)]
+    assert found == pytest.approx([0.25, 0.75], abs=0.01)
+    assert reversals(theta[:4000], 6e-4).size == 0
+    assert reversals(theta, 1e-5).size > 100, "the noise is there"
+    assert reversals(np.zeros(9), 0.0).size == 0
+
+
+def two_masses(share: float, softness: float):
+    """Motor and far inertia under a wandering torque and load: angle, torques, coupling [n]."""
+    near, far = (1 - share) * BASE["j_kgm2"], share * BASE["j_kgm2"]
+    fine = 40
+    t = np.arange(8000 * fine) * TS / fine
+    torque = 0.3 * np.sin(290 * t) + 0.2 * np.sin(617 * t)
+    load = 0.2 * np.sin(160 * t + 1) + 0.1
+    damping = 0.2 * np.sqrt(far / softness)
+    angle, other, speed, far_speed = 0.0, 0.0, 0.0, 0.0
+    kept = np.zeros((t.size, 2))
+    for k in range(t.size):
+        through = (angle - other) / softness + damping * (speed - far_speed)
+        kept[k] = angle, through
+        speed += TS / fine * (torque[k] - through) / near
+        far_speed += TS / fine * (through - load[k]) / far
+        angle += TS / fine * speed
+        other += TS / fine * far_speed
+    return kept[::fine, 0], torque[::fine], load[::fine], kept[::fine, 1]
+
+
+@pytest.mark.parametrize("between", [0.0, 1.0])
+def test_a_compliant_shaft_is_two_masses_and_a_spring(between: float):
+    """Load, or the coupling's torque, from the motor's angle and torque to a tenth of what a
+    rigid shaft misses by.
+    """
+    share, softness = 0.33, 0.002
+    theta, torque, load, through = two_masses(share, softness)
+    x = replace(shaft(theta), torque_em_nm=torque, inverter=True)
+    q = {"share": share, "twist_rad": softness * x.machine.scales["torque_nm"], "between": between}
+    drag = LIBRARY["compliance"].torque(x, q)
+    rigid = torque.copy()
+    rigid[1:-1] -= BASE["j_kgm2"] * np.diff(theta, 2) / TS**2
+    told = through if between else load
+    inner = slice(2000, -100)
+    missed = (rigid - told)[inner]
+    assert np.std((rigid - drag - told)[inner]) < 0.1 * np.std(missed)
+
+
+def test_a_twist_smoothed_twice_stays_within_the_samples_around_a_window():
+    """Where cut windows meet the angle jumps; nothing of that may reach into a window."""
+    x = operating(400)
+    theta = np.where(np.arange(400) < 200, 0.0, 3.0)
+    x = replace(x, theta_rad=theta, torque_em_nm=np.zeros(400), inverter=True)
+    drag = coupling.far_drag(x, 0.3, False, lambda: coupling.passed_on(x, 0.3))
+    drag = np.abs(drag[60:-60])
+    touched = np.flatnonzero(drag > 1e-6 * drag.max()) + 60
+    assert touched.size and touched.min() >= 200 - PAD and touched.max() < 200 + PAD
