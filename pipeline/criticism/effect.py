@@ -25,8 +25,9 @@ class Parameter:
 
     `scale` names an entry of `Machine.scales` (`torque_nm`, `voltage_v`, ...) or is `1`.
     `typical` is a size seen on real benches, `negligible` one that nobody would act on; both are
-    magnitudes. `scan`: trial values of a shape parameter, which has no influence while the
-    amplitudes of its effect are zero; empty for an amplitude. A `choice` takes one of these values
+    magnitudes; with a shape below its negligible one the effect is not there. `scan`: trial values
+    of a shape parameter, which has no influence while the amplitudes of its effect are zero; empty
+    for an amplitude. A `choice` takes one of these values
     and is never fitted. `optional`: the parameters of one number above 0 form a term that the
     effect can do without; without it they are zero.
     """
@@ -79,8 +80,9 @@ class Operating:
     inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
     `ts_s` is the sample period, `travel_rad` the angle turned since the last reversal (infinite
     before the first), `run` the number of reversals before and `runs_rad` [runs] the angle turned
-    from each to the next, negative backwards. `q_alone`: the log tells of the q axis only, so that
-    of a voltage's delay its envelope is what shows.
+    from each to the next, negative backwards. `kept` are waves of the angle that its copies share.
+    `q_alone`: the log tells of the q axis only, so that of a voltage's delay its envelope is what
+    shows.
     `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks. `held`: a
     dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
     """
@@ -104,6 +106,17 @@ class Operating:
     held: bool = False
     run: NDArray[np.int64] | None = None
     runs_rad: Array | None = None
+    kept: dict[tuple[int, int], tuple[Any, Any, Any]] = field(default_factory=dict)
+
+    def waves(self, order: int) -> tuple[Any, Any]:
+        """Cosine and sine of `order` times the electrical angle [n], computed once an angle."""
+        eps = self.eps_rad
+        # the angle is kept with its waves, so that nothing else takes its identity
+        known = self.kept.get((id(eps), order))
+        if known is None:
+            known = eps, np.cos(order * eps), np.sin(order * eps)
+            self.kept[id(eps), order] = known
+        return known[1], known[2]
 
     @property
     def i_a(self) -> Complex:

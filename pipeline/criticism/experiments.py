@@ -128,7 +128,7 @@ def _now(
     mine = f"{effect.name}."
     others = np.array([n for n in range(own) if not wide.columns[n].name.startswith(mine)])
     places = np.concatenate([others, rival]).astype(np.int64)
-    weight = 1.0 / np.maximum(wide.spreads(wide.residual), 1.0)[wide.group]
+    weight = wide.weights(wide.spreads(wide.residual))
     matrix = _stacked(wide.matrix, _amplitudes(effect, wide.columns, fitted), places)
     normal = (matrix * weight[:, None]).T @ matrix
     return normal + np.diag(np.concatenate([[0.0], wide.penalty[places]])), places
@@ -157,7 +157,7 @@ def _plans(
 ) -> Iterator[Plan]:
     """Every experiment whose outcome can be predicted: repeats, tests not done, calibrations."""
     amplitudes = _amplitudes(effect, wide.columns, fitted)
-    weight = 1.0 / np.maximum(wide.spreads(wide.residual), 1.0)[wide.group]
+    weight = wide.weights(wide.spreads(wide.residual))
     test = np.array([wide.tests[number] for number, _, _ in wide.labels])[wide.group]
     for name in sorted(set(wide.tests)):
         rows = test == name

@@ -41,7 +41,7 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
     stay those of the full fit, so that a capture cannot vote on its own weight.
     """
     places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
-    weight = 1.0 / np.maximum(around.spreads(around.residual), 1.0)[around.group]
+    weight = around.weights(around.spreads(around.residual))
     matrix = around.matrix[:, places]
     unit = _units(around, segments)
     weighted = matrix * weight[:, None]

@@ -59,7 +59,8 @@ class Rows:
 
     `group` [R] numbers (channel, order) pairs listed in `groups`; `window` [R] the window; `unit`
     [R] is what a residual of one is as a window's mean, in the signal's own unit; `soft` [R] the
-    noise floor over what rows are divided by, below 1 where a tolerance of form is in it.
+    noise floor over what rows are divided by, below 1 where a tolerance of form is in it; `whiten`
+    [R] one over that.
     """
 
     residual: Array
@@ -68,6 +69,7 @@ class Rows:
     window: NDArray[np.int64]
     unit: Array
     soft: Array
+    whiten: Array
     groups: tuple[tuple[str, int], ...]
 
 
@@ -111,7 +113,7 @@ def linearise(
         both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
     unit = told_unit(segment, values) / (whiten * window_gain(segment))
     soft = floor * whiten
-    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, groups)
+    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
 
 
 def _absorbed(power: float) -> float:

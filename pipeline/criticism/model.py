@@ -142,7 +142,17 @@ def effect_flux(effect: Effect, x: Operating, q: Values) -> tuple[Complex, Array
 
     by_d = slope(replace(x, id_a=x.id_a + 1j * _STEP))
     by_q = slope(replace(x, iq_a=x.iq_a + 1j * _STEP))
-    return by_d + 1j * by_q, slope(replace(x, eps_rad=x.eps_rad + 1j * _STEP))
+    return by_d + 1j * by_q, slope(replace(x, eps_rad=_beside(x)))
+
+
+def _beside(x: Operating) -> Complex:
+    """The electrical angle [n] a step into the imaginary, the same array every time."""
+    known = x.kept.get((id(x.eps_rad), 0))
+    if known is None:
+        known = x.eps_rad, x.eps_rad + 1j * _STEP, None
+        x.kept[id(x.eps_rad), 0] = known
+    turned: Complex = known[1]
+    return turned
 
 
 def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:

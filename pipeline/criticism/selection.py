@@ -292,8 +292,16 @@ def _refit_best(
 
 
 def material(fitted: Fitted, effect: Effect) -> bool:
-    """Whether some amplitude of an effect is over its negligible size."""
-    return size_of(fitted, effect, "negligible") >= 1.0
+    """Whether some amplitude of an effect is over its negligible size, and every shape that has
+    one over its own.
+    """
+    machine = fitted.model.machine
+    shapes = [
+        fitted.values[f"{effect.name}.{p.name}"] >= p.negligible * machine.scale(p)
+        for p in effect.parameters_of(machine)
+        if not p.amplitude
+    ]
+    return all(shapes) and size_of(fitted, effect, "negligible") >= 1.0
 
 
 def size_of(fitted: Fitted, effect: Effect, unit: str) -> float:

@@ -168,7 +168,7 @@ class Pursuit:
             left = around.residual + matrix @ step
             spreads = around.spreads(left)
             now = around.misfit_of(spreads) + float(around.prior_costs(places, step[:own]).sum())
-            weight = 1.0 / np.maximum(spreads, 1.0)[around.group]
+            weight = around.weights(spreads)
             if abs(before - now) < _SETTLED:
                 break
             before = now
@@ -335,7 +335,7 @@ def curve_about(
     put them, since a curve and a constant of the same shape can't be told apart otherwise.
     """
     hats = pursuit.around.matrix[:, pursuit.own :] @ coarse
-    weight = 1.0 / np.maximum(pursuit.around.spreads(found.left), 1.0)[pursuit.around.group]
+    weight = pursuit.around.weights(pursuit.around.spreads(found.left))
     live = np.any(hats != 0.0, axis=0)
     normal = hats[:, live].T @ (weight[:, None] * hats[:, live])
     covariance = _inverse(normal)

@@ -31,7 +31,10 @@ _SIDES = (
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
 )
 # how far a constant may move before columns are computed anew
-_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05, "j_kgm2": 0.05}
+_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
+# the equation of a coasting shaft is drags over J
+_HEAVIER = 0.05
+_COASTING = "omega_mech_rad_s"
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 _CONVERGED = 1.0
 _HALVINGS = 3
@@ -70,7 +73,8 @@ class System:
 
     `group` [R] numbers the groups of (segment, channel, order), `labels` names them; `unit` [R] is
     what a residual of one is as a window's mean, in the signal's own unit, `soft` [R] the noise
-    floor over what rows are divided by (below 1 by a tolerance of form). Rows of a
+    floor over what rows are divided by (below 1 by a tolerance of form), `whiten` [R] one over
+    that. Rows of a
     group that misses its noise floor, χ²/n = q > 1, count 1/q: the likelihood of a group whose
     scatter is at least the floor but otherwise unknown. An equation with an effect missing so
     keeps no hold on constants that sound equations know. `penalty` [P] is the inverse prior
@@ -84,6 +88,7 @@ class System:
     window: NDArray[np.int64]
     unit: Array
     soft: Array
+    whiten: Array
     labels: tuple[tuple[int, str, int], ...]
     penalty: Array
     pull: Array
@@ -123,6 +128,19 @@ class System:
         costs: Array = pull**2 / np.where(self.penalty > 0, self.penalty, np.inf)
         return costs
 
+    def weights(self, spreads: Array) -> Array:
+        """How much each weak sample [R] counts where groups have these χ²/n."""
+        each: Array = 1.0 / np.maximum(spreads, 1.0)
+        return each[self.group]
+
+    def foreseen(self, step: Array) -> float:
+        """Misfit after a step along the first columns, to first order."""
+        places = np.arange(step.size)
+        cost = float(self.prior_costs(places, step).sum())
+        return (
+            self.misfit_of(self.spreads(self.residual + self.matrix[:, : step.size] @ step)) + cost
+        )
+
     def spreads(self, residual: Array) -> Array:
         """χ²/n [G] of each group, 1 where empty."""
         counts = self.counts
@@ -160,7 +178,7 @@ class System:
         matrix, penalty = self.matrix[:, places], np.diag(self.penalty[places])
         left, step, before = self.residual, np.zeros(places.size), np.inf
         for _ in range(rounds):
-            weight = 1.0 / np.maximum(spreads, 1.0)[self.group]
+            weight = self.weights(spreads)
             weighted = matrix * weight[:, None]
             slope = weighted.T @ self.residual + self.pull[places]
             step = -_pseudo_inverse(weighted.T @ matrix + penalty) @ slope
@@ -174,7 +192,7 @@ class System:
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance [k, k] of the parameters at `places` when they are fitted together."""
-        weight = 1.0 / np.maximum(self.spreads(self.residual), 1.0)[self.group]
+        weight = self.weights(self.spreads(self.residual))
         matrix = self.matrix[:, places]
         normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
         return _pseudo_inverse(normal)
@@ -247,20 +265,25 @@ def system(
     none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
     floor = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
     rows = _each(lambda s, both: linearise(s, model, values, new, *both), segments, floor)
-    soft = np.concatenate([r.soft for r in rows])
-    rescaled = 1.0 if before is None or not known else soft / before.soft
+    whiten = np.concatenate([r.whiten for r in rows])
     fresh = {column.key: n for n, column in enumerate(new)}
     made = np.concatenate([r.columns for r in rows])
     matrix = np.empty((made.shape[0], len(columns)))
-    for place, column in enumerate(columns):
-        old = known.get(column.key)
-        matrix[:, place] = made[:, fresh[column.key]] if old is None else old * rescaled
-    penalty, pull = _priors(model, columns, values)
     first, labels, groups = 0, [], []
     for number, one in enumerate(rows):
         labels += [(number, channel, order) for channel, order in one.groups]
         groups.append(one.group + first)
         first += len(one.groups)
+    rescaled = np.ones(whiten.size)
+    if before is not None and known:
+        rescaled = whiten / before.whiten
+        speed = np.array([segments[n].kind == "shaft" and c == _COASTING for n, c, _ in labels])
+        inertia = before.around.values["j_kgm2"] / values["j_kgm2"]
+        rescaled *= np.where(speed, inertia, 1.0)[np.concatenate(groups)]
+    for place, column in enumerate(columns):
+        old = known.get(column.key)
+        matrix[:, place] = made[:, fresh[column.key]] if old is None else old * rescaled
+    penalty, pull = _priors(model, columns, values)
     return System(
         columns=tuple(columns),
         residual=np.concatenate([r.residual for r in rows]),
@@ -268,7 +291,8 @@ def system(
         group=np.concatenate(groups),
         window=np.concatenate([r.window for r in rows]),
         unit=np.concatenate([r.unit for r in rows]),
-        soft=soft,
+        soft=np.concatenate([r.soft for r in rows]),
+        whiten=whiten,
         labels=tuple(labels),
         penalty=penalty,
         pull=pull,
@@ -287,10 +311,11 @@ def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
         return {}
     if _moved_base(before.around.values, fitted.values):
         return {}
+    heavier = abs(fitted.values["j_kgm2"] / before.around.values["j_kgm2"] - 1.0)
     return {
         column.key: before.matrix[:, place]
         for place, column in enumerate(before.columns)
-        if _linear(column, fitted.model)
+        if _linear(column, fitted.model) and (column.name != "j_kgm2" or heavier < _HEAVIER)
     }
 
 
@@ -357,6 +382,8 @@ def gauss_newton(
     for _ in range(iterations):
         damped = replace(around, penalty=around.penalty + _ridge(fitted, around.columns))
         step = bounded_step(damped.best, around.columns, fitted.model, fitted.values)
+        if not renew and around.misfit - around.foreseen(step) < _CONVERGED:
+            break
         for _ in range(_HALVINGS):
             moved = _moved(fitted, around.columns, step)
             if renew:

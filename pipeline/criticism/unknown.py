@@ -69,7 +69,7 @@ def unknown_structure(
     near = _moved(fitted, wide, best.step)
     fine = system(segments, near, effect_columns(port.effect, near.model), wide)
     own = len(own_columns(fitted.model))
-    weight = 1.0 / np.maximum(fine.spreads(best.left), 1.0)[fine.group]
+    weight = fine.weights(fine.spreads(best.left))
     pursuit = Pursuit(fine, own, port, weight)
     sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
@@ -160,7 +160,7 @@ def _segment_of(around: System) -> NDArray[np.int64]:
 
 def _carried(around: System, own: NDArray[np.int64], left: Array) -> frozenset[int]:
     """Segments without which some constant of the model is lost: they are always in the fit."""
-    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    weight = around.weights(around.spreads(left))
     live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
     matrix, segment = around.matrix[:, live], _segment_of(around)
     normal = (matrix * weight[:, None]).T @ matrix + np.diag(around.penalty[live])
@@ -179,7 +179,7 @@ def _carried(around: System, own: NDArray[np.int64], left: Array) -> frozenset[i
 
 def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
     """Step [k] of least misfit in which a curve and a constant of one shape do not run away."""
-    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    weight = around.weights(around.spreads(left))
     matrix = around.matrix[:, places]
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(around.penalty[places] + ridge)
@@ -197,7 +197,7 @@ def _held_out(
     `left` [R] is the residual at their best fit, whose weights count; captures in `carried` are
     left where they are. A coefficient that no other capture tells of stays at zero by `ridge`.
     """
-    weight = 1.0 / np.maximum(around.spreads(left), 1.0)[around.group]
+    weight = around.weights(around.spreads(left))
     matrix, segment = around.matrix[:, places], _segment_of(around)
     weighted = matrix * weight[:, None]
     penalty = np.diag(around.penalty[places] + ridge)

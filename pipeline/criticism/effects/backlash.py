@@ -30,7 +30,7 @@ EFFECT = Effect(
     reference="Nordin & Gutman, Automatica 38 (2002), controlling systems with backlash",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
-        Parameter("gap_rad", "rad", 0.005, 0.0, low=0.0, high=0.3, scan=(0.0005, 0.005)),
+        Parameter("gap_rad", "rad", 0.005, 0.0002, low=0.0, high=0.3, scan=(0.0005, 0.005)),
         Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=0.3, scan=(0.003,)),
         Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", low=0.003, high=0.1, scan=(0.02,)),
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),

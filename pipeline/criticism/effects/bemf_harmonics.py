@@ -12,10 +12,10 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 def _coenergy(x: Operating, q: Values) -> Any:
     total = 0.0
     for order in (6, 12):
-        for wave, shape in (("cos", np.cos), ("sin", np.sin)):
+        for wave, shape in zip(("cos", "sin"), x.waves(order), strict=True):
             d, quadrature = q[f"d{order}_{wave}"], q[f"q{order}_{wave}"]
             if d or quadrature:
-                total = total + (d * x.id_a + quadrature * x.iq_a) * shape(order * x.eps_rad)
+                total = total + (d * x.id_a + quadrature * x.iq_a) * shape
     return x.base["psi_wb"] * total
 
 
@@ -24,7 +24,7 @@ def _torque(x: Operating, q: Values) -> Array:
     if q["ripple_share"] == 1.0:
         return slope
     for order in (6, 12):
-        cosine, sine = np.cos(order * x.eps_rad), np.sin(order * x.eps_rad)
+        cosine, sine = x.waves(order)
         for current, axis in ((x.id_a, "d"), (x.iq_a, "q")):
             wave = q[f"{axis}{order}_sin"] * cosine - q[f"{axis}{order}_cos"] * sine
             slope = slope + order * current * wave

@@ -23,7 +23,7 @@ EFFECT = Effect(
     reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
-        Parameter("twist_rad", "rad", 0.01, 0.0, low=1e-5, high=0.3, scan=(0.002, 0.01)),
+        Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=0.3, scan=(0.002, 0.01)),
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),

@@ -10,7 +10,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _coenergy(x: Operating, q: Values) -> Any:
-    cosine, sine = np.cos(6 * x.eps_rad), np.sin(6 * x.eps_rad)
+    cosine, sine = x.waves(6)
     ld, lq = x.base["ld_h"], x.base["lq_h"]
     products = {
         "d6": 0.5 * ld * x.id_a**2,
@@ -27,7 +27,7 @@ def _torque(x: Operating, q: Values) -> Array:
     if q["ripple_share"] == 1.0:
         return np.zeros(x.omega_rad_s.shape)
     ld, lq = x.base["ld_h"], x.base["lq_h"]
-    cosine, sine = np.cos(6 * x.eps_rad), np.sin(6 * x.eps_rad)
+    cosine, sine = x.waves(6)
     products = {
         "d6": 0.5 * ld * x.id_a**2,
         "q6": 0.5 * lq * x.iq_a**2,
