@@ -40,6 +40,7 @@ _ROUNDS = 2
 _HELD = 0.5
 _CLOSE = 0.7
 _WORTH = 30.0
+_CLEAR = 0.5
 _GLANCE = ((1.0,), 3)
 _THOROUGH = ((1.0, 0.0), 20)
 _PROMISING = 0.3
@@ -211,15 +212,20 @@ def _outside(value: float, parameter: Parameter) -> bool:
 def _share(around: System, effect: Effect, before: Standing, after: Standing) -> float:
     """Largest share of the removable misfit that went away: of one recorded signal, of the
     captures of the tests that excite the effect, or of what the priors of the station cost.
+
+    An excess counts from 30 on, or from half a nat a sample where there are few.
     """
     excess = around.counts * np.log(np.maximum(before.spreads, 1.0))
     left = around.counts * np.log(np.maximum(after.spreads, 1.0))
     channel = np.array([name for _, name, _ in around.labels])
     places = [channel == name for name in dict.fromkeys(channel.tolist())]
     places.append(np.array([around.tests[n] in effect.tests for n, _, _ in around.labels]))
-    pairs = [(float(excess[inside].sum()), float(left[inside].sum())) for inside in places]
-    pairs.append((before.prior_cost, after.prior_cost))
-    return max((1.0 - still / had for had, still in pairs if had > _WORTH), default=0.0)
+    found = [
+        (float(excess[n].sum()), float(left[n].sum()), min(_WORTH, _CLEAR * around.counts[n].sum()))
+        for n in places
+    ]
+    found.append((before.prior_cost, after.prior_cost, _WORTH))
+    return max((1.0 - still / had for had, still, least in found if had > least), default=0.0)
 
 
 def search(
