@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
-from pipeline.criticism.judge import HeldOut, leave_out
+from pipeline.criticism.judge import HeldOut, leave_out, uncertainties
 from pipeline.criticism.maps import all_maps, told_signal, unit_of
 from pipeline.criticism.model import BASE, PHYSICAL, Model
 from pipeline.criticism.optional import trimmed
@@ -49,7 +49,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     simulated = simulate(found, fitted, around, held)
     residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
     maps = all_maps(found, around, residual, fitted)
-    parameters = _parameters(fitted, around)
+    parameters = _parameters(fitted, around, held)
     without = model_of(model.bare(), machine)
     bare, moved = _bare(found, fitted, without, parameters)
     return Comparison(
@@ -68,11 +68,11 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     )
 
 
-def _parameters(fitted: Fitted, around: System) -> dict[str, ModelParameter]:
+def _parameters(fitted: Fitted, around: System, held: HeldOut) -> dict[str, ModelParameter]:
     model = fitted.model
-    own = np.arange(len(own_columns(model)))
-    spread = np.sqrt(np.maximum(np.diag(around.covariance(own)), 0.0))
-    u = {around.columns[n].name: float(spread[n]) for n in own}
+    own = own_columns(model)
+    spread = uncertainties(around, held, len(own)).tolist()
+    u = {column.name: one for column, one in zip(own, spread, strict=True)}
     heard = {c.name for n, c in enumerate(around.columns) if np.any(around.matrix[:, n] != 0.0)}
     told = {
         c.name: ModelParameter(fitted.values[c.name], u[c.name], c.unit)
@@ -101,13 +101,13 @@ def _bare(
     gone = [e.name for e in fitted.model.effects if e.name not in names]
     values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
     plain, around = gauss_newton(found, Fitted(without, values, fitted.sigma))
-    before = _parameters(plain, around)
+    held = leave_out(around, len(own_columns(without)), found)
+    before = _parameters(plain, around, held)
     moved = tuple(
         Move(name, one.unit, one.value, one.u, after[name].value, after[name].u)
         for name, one in before.items()
     )
-    total = leave_out(around, len(own_columns(without)), found).total
-    return (total if math.isfinite(total) else None), moved
+    return (held.total if math.isfinite(held.total) else None), moved
 
 
 def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[SignalError]:

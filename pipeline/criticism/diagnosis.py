@@ -11,7 +11,7 @@ from scipy.special import gammaincc
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
-from pipeline.criticism.ladder import rung_record
+from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
 from pipeline.criticism.segment import Segment
@@ -186,7 +186,7 @@ def _ranking(
                 confused,
                 f"{effect.words}; {effect.signature}",
                 experiment_for(effect, confused, library),
-                _parameters(last, effect),
+                _parameters(last, effect, held[-1]),
                 separations(
                     effect,
                     confused,
@@ -229,15 +229,6 @@ def _p_value(fall: float, dof: int) -> float:
     return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
 
 
-def _parameters(rung: Rung, effect: Effect) -> dict[str, tuple[float, float, str]]:
-    own = np.arange(len(own_columns(rung.fitted.model)))
-    spread = np.sqrt(np.maximum(np.diag(rung.around.covariance(own)), 0.0))
-    u = {rung.around.columns[n].name: float(spread[n]) for n in own}
-    return {
-        p.name: (
-            float(rung.fitted.values[f"{effect.name}.{p.name}"]),
-            u.get(f"{effect.name}.{p.name}", 0.0),
-            p.unit,
-        )
-        for p in effect.parameters_of(rung.fitted.model.machine)
-    }
+def _parameters(rung: Rung, effect: Effect, held: HeldOut) -> dict[str, tuple[float, float, str]]:
+    told, start = parameters_of(rung, held), f"{effect.name}."
+    return {name.removeprefix(start): one for name, one in told.items() if name.startswith(start)}

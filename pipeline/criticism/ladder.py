@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.criticism.judge import HeldOut, signal_errors
+from pipeline.criticism.judge import HeldOut, signal_errors, uncertainties
 from pipeline.criticism.maps import (
     angle_maps,
     histograms,
@@ -34,17 +34,17 @@ def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRu
             one.signal: RungError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
             for one in errors
         },
-        parameters_of(rung),
+        parameters_of(rung, held),
         (*(one for one in flat if one is not None), *angle_maps(found, rung.fitted)),
         histograms(errors),
     )
 
 
-def parameters_of(rung: Rung) -> dict[str, tuple[float, float, str]]:
+def parameters_of(rung: Rung, held: HeldOut) -> dict[str, tuple[float, float, str]]:
     """Value, standard uncertainty and unit of every effect's parameters on a rung."""
-    own = np.arange(len(own_columns(rung.fitted.model)))
-    spread = np.sqrt(np.maximum(np.diag(rung.around.covariance(own)), 0.0))
-    u = {rung.around.columns[n].name: float(spread[n]) for n in own}
+    own = own_columns(rung.fitted.model)
+    spread = uncertainties(rung.around, held, len(own)).tolist()
+    u = {column.name: one for column, one in zip(own, spread, strict=True)}
     return {
         name: (float(rung.fitted.values[name]), u.get(name, 0.0), p.unit)
         for name, (_, p) in rung.fitted.model.parameters().items()

@@ -1,0 +1,55 @@
+"""What a fit's uncertainty and held-out error make of captures that disagree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.judge import leave_out, uncertainties
+from pipeline.criticism.linearise import Column
+from pipeline.criticism.system import Fitted, System
+
+ROWS = 400
+
+
+def captures(levels: list[float], seed: int = 4) -> System:
+    """One constant told by several captures, each off by its own level, in noise of one."""
+    rng = np.random.default_rng(seed)
+    group = np.repeat(np.arange(len(levels)), ROWS)
+    told = np.array(levels)[group] + rng.standard_normal(group.size)
+    return System(
+        columns=(Column("r_ohm", 1.0),),
+        residual=told - told.mean(),
+        matrix=-np.ones((group.size, 1)),
+        group=group,
+        window=np.tile(np.arange(ROWS), len(levels)),
+        unit=np.ones(group.size),
+        soft=np.ones(group.size),
+        whiten=np.ones(group.size),
+        labels=tuple((n, "vq_v", 0) for n in range(len(levels))),
+        penalty=np.zeros(1),
+        pull=np.zeros(1),
+        around=Fitted(None, {}, ()),  # type: ignore[arg-type]
+        tests=("drive",) * len(levels),
+    )
+
+
+def test_captures_that_agree_are_as_sure_as_their_samples():
+    found = [
+        float(uncertainties(one, leave_out(one, 1), 1)[0])
+        for one in (captures([0.0] * 6, seed) for seed in range(30))
+    ]
+    assert np.median(found) == pytest.approx((6 * ROWS) ** -0.5, rel=0.25)
+
+
+def test_captures_that_disagree_are_not_surer_than_their_scatter():
+    """Six means that scatter by s: a mean is no better known than s / sqrt 6."""
+    levels = [0.3, -0.3, 0.1, -0.2, 0.25, -0.15]
+    around = captures(levels)
+    scatter = np.std(levels, ddof=1) / 6**0.5
+    assert uncertainties(around, leave_out(around, 1), 1)[0] == pytest.approx(scatter, rel=0.3)
+
+
+def test_one_capture_alone_has_its_noise():
+    around = captures([0.0])
+    assert uncertainties(around, leave_out(around, 1), 1)[0] == pytest.approx(ROWS**-0.5, rel=0.1)
