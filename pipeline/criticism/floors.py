@@ -24,6 +24,8 @@ _ZERO = 2e-3
 _ROUGH = 0.05
 _FORM = 0.02
 _LINE = 0.03
+_JUMP = 8.0
+_WHEN = 0.25
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -111,7 +113,31 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
     if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
         both[place] = np.hypot(both[place], _encoder_lines(segment, values))
+    if segment.kind == "dq":
+        jumps = _jumps(segment)[:, None]
+        for place, channel in enumerate(segment.channels):
+            if channel in ("vd_v", "vq_v"):
+                both[place] = np.hypot(both[place], jumps)
     return both
+
+
+def _jumps(segment: Segment) -> Array:
+    """Voltage [W] that a jump may be out by, as weak samples: a quarter of it for one sample.
+
+    A log says what the voltage was at its samples, not when within a period it changed.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    voltage = segment.recorded["vd_v"] + 1j * segment.recorded["vq_v"]
+    noise = math.hypot(segment.noise["vd_v"], segment.noise["vq_v"])
+    bend = np.zeros(voltage.size)
+    # a jump bends the line twice, there and back
+    bend[1:-1] = np.abs(np.diff(voltage, 2)) / math.sqrt(2.0)
+    bend[bend < _JUMP * noise] = 0.0
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    error: Array = _WHEN * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    return error
 
 
 def _encoder_lines(segment: Segment, values: Values) -> Array:

@@ -303,7 +303,7 @@ def material(fitted: Fitted, effect: Effect) -> bool:
     """
     machine = fitted.model.machine
     shapes = [
-        fitted.values[f"{effect.name}.{p.name}"] >= p.negligible * machine.scale(p)
+        abs(fitted.values[f"{effect.name}.{p.name}"]) >= p.negligible * machine.scale(p)
         for p in effect.parameters_of(machine)
         if not p.amplitude
     ]

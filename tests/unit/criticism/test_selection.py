@@ -11,7 +11,7 @@ from pipeline.criticism.judge import leave_out, remainder
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
-from pipeline.criticism.selection import candidates, score_all, search, widened
+from pipeline.criticism.selection import candidates, material, score_all, search, widened
 from pipeline.criticism.system import Fitted, floors, gauss_newton, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
@@ -143,3 +143,17 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
     offered = candidates(library, last.fitted)
     rivals = rivals_of(last.added[0], last.fitted, last.around, offered, segments)
     assert set(rivals) == {"windage", "brake"} - set(last.added)
+
+
+def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least():
+    """A coupling that hardly twists is none; a sign of a shape without a least says nothing."""
+    library = effects()
+
+    def judged(name: str, **values: float) -> bool:
+        full = {f"{name}.{k}": v for k, v in values.items()}
+        return material(Fitted(Model(machine(), (library[name],)), full, ()), library[name])
+
+    assert judged("compliance", share=0.3, twist_rad=0.005, between=0.0)
+    assert not judged("compliance", share=0.3, twist_rad=1e-4, between=0.0)
+    assert not judged("compliance", share=0.01, twist_rad=0.005, between=0.0)
+    assert judged("torque_lag", lag_s=1e-3, late=-0.4)
