@@ -23,7 +23,8 @@ def rivals_of(
     offered: Sequence[Candidate],
     segments: Sequence[Segment],
 ) -> tuple[str, ...]:
-    """Effects that explain the captures as well in an effect's place (misfit within 12).
+    """Effects that explain the captures as well in an effect's place (misfit within 12, and so
+    much of it that is over noise floors and priors).
 
     Those that to first order keep most of what the effect explains are refitted in its place.
     """
@@ -41,20 +42,27 @@ def rivals_of(
         if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate
     nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))[:_MOST]
-    enough = wide.misfit + TIE
-    ties = [c.effect.name for _, c in nearest if _refitted(name, fitted, c, segments) < enough]
+    ties = []
+    for _, candidate in nearest:
+        swapped = _refitted(name, fitted, candidate, segments)
+        if (
+            swapped is not None
+            and swapped.misfit < wide.misfit + TIE
+            and swapped.excess < wide.excess + TIE
+        ):
+            ties.append(candidate.effect.name)
     return tuple(sorted(ties))
 
 
 def _refitted(
     name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment]
-) -> float:
-    """Misfit with a candidate in an effect's place."""
+) -> System | None:
+    """The system with a candidate in an effect's place; None where it comes out negligible."""
     model = fitted.model.without(name).with_effects(candidate.effect)
     kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{name}.")}
     start = replace(fitted, model=model, values={**kept, **candidate.values})
     swapped, around = gauss_newton(segments, start)
-    return around.misfit if material(swapped, candidate.effect) else np.inf
+    return around if material(swapped, candidate.effect) else None
 
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:

@@ -18,6 +18,7 @@ from pipeline.criticism.traces import (
     PAD,
     SMOOTHED,
     decimated,
+    even_angle,
     even_clock,
     prepared,
     shaft_angle,
@@ -106,6 +107,8 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     window = window_of(period, size)
     orders = electrical_orders(machine) if turned > 0.1 else ()
     noise, runs = prepared(found, period)
+    if capture.meta.test == "torque_map":
+        even_angle(found, noise, window)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     found, starts = thinned(found, keep, window, most)

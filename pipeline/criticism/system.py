@@ -116,6 +116,12 @@ class System:
         cost = float(self.prior_costs().sum())
         return self.misfit_of(self.spreads(self.residual)) + cost
 
+    @property
+    def excess(self) -> float:
+        """The part of the misfit that is over noise floors and priors."""
+        over = np.log(np.maximum(self.spreads(self.residual), 1.0))
+        return float(self.counts @ over) + float(self.prior_costs().sum())
+
     def prior_costs(
         self, places: NDArray[np.int64] | None = None, step: Array | None = None
     ) -> Array:

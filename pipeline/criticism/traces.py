@@ -19,6 +19,7 @@ _SMOOTHING_S = 0.05
 SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 PAD = 24
 _SLACK = 6.0
+_RIPPLE = 1.5
 
 
 def even_clock(
@@ -175,6 +176,39 @@ def prepared(found: dict[str, Array], period: float) -> tuple[dict[str, float], 
     if "theta_mech_rad" in found:
         runs = with_travel(found, noise)
     return noise, runs
+
+
+def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) -> None:
+    """Takes an angle that shows nothing but its noise around an even run as its local parabola.
+
+    A dynamometer that holds its speed leaves only the encoder's rounding to difference twice;
+    times J that would be a torque, and a model that takes inertia away would seem to explain it.
+    """
+    theta, width = found["theta_mech_rad"], 2 * (window // 2) + 1
+    if theta.size < 3 * width or noise["theta_mech_rad"] <= 0.0:
+        return
+    run = _parabolas(theta, width)
+    if float(np.std(theta - run)) > _RIPPLE * noise["theta_mech_rad"]:
+        return
+    found["theta_mech_rad"] = run
+    # variance of a parabola's middle by least squares
+    noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
+
+
+def _parabolas(signal: Array, width: int) -> Array:
+    """Local parabolas [n] of an odd width by least squares, those of the ends to the ends.
+
+    Reference: Savitzky & Golay, Anal. Chem. 36 (1964).
+    """
+    half = width // 2
+    at = np.arange(-half, half + 1) / half
+    basis = np.vander(at, 3, increasing=True)
+    weights = np.linalg.pinv(basis)
+    start, end = signal[:width], signal[-width:]
+    middle = np.convolve(signal, weights[0][::-1], mode="valid")
+    first, last = basis @ (weights @ start), basis @ (weights @ end)
+    fitted: Array = np.concatenate([first[:half], middle, last[half + 1 :]])
+    return fitted
 
 
 def with_travel(found: dict[str, Array], noise: Mapping[str, float]) -> Array:

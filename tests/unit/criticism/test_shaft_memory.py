@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.criticism import coupling
 from pipeline.criticism.registry import effects
-from pipeline.criticism.traces import PAD, reversals, travel
+from pipeline.criticism.traces import PAD, even_angle, reversals, travel
 from tests.unit.criticism.machines import BASE, operating
 
 LIBRARY = effects()
@@ -109,3 +109,20 @@ def test_a_twist_smoothed_twice_stays_within_the_samples_around_a_window():
     drag = np.abs(drag[60:-60])
     touched = np.flatnonzero(drag > 1e-6 * drag.max()) + 60
     assert touched.size and touched.min() >= 200 - PAD and touched.max() < 200 + PAD
+
+
+@pytest.mark.parametrize("ripple_steps", [0.0, 4.0])
+def test_an_angle_held_even_loses_its_rounding_and_a_real_ripple_stays(ripple_steps: float):
+    """60 rad/s on 17 bits: the second difference of rounding alone would be 10⁴ rad/s²."""
+    step = 2 * np.pi / 2**17
+    t = np.arange(8000) * TS
+    true = 60.0 * t + ripple_steps * step * np.sin(2 * np.pi * 300.0 * t)
+    told = np.round(true / step) * step
+    found, noise = {"theta_mech_rad": told.copy()}, {"theta_mech_rad": step / 12**0.5}
+    even_angle(found, noise, 400)
+    if ripple_steps:
+        assert np.array_equal(found["theta_mech_rad"], told)
+    else:
+        left = found["theta_mech_rad"] - true
+        assert np.std(left) < 2.0 * noise["theta_mech_rad"] < 0.2 * step
+        assert np.abs(np.diff(found["theta_mech_rad"], 2)).max() < 0.01 * step
