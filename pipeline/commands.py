@@ -63,6 +63,19 @@ COMMANDS = _index(
         "every datasheet version: list, show, diff, at, verify, approve, revoke",
         positional=("action", "motor"),
     ),
+    Command(
+        "regress",
+        "regress",
+        s.RegressSettings,
+        "lot against lots, or code against code: the same, or what changed",
+    ),
+    Command(
+        "export",
+        "export",
+        s.ExportSettings,
+        "a released datasheet as a controller's configuration, conventions converted",
+        positional=("format", "motor"),
+    ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
     Command(
         "benchmark",

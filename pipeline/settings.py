@@ -93,6 +93,37 @@ class RegistrySettings(Settings):
 
 
 @dataclass(kw_only=True)
+class RegressSettings(Settings):
+    """`regress`: whether a lot, or a version of the code, still gives the same."""
+
+    baseline: str = key("", "selector, such as lot:2026-W* or tag:golden or type:T,since:2026-01")
+    candidate: str = key("", "selector of what is judged; its motors are left out of the baseline")
+    limits: str = key("default", "limits file of conf/limits/, or the path of one")
+    mode: str = key("auto", "lots; code: the same captures under two versions of the pipeline")
+    output: str = key("reports/demo", "folder for everything that is written", result=False)
+    registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
+    registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
+    diagnoses: str = key(
+        "auto", "folders of diagnoses, parted by commas; auto is diagnosis/ in output and beside"
+    )
+    lint: bool = key(False, "only check the limits file, and say what is wrong with it")
+
+
+@dataclass(kw_only=True)
+class ExportSettings(Settings):
+    """`export`: one controller's configuration from a released datasheet."""
+
+    format: str = key("", "moteus, odrive, vesc, simplefoc, c-header, ssv or csv")
+    motor: str = key("", "motor_id")
+    revision: str | None = key(None, "1, 2, ... of the motor; the newest released without it")
+    version: str | None = key(None, "beginning of the version's digest, instead of a revision")
+    output: str = key("reports/demo", "folder to write export/ to", result=False)
+    registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
+    registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
+    options: dict[str, Any] = key({}, "of the format: options.NAME=value")
+
+
+@dataclass(kw_only=True)
 class SimulateSettings(Settings):
     """`simulate`: captures of a simulated motor, and what is true of it."""
 

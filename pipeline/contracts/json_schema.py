@@ -85,6 +85,9 @@ def _estimate() -> Schema:
         {
             "bounds": _or_null(_list(NUMBER, minItems=2, maxItems=2)),
             "at_bound": {"type": "boolean"},
+            "orders": _list(
+                _object({"order": COUNT, "amplitude": SPREAD, "u": SPREAD, "phase_rad": NUMBER})
+            ),
             "budget": _list(_object({"source": NAME, "u": NUMBER, "kind": _one_of(Kind)})),
         },
     )
@@ -135,7 +138,9 @@ def datasheet_schema() -> Schema:
             "status": _one_of(DatasheetStatus),
             "provenance": _object(
                 {
-                    "captures": _list(_object(capture, {"station": _or_null(TEXT)})),
+                    "captures": _list(
+                        _object(capture, {"station": _or_null(TEXT), "started_at": _or_null(TEXT)})
+                    ),
                     "config_sha256": SHA256,
                     "code_version": NAME,
                 }

@@ -28,19 +28,22 @@ class Tested(NamedTuple):
     p_value: Array
 
 
-def lot_test(base_means: ArrayLike, new_mean: ArrayLike, u_link: ArrayLike = 0.0) -> Tested:
-    """One lot against the scatter of L others: means [..., L], mean [...].
+def lot_test(
+    base_means: ArrayLike, new_mean: ArrayLike, u_more: ArrayLike = 0.0, new_lots: int = 1
+) -> Tested:
+    """One lot, or the mean of M, against the scatter of L others: means [..., L], mean [...].
 
-    t = (m_new − mean)/√(s²(1 + 1/L) + u_link²) with s over the L means; L − 1 degrees of freedom,
-    by Welch-Satterthwaite more where the station link's `u_link` [..., infinite dof] dominates.
-    Prediction of a single new draw [1]. Raises ValueError for fewer than two lots.
+    t = (m_new − mean)/√(s²(1/M + 1/L) + u_more²) with s over the L means; L − 1 degrees of
+    freedom, by Welch-Satterthwaite more where `u_more` [..., infinite dof] counts: the link of
+    stations, or a new lot of fewer motors. Prediction of a new draw [1]. Raises ValueError for
+    fewer than two lots.
     """
     means, new = np.asarray(base_means, float), np.asarray(new_mean, float)
     lots = means.shape[-1]
     if lots < 2:
         raise ValueError("the scatter of lots needs two of them")
-    own = np.var(means, axis=-1, ddof=1) * (1.0 + 1.0 / lots)
-    total = own + np.asarray(u_link, float) ** 2
+    own = np.var(means, axis=-1, ddof=1) * (1.0 / new_lots + 1.0 / lots)
+    total = own + np.asarray(u_more, float) ** 2
     gap = new - means.mean(axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(total > 0.0, gap / np.sqrt(total), np.where(gap == 0.0, 0.0, np.inf * gap))

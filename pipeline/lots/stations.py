@@ -5,8 +5,9 @@ station alone tells nothing of it; what links stations are golden motors measure
 lots that were split over them, and a station that measured both sides.
 
 Model: y = block + station + error, a block being a lot or a golden motor; solved by weighted least
-squares with the blocks eliminated. Reference: S. R. Searle, G. Casella, C. E. McCulloch, Variance
-Components, 1992, 4.
+squares with the blocks eliminated. Where readings scatter by more than they state, the biases'
+uncertainty grows by as much (Birge's ratio). Reference: S. R. Searle, G. Casella, C. E. McCulloch,
+Variance Components, 1992, 4.
 """
 
 from __future__ import annotations
@@ -128,12 +129,30 @@ def _solve(
         normal += design.T @ (weight[:, None] * design)
         right += design.T @ (weight * value)
     scale = float(np.trace(normal)) / size
+    readings_left = len(readings) - len(by_block) - size + 1
     constrained = normal + scale / size * np.ones((size, size))
     inverse = np.linalg.inv(constrained)
     solution = inverse @ right
     # The constraint's own share of the inverse carries no information.
     spread = inverse - np.ones((size, size)) / (scale * size)
+    spread *= max(1.0, _misfit(by_block.values(), column, solution, floor) / max(readings_left, 1))
     for a, k in column.items():
         bias[a] = float(solution[k] - solution.mean())
         for b, j in column.items():
             covariance[a, b] = float(spread[k, j])
+
+
+def _misfit(
+    blocks: Iterable[Sequence[Reading]],
+    column: Mapping[str, int],
+    solution: Array,
+    floor: float,
+) -> float:
+    """Sum of squares of the weighted residuals."""
+    total = 0.0
+    for own in blocks:
+        weight = np.array([1.0 / max(r.sd, floor) ** 2 for r in own])
+        left = np.array([r.value - solution[column[r.station]] for r in own])
+        left -= np.sum(weight * left) / weight.sum()
+        total += float(np.sum(weight * left**2))
+    return total

@@ -1,0 +1,2 @@
+def render_regression(found):
+    return found.headline
