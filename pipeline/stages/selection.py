@@ -217,18 +217,16 @@ def _member(one: Sheet, side: Side) -> Member:
 
 def _group(side: str, query: Query, sheets: Sequence[Sheet], left_out: Sequence[str]) -> Group:
     members = [Member(one.sheet, None, one.when) for one in sheets]
-    texts = [
-        {one.sheet.motor_type for one in sheets},
-        {one.sheet.code_version for one in sheets},
-    ]
+    types = {one.sheet.motor_type for one in sheets}
+    codes = {one.sheet.code_version for one in sheets}
     return Group(
         side=side,  # type: ignore[arg-type]
         selector=query.text,
         motors=len(sheets),
         lots=tuple(lot for lot, _ in lots_in_order(members)),
         stations=tuple(sorted({s for one in sheets for s in one.version.published.stations})),
-        motor_types=tuple(sorted(t for t in texts[0] if t)),
-        code_versions=tuple(sorted(t for t in texts[1] if t)),
+        motor_types=tuple(sorted(name for name in types if name)),
+        code_versions=tuple(sorted(codes)),
         versions=tuple(one.version.version for one in sheets),
         left_out=tuple(sorted(left_out)),
     )
