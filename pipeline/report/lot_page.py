@@ -105,7 +105,7 @@ def _row(one: ConstantResult) -> Row:
         else one.test.status.replace("_", " ").lower(),
         same=one.equivalence.status.replace("_", " "),
         power=NONE if one.power.power is None else f"{100 * one.power.power:.0f} %",
-        cpk=NONE if cpk.cpk is None else f"{cpk.cpk:.2f} ({cpk.cpk_low:.2f} to {cpk.cpk_high:.2f})",
+        cpk=NONE if cpk.cpk is None else f"{cpk.cpk:.2f}",
     )
 
 
@@ -156,6 +156,7 @@ def _facts(one: ConstantResult) -> Sequence[tuple[str, str]]:
         ("lot-level test", _test(one)),
         ("sameness", _same(one)),
         ("power", _power(one)),
+        ("capability", _capability(one)),
         ("gauge R&R", _gauge(one.gauge, one.unit)),
     )
 
@@ -210,6 +211,15 @@ def _power(one: ConstantResult) -> str:
     shift, seen = quantity(power.shift, one.unit, 3), quantity(power.detectable, one.unit, 3)
     by = "scatter of lots" if power.by == "lots" else "scatter of motors"
     return f"{100 * power.power:.0f} % for {shift} (1.5 sd); 95 % from {seen} on, by the {by}"
+
+
+def _capability(one: ConstantResult) -> str:
+    found = one.capability
+    if found.cpk is None or found.cpk_low is None or found.cpk_high is None:
+        return ""
+    cp = "" if found.cp is None else f"Cp {found.cp:.2f}, "
+    level = f"{100 * found.level:.0f} %"
+    return f"{cp}Cpk {found.cpk:.2f} ({found.cpk_low:.2f} to {found.cpk_high:.2f} at {level})"
 
 
 def _gauge(gauge: Gauge | None, unit: str) -> str:
