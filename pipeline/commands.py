@@ -60,7 +60,7 @@ COMMANDS = _index(
         "registry",
         "registry",
         s.RegistrySettings,
-        "every datasheet version: list, show, diff, at, verify, approve, revoke",
+        "every datasheet version: list, show, diff, at, verify, approve, revoke, tag",
         positional=("action", "motor"),
     ),
     Command(

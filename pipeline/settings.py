@@ -79,7 +79,7 @@ class PlanSettings(Settings):
 class RegistrySettings(Settings):
     """`registry`: the versions that runs published."""
 
-    action: str = key("", "list, show, diff, at, verify, approve or revoke")
+    action: str = key("", "list, show, diff, at, verify, approve, revoke, tag or untag")
     motor: str | None = key(None, "motor_id; for `at` the date may stand here")
     registry: str = key("reports/demo/registry", "folder or URL of the registry")
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL")
@@ -88,8 +88,10 @@ class RegistrySettings(Settings):
     from_: str | None = key(None, "revision, for diff")
     to: str | None = key(None, "revision, for diff")
     date: str | None = key(None, "2026-03-01 (its end, UTC) or 2026-03-01T12:00Z, for at")
-    by: str | None = key(None, "who approves or revokes")
+    by: str | None = key(None, "who approves, revokes or tags")
     why: str | None = key(None, "why")
+    tag: str | None = key(None, "name that versions bear, for tag and untag")
+    select: str | None = key(None, "selector of the versions to tag, such as lot:A, or a motor")
 
 
 @dataclass(kw_only=True)

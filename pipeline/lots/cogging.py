@@ -15,8 +15,8 @@ from pipeline.records.lot_constant import Side
 from pipeline.records.lot_regression import CoggingBand, OrderLevel
 
 Array = NDArray[np.float64]
-POINTS_A_PERIOD = 48
-MOST_POINTS = 4097
+POINTS_A_PERIOD = 24
+MOST_POINTS = 2049
 MOST_ORDERS = 12
 
 

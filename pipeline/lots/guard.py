@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +106,13 @@ def _accepted(eta: Array, tolerance: Tolerance, u: float) -> Array:
 
 
 def _nodes(start: float, end: float) -> tuple[Array, Array]:
-    x, weight = np.polynomial.legendre.leggauss(NODES)
+    x, weight = _rule()
     half = 0.5 * (end - start)
     return start + half * (x + 1.0), half * weight
+
+
+@cache
+def _rule() -> tuple[Array, Array]:
+    """Nodes and weights on [-1, 1]."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    return x, weight

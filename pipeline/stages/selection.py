@@ -67,7 +67,7 @@ def choose(
             "mode=code: no motor is on both sides with the same captures",
             "choose the versions by code:... or version:...",
         )
-    if same and (mode == "code" or (mode == "auto" and len(same) == len(newest["candidate"]))):
+    if same and (mode == "code" or (mode == "auto" and _of_code(newest, same))):
         return _versions(newest, same, queries)
     return _lots(shelf, versions, newest, queries, golden)
 
@@ -122,6 +122,17 @@ def _newest(sheets: Iterable[Sheet]) -> dict[str, Sheet]:
 def _same_captures(base: Mapping[str, Sheet], candidate: Mapping[str, Sheet]) -> list[str]:
     """Motors that rest on the same captures on both sides."""
     return [m for m, one in candidate.items() if m in base and base[m].inputs == one.inputs]
+
+
+def _of_code(newest: Mapping[str, Mapping[str, Sheet]], same: Sequence[str]) -> bool:
+    """Whether versions of the code are meant: all candidates have their captures on both sides,
+    and their versions differ, or both sides are of the same motors.
+    """
+    base, candidate = newest["baseline"], newest["candidate"]
+    if len(same) < len(candidate):
+        return False
+    differ = all(base[m].version.version != candidate[m].version.version for m in same)
+    return differ or base.keys() == candidate.keys()
 
 
 def _versions(
