@@ -14,7 +14,7 @@ NEW_ORDER = "cogging_order_12"
 
 
 def regressed(folder: Path, fleet: str) -> tuple[int, dict]:  # type: ignore[type-arg]
-    """Simulates a fleet of `conf/fleet/`, works it through, compares its second lot to its first."""
+    """Simulates a fleet of `conf/fleet/`, works it through, compares its two lots."""
     captures, output = folder / "captures", folder / "out"
     assert main(["simulate", f"output={captures}", f"fleet={fleet}"]) == 0
     words = [f"input={captures}", f"output={output}", "report=false", "recordings=false"]
@@ -50,7 +50,7 @@ def test_weak_magnets_and_a_new_cogging_order_fail_the_lot(tmp_path: Path) -> No
 
 @pytest.mark.slow
 def test_the_same_lots_unchanged_pass(tmp_path: Path) -> None:
-    """The same fleet without the two changes: exit code 0, though one baseline lot is no history."""
+    """The same fleet without the two changes: exit code 0 from one baseline lot."""
     code, said = regressed(tmp_path, "two-lots-alike")
     assert code == 0
     assert said["verdict"] == "pass"
