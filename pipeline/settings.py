@@ -98,7 +98,11 @@ class RegistrySettings(Settings):
 class RegressSettings(Settings):
     """`regress`: whether a lot, or a version of the code, still gives the same."""
 
-    baseline: str = key("", "selector, such as lot:2026-W* or tag:golden or type:T,since:2026-01")
+    baseline: str = key(
+        "",
+        "selector: FIELD:VALUE,VALUE,FIELD:VALUE with * and ?; fields are lot, type, station, "
+        "motor, tag, status, version, revision, code, date, since, until (docs/lots.md)",
+    )
     candidate: str = key("", "selector of what is judged; its motors are left out of the baseline")
     limits: str = key("default", "limits file of conf/limits/, or the path of one")
     mode: str = key("auto", "lots; code: the same captures under two versions of the pipeline")

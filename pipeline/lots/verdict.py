@@ -60,11 +60,11 @@ def judge(
     if not found.candidate or not found.base:
         side = "candidate" if not found.candidate else "baseline"
         return Judged("not_evaluated", f"no motor of the {side} has it")
+    moved = _moved(found, unit)
     if conformity.worst in ("fail", "conditional_fail"):
-        return Judged("fail", _outside(conformity))
+        return Judged("fail", f"{moved}: {_outside(conformity)}")
     if found.confounded:
         return Judged("CONFOUNDED", found.confounded)
-    moved = _moved(found, unit)
     changed = _changed(limits, unit, found, test, same, motor_p_holm, alpha, moved)
     return changed or _not_failed(conformity, test, same, moved)
 
@@ -159,7 +159,7 @@ def _outside(conformity: Conformity) -> str:
 def _moved(found: Assessment, unit: str) -> str:
     """The change in words: relative where it can be."""
     if found.contrast is None:
-        return "not compared"
+        return "not compared with the baseline"
     before = sum(found.base_means) / len(found.base_means)
     change = found.contrast.difference
     if before:

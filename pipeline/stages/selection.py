@@ -174,7 +174,9 @@ def _lots(
             f"baseline={queries['baseline'].text} holds no motor that the candidate does not",
             "name other lots; the same captures under two versions are mode=code",
         )
-    notes += _types(base.values(), candidate.values())
+    base, others = _of_one_type(base, candidate)
+    if others:
+        notes.append(f"{len(others)} baseline motors are of another type and are left out")
     codes = {one.sheet.code_version for one in (*base.values(), *candidate.values())}
     if len(codes) > 1:
         notes.append(f"datasheets of {len(codes)} code versions are compared: {_few(codes)}")
@@ -188,7 +190,7 @@ def _lots(
     members += [_member(one, "candidate") for one in candidate.values()]
     again = _repeats(shelf, versions, {*base, *candidate, *golden})
     samples = Samples(
-        _group("baseline", queries["baseline"], list(base.values()), shared),
+        _group("baseline", queries["baseline"], list(base.values()), [*shared, *others]),
         _group("candidate", queries["candidate"], list(candidate.values()), ()),
         tuple(members),
         tuple(again),
@@ -202,14 +204,25 @@ def _few(names: Iterable[str], most: int = 8) -> str:
     return ", ".join(told[:most]) + (f" and {len(told) - most} more" if len(told) > most else "")
 
 
-def _types(base: Iterable[Sheet], candidate: Iterable[Sheet]) -> list[str]:
-    """Warns where the sides are of different designs."""
-    sides = [
-        sorted({one.sheet.motor_type or "not stated" for one in own}) for own in (base, candidate)
-    ]
-    if sides[0] == sides[1]:
-        return []
-    return [f"motor types differ: {', '.join(sides[0])} before, {', '.join(sides[1])} now"]
+def _of_one_type(
+    base: Mapping[str, Sheet], candidate: Mapping[str, Sheet]
+) -> tuple[dict[str, Sheet], list[str]]:
+    """The baseline's motors of the candidate's type, and the others' names.
+
+    Lots of one type are compared. Raises UsageError for candidates of several types, and for a
+    baseline that has none of theirs.
+    """
+    types = {one.sheet.motor_type for one in candidate.values()}
+    told = _few(name or "(not stated)" for name in types)
+    if len(types) > 1:
+        raise UsageError(f"the candidate's motors are of several types: {told}", "add type:NAME")
+    kept = {m: one for m, one in base.items() if one.sheet.motor_type in types}
+    if not kept:
+        has = _few({one.sheet.motor_type or "(not stated)" for one in base.values()})
+        raise UsageError(
+            f"the candidate is of type {told}, the baseline of {has}", "name lots of one type"
+        )
+    return kept, sorted(set(base) - set(kept))
 
 
 def _repeats(shelf: _Shelf, versions: Sequence[Version], motors: set[str]) -> list[Member]:

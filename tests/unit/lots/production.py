@@ -54,7 +54,7 @@ def sheet(
     run: int = 0,
     at: Mapping[str, float] | None = None,
     code: str = "0.1.0+aaaaaaaaaaaa",
-    status: str = "provisional",
+    motor_type: str = "gimbal",
 ) -> Datasheet:
     """A datasheet of these values; `run` parts measurements of one motor."""
     digest = hashlib.sha256(f"{motor_id} {station} {run}".encode()).hexdigest()
@@ -80,7 +80,7 @@ def sheet(
             orders=tuple(orders),
         )  # fmt: skip
     return Datasheet(
-        motor_id, "gimbal", lot, version, status, (),  # type: ignore[arg-type]
+        motor_id, motor_type, lot, version, "provisional", (),
         (CaptureReference(path, digest, "resistance", "verified", station),),
         "c" * 64, code, constants, (), (),
     )  # fmt: skip

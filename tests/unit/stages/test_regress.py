@@ -168,6 +168,26 @@ def test_the_candidate_is_no_part_of_its_baseline(
     assert sorted(report(output)["baseline"]["lots"]) == ["A", "weak"]
 
 
+def test_lots_of_one_type_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Motors of another design leave the baseline; a candidate of two designs is a mistake."""
+    registry = Registry(str(tmp_path / "registry"))
+    made = lots()
+    other = [
+        line.sheet(f"X-{k}", "A", "S1", {"psi_pm_wb": 2.0}, motor_type="drone") for k in range(3)
+    ]
+    sheets = (*made["A"], *made["B"], *other)
+    registry.publish([sheet.document() for sheet in sheets], NOON)
+    code, out, _ = told(capsys, tmp_path, "baseline=lot:A", "candidate=lot:B")
+    assert code == 0
+    assert "3 baseline motors are of another type and are left out" in out
+    code, _, err = told(capsys, tmp_path, "baseline=lot:B", "candidate=lot:A")
+    assert code == 2
+    assert "several types: drone, gimbal; add type:NAME" in err
+    code, _, err = told(capsys, tmp_path, "baseline=lot:B", "candidate=lot:A,type:drone")
+    assert code == 2
+    assert "of type drone, the baseline of gimbal" in err
+
+
 def test_dates_choose_lots(output: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Captures without a start are of the day they were published."""
     code, _, _ = told(capsys, output, "baseline=date:2026-03-02", "candidate=date:2026-03-03")
