@@ -77,7 +77,13 @@ def hold(
     return Held(bounds, margin, decisions, tolerance)
 
 
-def conformity(held: Held, candidate: Sequence[Value], mean: float, sd: float | None) -> Conformity:
+def conformity(
+    held: Held,
+    candidate: Sequence[Value],
+    corrected: Mapping[str, float],
+    mean: float,
+    sd: float | None,
+) -> Conformity:
     """The candidate's motors by decision, the worst first, and the rule's risks for such a lot."""
     found = [(held.decisions.get(v.motor_id, "not_evaluated"), v) for v in candidate]
     counts = tuple(
@@ -86,7 +92,8 @@ def conformity(held: Held, candidate: Sequence[Value], mean: float, sd: float | 
         if (number := sum(1 for one, _ in found if one == decision))
     )
     worst: Decision = counts[0].decision if counts else "not_evaluated"
-    named = next((v.motor_id for one, v in found if one == worst), None)
+    inside = {v.motor_id: _inside(held, corrected[v.motor_id]) for one, v in found if one == worst}
+    named = min(inside, key=lambda motor: (inside[motor], motor), default=None)
     risk: Risks | None = None
     if held.tolerance is not None and sd is not None and candidate:
         u = median(v.u for v in candidate)
@@ -98,6 +105,13 @@ def conformity(held: Held, candidate: Sequence[Value], mean: float, sd: float | 
         None if risk is None else risk.false_accept,
         None if risk is None else risk.false_reject,
     )
+
+
+def _inside(held: Held, value: float) -> float:
+    """How far a value lies within the tolerance [unit], negative outside."""
+    if held.tolerance is None:
+        return 0.0
+    return min(value - held.tolerance.lower, held.tolerance.upper - value)
 
 
 def _finite(value: float) -> float | None:

@@ -71,7 +71,7 @@ def result(
     mean = float(np.mean(found.candidate_means)) if found.candidate else 0.0
     flat = [value for values in found.candidate.values() for value in values]
     spread = float(np.std(flat, ddof=1)) if len(flat) > 1 else None
-    conform = conformity(made.held, candidate, mean, spread)
+    conform = conformity(made.held, candidate, found.corrected, mean, spread)
     test = _test(found, family, limits)
     same = _equivalence(found, made.held.margin, limits.alpha)
     told = judge(made.own, made.unit, found, conform, test, same, family.motor_p_holm, limits.alpha)

@@ -96,9 +96,10 @@ def effects_shown(
         for effect in told.missing:
             own = told.parameters.get(effect, {})
             waves = _orders(own)
-            _name, first = next(iter(own.items()), ("", None))
-            sizes[effect] = None if first is None or waves else first[0]
-            units[effect] = "" if first is None or waves else first[1]
+            # Of several parameters none is the size.
+            only = next(iter(own.values())) if len(own) == 1 else None
+            sizes[effect] = None if only is None else only[0]
+            units[effect] = "" if only is None else only[1]
             sizes |= {f"{order_name(k)} (diagnosed)": size for k, size in waves.items()}
             units |= {f"{order_name(k)} (diagnosed)": "N·m" for k in waves}
         if told.verdict == "unknown":

@@ -86,7 +86,8 @@ def _changed(
         words = f"{moved}: beyond the scatter of {test.lots} lots, p {_p(test.p_holm)}"
         if limits.tolerate and same.status == "equivalent":
             return Judged("marginal", f"{words}, yet within the margin")
-        return Judged("fail", words)
+        small = ", although within the margin" if same.status == "equivalent" else ""
+        return Judged("fail", words + small)
     if not _beyond(found, same, motor_p_holm, alpha):
         return None
     margin = quantity(same.margin or 0.0, unit, 3)

@@ -16,6 +16,7 @@ from pipeline.records.lot_regression import EffectChange, LotRegression
 
 # What XML 1.0 has no place for.
 UNFIT = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+MOST_LINES = 200
 PASSED = ("pass", "marginal")
 
 
@@ -39,10 +40,13 @@ def _constant(one: ConstantResult) -> Xml.Element:
     must = one.decides and bool(one.motors)
     case = _case(one.name, one.verdict, one.why, must)
     if one.motors:
-        out = Xml.SubElement(case, "system-out")
-        out.text = _fit(
-            "\n".join(f"{m.side} {m.lot} {m.motor_id}: {m.value!r} {one.unit}" for m in one.motors)
-        )
+        own = [f"{lot.side} {lot.lot}: mean {lot.mean!r} {one.unit}" for lot in one.lots]
+        own += [
+            f"{m.side} {m.lot} {m.motor_id}: {m.value!r} {one.unit}, {m.decision}, {m.capture}"
+            for m in one.motors
+            if m.outlier or m.decision in ("fail", "conditional_fail", "conditional_pass")
+        ]
+        Xml.SubElement(case, "system-out").text = _fit("\n".join(own[:MOST_LINES]))
     return case
 
 

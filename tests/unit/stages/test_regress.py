@@ -188,6 +188,47 @@ def test_lots_of_one_type_are_compared(tmp_path: Path, capsys: pytest.CaptureFix
     assert "of type drone, the baseline of gimbal" in err
 
 
+def test_golden_motors_link_a_new_station(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Station S2 reads 3 sd high. Golden motors of the limits file, three times on each station,
+    make its healthy lot pass; without them it is CONFOUNDED.
+    """
+    rng = np.random.default_rng(5)
+    registry = Registry(str(tmp_path / "registry"))
+    base = line.lot(rng, "A", names=THREE, motors=12, lot_sd=0.0)
+    new = line.lot(rng, "B", names=THREE, motors=12, lot_sd=0.0, station="S2", bias=3.0)
+    registry.publish([sheet.document() for sheet in (*base, *new)], NOON)
+    for station, bias in (("S1", 0.0), ("S2", 0.03)):
+        for run in range(3):
+            golden = [
+                line.sheet(
+                    f"G{g}",
+                    None,
+                    station,
+                    {n: 1.0 + 0.01 * g + bias + 2e-4 * rng.standard_normal() for n in THREE},
+                    run=run,
+                )
+                for g in range(3)
+            ]
+            registry.publish([sheet.document() for sheet in golden], NOON + DAY)
+    limits = tmp_path / "own.yaml"
+    body = "".join(f"  {name}: {{equivalence_margin: 1.5 %}}\n" for name in THREE)
+    limits.write_text(f"required: []\ngolden: [G0, G1, G2]\nconstants:\n{body}")
+    words = ("baseline=lot:A", "candidate=lot:B")
+    code, out, _ = told(capsys, tmp_path, *words, f"limits={limits}")
+    assert code == 0, out
+    said = report(tmp_path)
+    assert said["golden"] == ["G0", "G1", "G2"]
+    gauge = said["constants"][0]["gauge"]
+    assert (gauge["motors"], gauge["stations"], gauge["repeats"]) == (3, 2, 3)
+    assert gauge["reproducibility"] == pytest.approx(0.03 / np.sqrt(2.0), rel=0.1)
+    assert "gauge R&amp;R" in (tmp_path / "regression" / "report.html").read_text()
+    limits.write_text(f"required: []\nconstants:\n{body}")
+    assert told(capsys, tmp_path, *words, f"limits={limits}")[0] == 4
+    assert report(tmp_path)["verdict"] == "CONFOUNDED"
+
+
 def test_dates_choose_lots(output: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Captures without a start are of the day they were published."""
     code, _, _ = told(capsys, output, "baseline=date:2026-03-02", "candidate=date:2026-03-03")
