@@ -117,7 +117,7 @@ def _solve(
     by_block: dict[str, list[Reading]] = {}
     for reading in readings:
         by_block.setdefault(reading.block, []).append(reading)
-    floor = 1e-12 * max((abs(r.value) for r in readings), default=1.0) or 1e-300
+    floor = 1e-12 * max((abs(r.value) for r in readings), default=1.0) or 1e-12
     for own in by_block.values():
         weight = np.array([1.0 / max(r.sd, floor) ** 2 for r in own])
         design = np.zeros((len(own), size))
