@@ -196,22 +196,14 @@ def _contrast(
     dof = min(total**2 / loss, 1e9) if loss > 0.0 else 1e9
     u = math.sqrt(total)
     motor_p = None if within is None else _p_value(difference, u, dof)
-    if len(old) < 2:
+    if len(old) < 2 or lots_sd is None:
         return Contrast(difference, u, dof, motor_p, None, None, None, None)
-    fewer = motor_var * max(0.0, _mean_share(groups.candidate) * len(new) - _each(groups.base))
+    fewer = motor_var * max(0.0, _each(groups.candidate) - _each(groups.base))
     more = math.sqrt(fixed + fewer / len(new))
     tested = lot_test(old, float(np.mean(new)), more, len(new))
-    own = (lots_sd or 0.0) ** 2 * (1.0 / len(new) + 1.0 / len(old))
-    return Contrast(
-        difference,
-        u,
-        dof,
-        motor_p,
-        float(tested.t),
-        float(tested.dof),
-        float(tested.p_value),
-        math.sqrt(own + more**2),
-    )
+    se = math.hypot(lots_sd * math.sqrt(1.0 / len(new) + 1.0 / len(old)), more)
+    t, lot_dof, lot_p = (float(part) for part in tested)
+    return Contrast(difference, u, dof, motor_p, t, lot_dof, lot_p, se)
 
 
 def _p_value(difference: float, u: float, dof: float) -> float:

@@ -49,10 +49,8 @@ def hold(
     margin = _margin(limits, nominal, sd, typical_u)
     span = _span(limits, nominal, sd)
     if span is None:
-        bounds = None
-        if margin is not None:
-            bounds = Bounds(nominal, None, None, None, None, 0.0, RULES[limits.rule], margin)
-        return Held(bounds, margin, {}, None)
+        bare = Bounds(nominal, None, None, None, None, 0.0, RULES[limits.rule], margin)
+        return Held(bare if margin is not None else None, margin, {}, None)
     low, high = span
     decisions = {
         v.motor_id: _decision(

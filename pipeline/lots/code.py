@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from pipeline.lots.capability import NONE as NO_CAPABILITY
@@ -94,35 +95,65 @@ def compare_versions(
     )
 
 
-def _constant(
-    name: str, pairs: Sequence[Pair], limits: Limits, terms: Mapping[str, Term]
-) -> ConstantResult:
-    changes, lost, gained, wider = [], [], [], []
-    motors: list[MotorValue] = []
-    for pair in pairs:
+@dataclass(slots=True)
+class _Seen:
+    """What became of one constant over all motors."""
+
+    changes: list[Change] = field(default_factory=list)
+    motors: list[MotorValue] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+    gained: list[str] = field(default_factory=list)
+    wider: list[str] = field(default_factory=list)
+
+    def take(self, name: str, pair: Pair, limits: Limits) -> None:
+        """Adds one motor."""
         before, after = (member.sheet.constants.get(name) for member in pair)
+        motor_id = pair.after.sheet.motor_id
         if before is None or not before.known:
             if after is not None and after.known:
-                gained.append(pair.after.sheet.motor_id)
-            continue
+                self.gained.append(motor_id)
+            return
         if after is None or not after.known:
-            lost.append(pair.before.sheet.motor_id)
-            continue
+            self.lost.append(motor_id)
+            return
         change = _change(pair, before, after, limits)
-        changes.append(change)
+        self.changes.append(change)
         if before.u > 0.0 and not 1.0 / U_RATIO <= after.u / before.u <= U_RATIO:
-            wider.append(f"{change.motor_id} {after.u / before.u:.3g} times")
-        motors += [
+            self.wider.append(f"{motor_id} {after.u / before.u:.3g} times")
+        self.motors += [
             _motor(pair.before, before, None, "not_evaluated"),
             _motor(pair.after, after, change, change.decision),
         ]
-    verdict, why = _verdict(changes, lost, wider, limits)
-    worst = max(changes, key=lambda change: abs(change.in_u), default=None)
-    decisions: tuple[Decision, ...] = ("fail", "conditional_pass", "pass")
-    counts = tuple(
-        Count(d, n) for d in decisions if (n := sum(change.decision == d for change in changes))
-    )
-    term = terms.get(name)
+
+    @property
+    def worst(self) -> Change | None:
+        """The largest change in units of the old u."""
+        return max(self.changes, key=lambda change: abs(change.in_u), default=None)
+
+    def conformity(self) -> Conformity:
+        """Motors by the decision on their change."""
+        decisions: tuple[Decision, ...] = ("fail", "conditional_pass", "pass")
+        counts = tuple(
+            Count(d, n)
+            for d in decisions
+            if (n := sum(change.decision == d for change in self.changes))
+        )
+        worst = self.worst
+        named = None if worst is None or worst.decision == "pass" else worst.motor_id
+        return Conformity(
+            counts, counts[0].decision if counts else "not_evaluated", named, None, None
+        )
+
+
+def _constant(
+    name: str, pairs: Sequence[Pair], limits: Limits, terms: Mapping[str, Term]
+) -> ConstantResult:
+    seen = _Seen()
+    for pair in pairs:
+        seen.take(name, pair, limits)
+    verdict, why = _verdict(seen, limits)
+    worst, term = seen.worst, terms.get(name)
+    in_u = None if worst is None or math.isinf(worst.in_u) else worst.in_u
     return ConstantResult(
         name=name,
         unit=term.unit if term else "1",
@@ -131,29 +162,20 @@ def _constant(
         why=why,
         decides=True,
         temperature_degc=None,
-        motors=tuple(motors),
+        motors=tuple(seen.motors),
         lots=(),
         bounds=None,
-        conformity=Conformity(
-            counts,
-            counts[0].decision if counts else "not_evaluated",
-            None if worst is None or worst.decision == "pass" else worst.motor_id,
-            None,
-            None,
-        ),
+        conformity=seen.conformity(),
         test=LotTest("not_evaluated", 0, 0, None, None, None, None, False),
         equivalence=NOT_EVALUATED,
-        effect=EffectSize(
-            None if worst is None else worst.difference, None, None, None, None,
-            None if worst is None or math.isinf(worst.in_u) else worst.in_u,
-        ),
+        effect=EffectSize(worst.difference if worst else None, None, None, None, None, in_u),
         power=Power("none", None, None, None),
         capability=NO_CAPABILITY,
         variance=(),
         gauge=None,
         stations=(),
-        missing=(*(f"{m}: lost" for m in lost), *(f"{m}: new" for m in gained)),
-    )  # fmt: skip
+        missing=(*(f"{m}: lost" for m in seen.lost), *(f"{m}: new" for m in seen.gained)),
+    )
 
 
 def _change(pair: Pair, before: Estimate, after: Estimate, limits: Limits) -> Change:
@@ -191,14 +213,12 @@ def _motor(
     )
 
 
-def _verdict(
-    changes: Sequence[Change], lost: Sequence[str], wider: Sequence[str], limits: Limits
-) -> tuple[Verdict, str]:
-    if lost:
-        return "fail", f"{len(lost)} motors lost it, {lost[0]} first"
-    if not changes:
+def _verdict(seen: _Seen, limits: Limits) -> tuple[Verdict, str]:
+    if seen.lost:
+        return "fail", f"{len(seen.lost)} motors lost it, {seen.lost[0]} first"
+    worst, wider = seen.worst, seen.wider
+    if worst is None:
         return "not_evaluated", "only the new version gives it"
-    worst = max(changes, key=lambda change: abs(change.in_u))
     size = "without a stated u" if math.isinf(worst.in_u) else f"{worst.in_u:+.3g} u"
     words = f"largest change {size} ({worst.motor_id})"
     if worst.decision == "fail":
