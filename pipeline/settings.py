@@ -105,7 +105,9 @@ class RegressSettings(Settings):
     )
     candidate: str = key("", "selector of what is judged; its motors are left out of the baseline")
     limits: str = key("default", "limits file of conf/limits/, or the path of one")
-    mode: str = key("auto", "lots; code: the same captures under two versions of the pipeline")
+    mode: str = key(
+        "auto", "auto, lots, or code: the same captures under two versions of the pipeline"
+    )
     output: str = key("reports/demo", "folder for everything that is written", result=False)
     registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
