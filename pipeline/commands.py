@@ -57,13 +57,6 @@ COMMANDS = _index(
         positional=("motor",),
     ),
     Command(
-        "registry",
-        "registry",
-        s.RegistrySettings,
-        "every datasheet version: list, show, diff, at, verify, approve, revoke, tag",
-        positional=("action", "motor"),
-    ),
-    Command(
         "regress",
         "regress",
         s.RegressSettings,
@@ -75,6 +68,13 @@ COMMANDS = _index(
         s.ExportSettings,
         "a released datasheet as a controller's configuration, conventions converted",
         positional=("format", "motor"),
+    ),
+    Command(
+        "registry",
+        "registry",
+        s.RegistrySettings,
+        "every datasheet version: list, show, diff, at, verify, approve, revoke, tag",
+        positional=("action", "motor"),
     ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
     Command(
