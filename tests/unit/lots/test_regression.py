@@ -179,6 +179,45 @@ def test_golden_motors_take_off_the_stations_bias() -> None:
     assert gauge.reproducibility == pytest.approx(0.02 / np.sqrt(2.0), rel=0.15)
 
 
+def test_the_links_uncertainty_is_in_the_difference() -> None:
+    """One golden motor, read once on each station with 0.5 % of scatter: U cannot be below that."""
+    rng = np.random.default_rng(18)
+    golden = [
+        line.sheet("G0", None, station, dict.fromkeys(THREE, 1.0 + bias), u=0.005)
+        for station, bias in (("S1", 0.0), ("S2", 0.02))
+    ]
+    new = line.lot(rng, "N", names=THREE, motors=200, station="S2", bias=2.0)
+    found = compare(base_lots(rng, 12, lot_sd=0.0), new, None, golden, ("G0",))
+    link = 0.005 * np.sqrt(2.0)
+    for one in found.constants:
+        assert one.effect.u == pytest.approx(link, rel=0.2)
+        assert one.effect.u > link
+
+
+def test_what_one_instrument_adds_to_both_sides_cancels() -> None:
+    """A gain of 5 % that one station's meter may be off by is in both means alike."""
+    rng = np.random.default_rng(19)
+    lots = [line.lot(rng, name, names=THREE, motors=12, lot_sd=0.0) for name in ("A", "N")]
+
+    def stated(gain: float):
+        return [
+            [
+                line.sheet(
+                    s.motor_id, s.lot, "S1", {n: e.number for n, e in s.constants.items()},
+                    u_gain=gain,
+                )
+                for s in lot
+            ]
+            for lot in lots
+        ]  # fmt: skip
+
+    bare, sure = stated(0.0), stated(0.05)
+    without = compare([bare[0]], bare[1], with_margin()).constants[0].effect.u
+    with_gain = compare([sure[0]], sure[1], with_margin()).constants[0].effect.u
+    assert without == pytest.approx(0.01 * np.sqrt(2.0 / 12.0), rel=0.35)
+    assert with_gain == pytest.approx(without, rel=1e-9)
+
+
 def test_a_shift_is_still_seen_through_the_correction() -> None:
     rng = np.random.default_rng(10)
     base = base_lots(rng, 12)
