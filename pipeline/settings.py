@@ -79,7 +79,7 @@ class PlanSettings(Settings):
 class RegistrySettings(Settings):
     """`registry`: the versions that runs published."""
 
-    action: str = key("", "list, show, diff, at, verify, approve or revoke")
+    action: str = key("", "list, show, diff, at, verify, approve, revoke, tag or untag")
     motor: str | None = key(None, "motor_id; for `at` the date may stand here")
     registry: str = key("reports/demo/registry", "folder or URL of the registry")
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL")
@@ -88,8 +88,47 @@ class RegistrySettings(Settings):
     from_: str | None = key(None, "revision, for diff")
     to: str | None = key(None, "revision, for diff")
     date: str | None = key(None, "2026-03-01 (its end, UTC) or 2026-03-01T12:00Z, for at")
-    by: str | None = key(None, "who approves or revokes")
+    by: str | None = key(None, "who approves, revokes or tags")
     why: str | None = key(None, "why")
+    tag: str | None = key(None, "name that versions bear, for tag and untag")
+    select: str | None = key(None, "selector of the versions to tag, such as lot:A, or a motor")
+
+
+@dataclass(kw_only=True)
+class RegressSettings(Settings):
+    """`regress`: whether a lot, or a version of the code, still gives the same."""
+
+    baseline: str = key(
+        "",
+        "selector: FIELD:VALUE,VALUE,FIELD:VALUE with * and ?; fields are lot, type, station, "
+        "motor, tag, status, version, revision, code, date, since, until (docs/lots.md)",
+    )
+    candidate: str = key("", "selector of what is judged; its motors are left out of the baseline")
+    limits: str = key("default", "limits file of conf/limits/, or the path of one")
+    mode: str = key(
+        "auto", "auto, lots, or code: the same captures under two versions of the pipeline"
+    )
+    output: str = key("reports/demo", "folder for everything that is written", result=False)
+    registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
+    registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
+    diagnoses: str = key(
+        "auto", "folders of diagnoses, parted by commas; auto is diagnosis/ in output and beside"
+    )
+    lint: bool = key(False, "only check the limits file, and say what is wrong with it")
+
+
+@dataclass(kw_only=True)
+class ExportSettings(Settings):
+    """`export`: one controller's configuration from a released datasheet."""
+
+    format: str = key("", "moteus, odrive, vesc, simplefoc, c-header, ssv or csv")
+    motor: str = key("", "motor_id")
+    revision: str | None = key(None, "1, 2, ... of the motor; the newest released without it")
+    version: str | None = key(None, "beginning of the version's digest, instead of a revision")
+    output: str = key("reports/demo", "folder to write export/ to", result=False)
+    registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
+    registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
+    options: dict[str, Any] = key({}, "of the format: options.NAME=value")
 
 
 @dataclass(kw_only=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
 from pipeline.records.errors import UsageError
-from pipeline.records.estimate import Estimate
+from pipeline.records.estimate import Estimate, Order
 from pipeline.records.uncertainty import Budget, Contribution, effective_dof
 
 SCHEMA = "motor-datasheet/1"
@@ -56,7 +56,14 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
         status=document["status"],
         why=tuple(document.get("why", ())),
         captures=tuple(
-            CaptureReference(c["path"], c["sha256"], c["test"], c["integrity"], c.get("station"))
+            CaptureReference(
+                c["path"],
+                c["sha256"],
+                c["test"],
+                c["integrity"],
+                c.get("station"),
+                c.get("started_at"),
+            )
             for c in provenance["captures"]
         ),
         config_sha256=provenance["config_sha256"],
@@ -93,6 +100,10 @@ def _estimate(name: str, said: Mapping[str, Any]) -> Estimate:
         note=said["note"],
         bounds=None if bounds is None else (bounds[0], bounds[1]),
         at_bound=said.get("at_bound", False),
+        orders=tuple(
+            Order(one["order"], one["amplitude"], one["u"], one["phase_rad"])
+            for one in said.get("orders", ())
+        ),
     )
 
 

@@ -1,19 +1,44 @@
-"""Reading `conf/limits/*.yaml`: what a datasheet must hold before it is released."""
+"""Reading `conf/limits/*.yaml`: what a datasheet must hold, and what a lot is held to."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-import yaml
-
+from pipeline.io.plain_yaml import load_plain
 from pipeline.physics.glossary import CONSTANTS
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import CaptureError, UsageError
+from pipeline.records.limits import (
+    RULES,
+    Amount,
+    ConstantLimits,
+    Limits,
+    amount_from,
+    number_from,
+)
 
-MAX_BYTES = 1 << 20
+KEYS = ("about", "required", "rules", "golden", "constants")
+RULE_KEYS = ("alpha", "min_lots", "k", "order_share", "code_negligible", "code_limit")
+CONSTANT_KEYS = (
+    "nominal",
+    "tolerance",
+    "minimum",
+    "maximum",
+    "guard_band",
+    "decision_rule",
+    "equivalence_margin",
+    "decides",
+    "tolerate_within_margin",
+)
+WORDS = {"yes": True, "true": True, "no": False, "false": False}
 
 
 def limits_file(folder: Path, name: str) -> Path:
-    """The limits file of a name; raises UsageError where there is none."""
+    """The limits file of a name, or at a path that ends in .yaml; raises UsageError for neither."""
+    if name.endswith((".yaml", ".yml")) and Path(name).is_file():
+        return Path(name)
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     if name not in known:
         raise UsageError(f"no limits file {name!r}", f"known are {', '.join(known)}")
@@ -22,17 +47,112 @@ def limits_file(folder: Path, name: str) -> Path:
 
 def required_constants(path: Path) -> tuple[str, ...]:
     """The constants that a release must hold, measured; raises UsageError for a bad file."""
-    content = path.read_bytes()
-    if len(content) > MAX_BYTES or content.count(b"*") > 100:
-        raise UsageError(f"{path.name} is too large or too full of aliases", "shorten it")
-    try:
-        document = yaml.safe_load(content)
-    except yaml.YAMLError as error:
-        raise UsageError(f"{path.name} is no YAML: {error}", "correct it") from error
-    names = document.get("required") if isinstance(document, dict) else None
+    names = _document(path).get("required")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise UsageError(f"{path.name} needs `required:`, a list of constants", "add it")
     unknown = [name for name in names if name not in CONSTANTS]
     if unknown:
         raise UsageError(f"{path.name}: no constant {unknown[0]!r}", "see docs/glossary.md")
     return tuple(names)
+
+
+def read_limits(path: Path) -> Limits:
+    """A limits file as a record; raises UsageError for a key, a word or a number it cannot read.
+
+    What the file means is judged by `lots.limits_lint`.
+    """
+    document = _document(path)
+    _only(document, KEYS, path.name)
+    rules = _map(document, "rules", path.name)
+    _only(rules, RULE_KEYS, f"{path.name}: rules")
+    constants = _map(document, "constants", path.name)
+    golden = document.get("golden") or []
+    if not isinstance(golden, list) or not all(isinstance(one, str) for one in golden):
+        raise UsageError(f"{path.name}: golden is no list of motors", "write [GM-1, GM-2]")
+    values: dict[str, Any] = {key: _number(rules, key, path.name) for key in rules}
+    if "min_lots" in values:
+        values["min_lots"] = int(values["min_lots"])
+    return Limits(
+        name=path.stem,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        required=required_constants(path),
+        constants=tuple(_constant(path.name, name, said) for name, said in constants.items()),
+        golden=tuple(golden),
+        **values,
+    )
+
+
+def _document(path: Path) -> dict[str, Any]:
+    try:
+        document = load_plain(path.read_bytes(), path.name)
+    except CaptureError as error:
+        raise UsageError(error.message, error.remedy) from error
+    if not isinstance(document, dict):
+        raise UsageError(f"{path.name} holds no keys", "write `key: value` lines")
+    return document
+
+
+def _only(document: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    for key in document:
+        if key not in known:
+            raise UsageError(f"{where}: no key {key!r}", f"known are {', '.join(known)}")
+
+
+def _map(document: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
+    found = document.get(key) or {}
+    if not isinstance(found, dict):
+        raise UsageError(f"{where}: {key} holds no keys", "write `key: value` lines below it")
+    return found
+
+
+def _number(document: Mapping[str, Any], key: str, where: str) -> float:
+    try:
+        return number_from(document[key])
+    except UsageError as error:
+        raise UsageError(f"{where}: {key}: {error.message}", error.remedy) from error
+
+
+def _amount(text: Any, where: str) -> Amount:
+    if not isinstance(text, str):
+        raise UsageError(f"{where} is no size", "write 0.0071, 3 %, 1.5 sd or 0.822 U")
+    try:
+        return amount_from(text)
+    except UsageError as error:
+        raise UsageError(f"{where}: {error.message}", error.remedy) from error
+
+
+def _constant(file: str, name: str, said: Any) -> ConstantLimits:
+    where = f"{file}: {name}"
+    said = said or {}
+    if not isinstance(said, dict):
+        raise UsageError(f"{where} holds no keys", "write {tolerance: 3 %} or lines below it")
+    _only(said, CONSTANT_KEYS, where)
+    values: dict[str, Any] = {}
+    for key in ("nominal", "minimum", "maximum"):
+        if key in said and not (key == "nominal" and said[key] == "baseline"):
+            values[key] = _number(said, key, where)
+    for key in ("tolerance", "guard_band"):
+        if key in said:
+            values[key] = _amount(said[key], f"{where}: {key}")
+    margins = said.get("equivalence_margin", [])
+    margins = margins if isinstance(margins, list) else [margins]
+    values["margins"] = tuple(_amount(one, f"{where}: equivalence_margin") for one in margins)
+    return ConstantLimits(name=name, **values, **_choices(said, where))
+
+
+def _choices(said: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """The decision rule and what is answered by yes or no."""
+    chosen: dict[str, Any] = {}
+    if "decision_rule" in said:
+        if said["decision_rule"] not in RULES:
+            known = ", ".join(RULES)
+            raise UsageError(
+                f"{where}: no decision rule {said['decision_rule']!r}", f"known are {known}"
+            )
+        chosen["rule"] = said["decision_rule"]
+    for key, field in (("decides", "decides"), ("tolerate_within_margin", "tolerate")):
+        if key in said:
+            if str(said[key]).lower() not in WORDS:
+                raise UsageError(f"{where}: {key} is {said[key]!r}", "write yes or no")
+            chosen[field] = WORDS[str(said[key]).lower()]
+    return chosen

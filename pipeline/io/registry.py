@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Literal
 
@@ -164,7 +164,37 @@ class Registry:
             raise self._missing()
         _, added = self._table.append(append)
         decided = found[0]
-        return Version(decided.published, (*decided.decisions, *added)), bool(added)
+        return replace(decided, decisions=(*decided.decisions, *added)), bool(added)
+
+    def tag(
+        self,
+        kind: Literal["tag", "untag"],
+        versions: Sequence[Version],
+        name: str,
+        by: str,
+        now: datetime,
+    ) -> int:
+        """Gives versions a name, or takes it from them, in one commit; how many were changed."""
+        wanted = {version.key: version.revision for version in versions}
+
+        def append(events: Sequence[Event]) -> list[Row]:
+            there = {v.key: v.tags for own in histories(events).values() for v in own}
+            number, chain = (events[-1].sequence, events[-1].chain) if events else (0, START)
+            rows: list[Row] = []
+            for key, revision in wanted.items():
+                if (name in there[key]) == (kind == "tag"):
+                    continue
+                number += 1
+                event = Event(number, _utc(now), kind, *key, revision, by=by, why=name)
+                event = event.linked(chain)
+                chain = event.chain
+                rows.append((event, None))
+            return rows
+
+        if self._table.events() is None:
+            raise self._missing()
+        _, added = self._table.append(append)
+        return len(added)
 
     def events(self) -> list[Event]:
         """Every event in the order of commits; raises UsageError where there is no registry."""

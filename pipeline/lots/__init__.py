@@ -1,0 +1,1 @@
+"""Whether a production lot still makes the same motor: statistics over many datasheets."""

@@ -49,6 +49,7 @@ class CaptureReference:
     test: str
     integrity: str
     station: str | None = None
+    started_at: str | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -58,6 +59,7 @@ class CaptureReference:
             "test": self.test,
             "integrity": self.integrity,
             "station": self.station,
+            "started_at": self.started_at,
         }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from scipy.special import stdtrit
@@ -21,11 +21,24 @@ Conditions = Mapping[str, float | int | str]
 
 
 @dataclass(frozen=True, slots=True)
+class Order:
+    """One order a turn that was found: amplitude and its u [unit of the estimate], phase of its
+    cosine [rad].
+    """
+
+    order: int
+    amplitude: float
+    u: float
+    phase_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class Estimate:
     """One constant of one motor. `value` is None exactly when `status` is not_identifiable.
 
     `method` is the estimator's name, `at` the conditions the value holds for (names from the
-    glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used.
+    glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used,
+    `orders` the spectrum behind it, where it has one.
     """
 
     name: str
@@ -39,6 +52,7 @@ class Estimate:
     note: str = ""
     bounds: tuple[float, float] | None = None
     at_bound: bool = False
+    orders: tuple[Order, ...] = ()
 
     def __post_init__(self) -> None:
         if (self.value is None) != (self.status == "not_identifiable"):
@@ -87,7 +101,8 @@ class Estimate:
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`; infinite degrees of freedom become null."""
         known = self.known
-        return {
+        spectrum = {"orders": [asdict(one) for one in self.orders]} if self.orders else {}
+        return spectrum | {
             "value": self.value,
             "unit": self.unit,
             "u": self.u if known else None,

@@ -1,7 +1,8 @@
 """The events of the registry, and what follows from them: revisions, statuses, what was valid when.
 
 The registry is a list of events that only grows. A datasheet version enters it by `publish` and
-is never changed; `approve` and `revoke` say what people decided of it, and why.
+is never changed; `approve` and `revoke` say what people decided of it, and why; `tag` and `untag`
+give it a name that many versions may share.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Literal
 
 from pipeline.records.datasheet import AWAITS_APPROVAL, DatasheetStatus
 
-EventKind = Literal["publish", "approve", "revoke"]
+EventKind = Literal["publish", "approve", "revoke", "tag", "untag"]
 Standing = Literal["released", "provisional", "refused", "revoked"]
 START = "0" * 64
 
@@ -27,7 +28,7 @@ class Event:
     `revision` counts the versions of one motor. `chain` is the sha256 of this row and the chain of
     the row before, so that no row can be changed, lost or put in without notice. What a datasheet
     says of itself (`motor_type` to `content_sha256`) is there for `publish` alone, `by` and `why`
-    for the decisions alone.
+    for the decisions alone; the `why` of a tag is its name.
     """
 
     sequence: int
@@ -65,10 +66,14 @@ def _link(event: Event, before: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """One version of a motor's datasheet and what was decided of it, oldest decision first."""
+    """One version of a motor's datasheet and what was decided of it, oldest decision first.
+
+    `tags` are the names that it bears.
+    """
 
     published: Event
     decisions: tuple[Event, ...] = ()
+    tags: frozenset[str] = frozenset()
 
     @property
     def key(self) -> tuple[str, str]:
@@ -116,16 +121,22 @@ def histories(
     """
     published: dict[tuple[str, str], Event] = {}
     decided: dict[tuple[str, str], list[Event]] = {}
+    tagged: dict[tuple[str, str], set[str]] = {}
     for event in sorted(events, key=lambda event: event.sequence):
         if until is not None and event.recorded_at > until:
             continue
         if event.kind == "publish":
             published.setdefault(event.key, event)
+        elif event.kind == "tag":
+            tagged.setdefault(event.key, set()).add(event.why or "")
+        elif event.kind == "untag":
+            tagged.setdefault(event.key, set()).discard(event.why or "")
         else:
             decided.setdefault(event.key, []).append(event)
     found: dict[str, list[Version]] = {}
     for key, event in published.items():
-        found.setdefault(event.motor_id, []).append(Version(event, tuple(decided.get(key, ()))))
+        decisions, tags = tuple(decided.get(key, ())), frozenset(tagged.get(key, ()))
+        found.setdefault(event.motor_id, []).append(Version(event, decisions, tags))
     return {motor_id: tuple(found[motor_id]) for motor_id in sorted(found)}
 
 

@@ -64,6 +64,8 @@ def datasheet_text(version: Version, sheet: Datasheet) -> str:
     ]
     lines += [f"  {sheet.status} as published: {safe(reason)}" for reason in sheet.why]
     lines += [f"  {decision(event)}" for event in version.decisions]
+    if version.tags:
+        lines.append(f"  tags: {safe(', '.join(sorted(version.tags)))}")
     rows = [(name, _value(est), est.status) for name, est in sorted(sheet.constants.items())]
     checks = [(c.name, c.status, c.meaning) for c in sheet.checks]
     for part in (rows, checks):

@@ -115,13 +115,15 @@ class Fleet:
     station: str
     motors: tuple[Motor, ...]
     started_at: Mapping[str, str]
+    tests: tuple[str, ...] = ()
 
 
 def fleet_from(document: Mapping[str, Any], design: Mapping[str, Any]) -> Fleet:
     """The motors of a fleet document; each motor's draw hangs on the seed and its number alone.
 
     `spread` is the relative standard deviation between motors of one lot, `shift` a lot's own
-    relative departure from the design, `faults` effects of single motors.
+    relative departure from the design, `effects` those of all motors of a lot, `faults` those of
+    single motors. `tests` names the captures of the campaign that are recorded, all without it.
     """
     base, seed = motor_from(design), int(_number(document["seed"], "seed"))
     spread = {k: _number(v, k) for k, v in (document.get("spread") or {}).items()}
@@ -131,13 +133,16 @@ def fleet_from(document: Mapping[str, Any], design: Mapping[str, Any]) -> Fleet:
         shift = {k: _number(v, k) for k, v in (words.get("shift") or {}).items()}
         for motor_id in words["motors"]:
             motor = replace(base, motor_id=motor_id, lot=lot)
+            motor = motor.having(**effects_from(words.get("effects") or {}, motor))
             motor = _one_of_many(motor, spread, shift, seed_of(seed, motor_id))
             motors.append(motor.having(**effects_from(faults.get(motor_id) or {}, motor)))
             started[motor_id] = words["started_at"]
     stray = set(faults) - set(started)
     if stray:
         raise ValueError(f"faults of motors that no lot holds: {', '.join(sorted(stray))}")
-    return Fleet(str(document["motor"]), seed, str(document["station"]), tuple(motors), started)
+    tests = tuple(document.get("tests") or ())
+    station = str(document["station"])
+    return Fleet(str(document["motor"]), seed, station, tuple(motors), started, tests)
 
 
 def seed_of(seed: int, motor_id: str) -> int:

@@ -96,7 +96,9 @@ def assemble(
 ) -> Datasheet:
     """The datasheet of one motor; its version is a digest of inputs, configuration and code."""
     references = tuple(
-        CaptureReference(c.path, c.sha256, c.meta.test, c.integrity, c.meta.station)
+        CaptureReference(
+            c.path, c.sha256, c.meta.test, c.integrity, c.meta.station, c.meta.started_at
+        )
         for c in campaign.captures
     )
     chosen = constants.chosen()

@@ -8,9 +8,10 @@ from datetime import UTC, datetime, time
 from typing import Literal
 
 from pipeline.io.registry import Registry, one_of
+from pipeline.lots.selector import OF_CONTENT, known, parse_selector
 from pipeline.records.difference import changes
 from pipeline.records.errors import UsageError
-from pipeline.records.ledger import Selection, Version, histories, in_force, select
+from pipeline.records.ledger import Selection, Version, histories, in_force, newest, select
 from pipeline.records.outcome import Outcome
 from pipeline.report.registry_text import (
     datasheet_text,
@@ -24,6 +25,7 @@ from pipeline.report.registry_text import (
 from pipeline.settings import RegistrySettings
 
 PREFIX = re.compile("[0-9a-f]{4,64}")
+TAG = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 
 def main(settings: RegistrySettings) -> Outcome:
@@ -116,6 +118,34 @@ def _decide(
     return Outcome(text=text + decision(version.decisions[-1]))
 
 
+def _tag(registry: Registry, settings: RegistrySettings) -> Outcome:
+    return _name(registry, settings, "tag")
+
+
+def _untag(registry: Registry, settings: RegistrySettings) -> Outcome:
+    return _name(registry, settings, "untag")
+
+
+def _name(registry: Registry, settings: RegistrySettings, kind: Literal["tag", "untag"]) -> Outcome:
+    """Gives the newest version of each motor that `select` takes, or one motor's, a name."""
+    tag, by = _needed(settings, "tag"), _needed(settings, "by")
+    if not TAG.fullmatch(tag):
+        raise UsageError(f"tag={tag} is no name", "letters, digits and - _ . up to 64")
+    if settings.select is not None:
+        versions = [v for own in histories(registry.events()).values() for v in own]
+        query = parse_selector(settings.select, versions)
+        if any(name in query.terms for name in OF_CONTENT):
+            raise UsageError("registry tag: select by what a version's row says", "use `lot:...`")
+        chosen = newest(v for v in versions if query.takes(v))
+        if not chosen:
+            raise UsageError(f"select={settings.select} selects nothing", known(versions))
+    else:
+        chosen = (_version(registry, settings, newest=True),)
+    changed = registry.tag(kind, chosen, tag, by, datetime.now(UTC))
+    done = "now bear" if kind == "tag" else "no longer bear"
+    return Outcome(text=f"{len(chosen)} versions {done} the tag {tag}, {changed} of them changed")
+
+
 ACTIONS: Mapping[str, Callable[[Registry, RegistrySettings], Outcome]] = {
     "list": _list,
     "show": _show,
@@ -124,6 +154,8 @@ ACTIONS: Mapping[str, Callable[[Registry, RegistrySettings], Outcome]] = {
     "verify": _verify,
     "approve": _approve,
     "revoke": _revoke,
+    "tag": _tag,
+    "untag": _untag,
 }
 
 

@@ -141,7 +141,8 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
     required = required_constants(limits)
-    work = canonical_json(result_document(settings)) + limits.read_bytes()
+    # Of the limits file, what a lot is held to changes no datasheet.
+    work = canonical_json({**result_document(settings), "required": required})
     return [
         MotorJob(
             motor_id=motor_id,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
@@ -15,7 +15,7 @@ from pipeline.records.errors import UsageError
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import SimulateSettings, configuration_folder
-from pipeline.simulator.bench import campaign
+from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.catalogue import (
     bench_from,
     fleet_from,
@@ -41,6 +41,8 @@ SMALL = ("csv", "json_samples", "protobuf_samples", "cdr_samples", "json", "cdr"
 LARGE = (Format("protobuf"), Format("cdr"))
 LARGE_ROWS = 3000
 
+Plan = tuple[tuple[str, str, Mapping[str, Any]], ...]
+
 
 def main(settings: SimulateSettings) -> Outcome:
     """Writes the captures of one motor, or of every motor of a fleet, each with `truth.json`."""
@@ -56,9 +58,9 @@ def main(settings: SimulateSettings) -> Outcome:
     except (ValueError, KeyError) as error:
         raise UsageError(f"simulate: {error}", "correct it") from error
     lines = []
-    for folder, motor, bench, seed in jobs:
+    for folder, motor, bench, seed, plan in jobs:
         with watch.stage("simulate"):
-            recordings, true = _simulated(motor, bench, seed)
+            recordings, true = _simulated(motor, bench, seed, plan)
         with watch.stage("write"):
             written = _write(output / folder, recordings, settings.encoding)
             write_whole(output / folder / TRUTH, canonical_json(true))
@@ -66,15 +68,17 @@ def main(settings: SimulateSettings) -> Outcome:
     return Outcome(text="\n".join(lines) + "\n", timings=watch.table())
 
 
-def _simulated(motor: Motor, bench: Bench, seed: int) -> tuple[list[Recording], dict[str, Any]]:
+def _simulated(
+    motor: Motor, bench: Bench, seed: int, plan: Plan
+) -> tuple[list[Recording], dict[str, Any]]:
     try:
-        return campaign(motor, bench, seed), truth(motor)
+        return campaign(motor, bench, seed, plan), truth(motor)
     except ValueError as error:
         raise UsageError(f"simulate: {motor.motor_id}: {error}", "choose another size") from error
 
 
-Job = tuple[str, Motor, Bench, int]
-"""Subfolder, motor, bench, seed."""
+Job = tuple[str, Motor, Bench, int, Plan]
+"""Subfolder, motor, bench, seed, captures to record (all of the campaign where empty)."""
 
 
 def _single(settings: SimulateSettings) -> Iterable[Job]:
@@ -87,7 +91,7 @@ def _single(settings: SimulateSettings) -> Iterable[Job]:
     bench = bench_from(document.get("bench") or {})
     if settings.exact:
         bench = replace(bench, instruments=EXACT)
-    yield "", motor, bench, settings.seed
+    yield "", motor, bench, settings.seed, ()
 
 
 def _fleet(settings: SimulateSettings) -> Iterable[Job]:
@@ -99,10 +103,19 @@ def _fleet(settings: SimulateSettings) -> Iterable[Job]:
     fleet = fleet_from(words, document)
     settled = {**(document.get("bench") or {}), **(words.get("bench") or {})}
     bench = replace(bench_from(settled), station=fleet.station)
+    plan = _plan(fleet.tests)
     drawn = EXACT if settings.exact else bench.drawn(np.random.default_rng(fleet.seed))
     for motor in fleet.motors:
         there = replace(bench, instruments=drawn, started_at=fleet.started_at[motor.motor_id])
-        yield file_stem(motor.motor_id), motor, there, seed_of(fleet.seed, motor.motor_id)
+        yield file_stem(motor.motor_id), motor, there, seed_of(fleet.seed, motor.motor_id), plan
+
+
+def _plan(tests: Sequence[str]) -> Plan:
+    """The steps of the campaign of these names; raises ValueError for one that it has not."""
+    known = [stem for stem, _, _ in CAMPAIGN]
+    if stray := set(tests) - set(known):
+        raise ValueError(f"no test {', '.join(sorted(stray))}; there are {', '.join(known)}")
+    return tuple(step for step in CAMPAIGN if step[0] in tests)
 
 
 def _document(kind: str, name: str) -> dict[str, Any]:

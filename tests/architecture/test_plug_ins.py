@@ -15,6 +15,8 @@ from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
 from pipeline.crosscheck import rules as rules_room
 from pipeline.crosscheck.registry import check_all, rules
+from pipeline.export import exporters as exporters_room
+from pipeline.export.registry import exporters
 from pipeline.fit import estimators as estimators_room
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
@@ -59,11 +61,24 @@ def check(capture, options):
 GATE = Gate("dropped_in", ("flux_map",), check)
 '''
 
+EXPORTER = '''
+"""Pole pairs alone."""
+from pipeline.export.protocol import Exporter
+
+def render(source, options):
+    return repr(source.value("pole_pairs"))
+
+def read(text):
+    return {"pole_pairs": float(text)}
+
+EXPORTER = Exporter("dropped_in", "txt", "pole pairs", render, read)
+'''
+
 
 @pytest.fixture
 def drop_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
     """Puts one file into a room for the length of a test."""
-    registries = (estimators, rules, gates)
+    registries = (estimators, rules, gates, exporters)
 
     def drop(room: ModuleType, source: str) -> None:
         (tmp_path / "dropped_in.py").write_text(source)
@@ -117,7 +132,12 @@ def test_a_gate_is_one_file(drop_in: Callable[..., None], capture: Capture) -> N
     assert validate(capture, {"dropped_in": {"enabled": 0.0}})[1] == ()
 
 
+def test_an_exporter_is_one_file(drop_in: Callable[..., None]) -> None:
+    drop_in(exporters_room, EXPORTER)
+    assert exporters()["dropped_in"].read("7.0") == {"pole_pairs": 7.0}
+
+
 def test_rooms_are_clean_again() -> None:
     """The tests above leave nothing behind."""
-    plugs = (*estimators(), *rules(), *gates())
+    plugs = (*estimators(), *rules(), *gates(), *exporters().values())
     assert "dropped_in" not in {plug.name for plug in plugs}

@@ -17,11 +17,14 @@ from pipeline.commands import COMMANDS
 from pipeline.contracts.protocol import Gate
 from pipeline.criticism.effect import Effect
 from pipeline.crosscheck.protocol import Rule
+from pipeline.export.protocol import Exporter, Source
 from pipeline.fit.protocol import Estimator
 from pipeline.io.source_map import parse_source_map
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.errors import UsageError
+from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.uncertainty import type_a
 
 ROOT = Path(__file__).parents[2]
@@ -130,19 +133,33 @@ def test_example_source_map_is_read() -> None:
 
 
 def test_example_exporter() -> None:
-    lines = example("moteus_lines").moteus_lines
-    names = ("r_phase_ohm", "ld_h", "lq_h", "kv_ll_peak_rpm_v", "pole_pairs")
-    constants = {name: {"value": 7.0, "status": "measured", "note": ""} for name in names}
-    assert "conf set motor.poles 14" in lines({"constants": constants})
-    constants["ld_h"] = {"value": None, "status": "not_identifiable", "note": "record an lcr table"}
-    with pytest.raises(KeyError, match="record an lcr table"):
-        lines({"constants": constants})
+    exporter = example("EXPORTER").EXPORTER
+    assert isinstance(exporter, Exporter)
+    constants = {
+        name: Estimate(name, 7.0, unit, "measured", "x")
+        for name, unit in (("r_phase_ohm", "ohm"), ("kv_ll_peak_rpm_v", "rpm/V"))
+    }
+    none = ("M", None, None, "v", "released", (), (), "c", "0", constants, (), ())
+    source = Source(Datasheet(*none), 1)  # type: ignore[arg-type]
+    text = exporter.render(source, {})
+    assert "resistance_line_ohm=14.0" in text
+    assert exporter.read(text) == {"r_phase_ohm": 7.0, "kv_ll_peak_rpm_v": 7.0}
+    constants["r_phase_ohm"] = not_identifiable("r_phase_ohm", "ohm", "x", "record a resistance")
+    with pytest.raises(UsageError, match="record a resistance"):
+        exporter.render(source, {})
 
 
-@pytest.mark.parametrize("room", ["fit/estimators", "crosscheck/rules", "contracts/gates"])
+@pytest.mark.parametrize(
+    "room", ["fit/estimators", "crosscheck/rules", "contracts/gates", "export/exporters"]
+)
 def test_examples_are_in_the_style_of_the_house(room: str) -> None:
     """Each example passes the linter and the formatter in the room it is for."""
-    mark = {"fit/estimators": "ESTIMATOR", "crosscheck/rules": "RULE", "contracts/gates": "GATE"}
+    mark = {
+        "fit/estimators": "ESTIMATOR",
+        "crosscheck/rules": "RULE",
+        "contracts/gates": "GATE",
+        "export/exporters": "EXPORTER",
+    }
     (source,) = [text for text in blocks("python") if f"\n{mark[room]} = " in text]
     name = f"--stdin-filename=pipeline/{room}/example.py"
     for words in (["check", name], ["format", "--check", name]):

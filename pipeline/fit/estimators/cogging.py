@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from pipeline.physics.glossary import CONSTANTS
 from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate, Order, not_identifiable
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Budget, Contribution
 
@@ -171,9 +172,20 @@ def _cogging(
     return (
         Estimate("cogging_order", leading.order, "1", "measured", NAME, captures=paths, note=note,
                  bounds=(1.0, float(spec.orders[-1]))),
-        _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, gain, paths, note),
+        replace(
+            _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, gain, paths, note),
+            orders=_published(lines),
+        ),
         _torque("cogging_peak_nm", peak, u_peak, dof, gain, paths, note),
     )  # fmt: skip
+
+
+def _published(lines: Sequence[OrderLine]) -> tuple[Order, ...]:
+    """The orders found, by order."""
+    return tuple(
+        Order(line.order, line.amplitude, line.u, float(np.angle(line.coefficient)))
+        for line in sorted(lines, key=lambda line: line.order)
+    )
 
 
 def _torque(

@@ -1,0 +1,1 @@
+"""Datasheets as other programs read them; one exporter a file."""

@@ -1,0 +1,111 @@
+"""What an exporter is, and what it may take from a datasheet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.errors import UsageError
+from pipeline.records.estimate import Estimate
+
+USABLE = ("measured", "derived")
+Options = Mapping[str, str]
+Values = dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A released datasheet on its way out: what it says, its revision, constants' own terms."""
+
+    sheet: Datasheet
+    revision: int
+    terms: Mapping[str, Term] = field(default_factory=lambda: dict(CONSTANTS))
+
+    def estimate(self, name: str) -> Estimate:
+        """A constant that may be exported.
+
+        Raises UsageError for one that is missing, assumed or not identifiable, and for one whose
+        convention is not known: not in the glossary, or in another unit than the glossary's.
+        """
+        found = self.optional(name)
+        if found is None:
+            estimate = self.sheet.constants.get(name)
+            status = "missing" if estimate is None else estimate.status
+            note = "" if estimate is None or not estimate.note else f" ({estimate.note})"
+            raise UsageError(
+                f"motor {self.sheet.motor_id!r}: {name} is {status}{note}",
+                "an export holds measured and derived constants only",
+            )
+        return found
+
+    def optional(self, name: str) -> Estimate | None:
+        """A constant where it may be exported, else None; raises UsageError as `estimate` does
+        for an unknown convention.
+        """
+        estimate = self.sheet.constants.get(name)
+        if estimate is None:
+            return None
+        term = self.terms.get(name)
+        if term is None or term.unit != estimate.unit:
+            said = "is not in the glossary" if term is None else f"is stated in {estimate.unit}"
+            raise UsageError(
+                f"motor {self.sheet.motor_id!r}: the convention of {name} is unknown, it {said}",
+                "rename it to a name of docs/glossary.md, which says peak or rms, phase or line",
+            )
+        return estimate if estimate.known and estimate.status in USABLE else None
+
+    def value(self, name: str) -> float:
+        """A constant's value in the glossary's unit and convention; raises as `estimate` does."""
+        return self.estimate(name).number
+
+    def all(self) -> list[Estimate]:
+        """Every constant that may be exported, by name; raises as `optional` does."""
+        found = (self.optional(name) for name in sorted(self.sheet.constants))
+        return [estimate for estimate in found if estimate is not None]
+
+    def heading(self) -> list[str]:
+        """Lines that say what this is, free of anything that would end a comment."""
+        sheet = self.sheet
+        own = (
+            f"motor {sheet.motor_id}, type {sheet.motor_type or 'not stated'}",
+            f"datasheet revision {self.revision}, version {sheet.version}, released",
+            "resistance and magnet flux at 25 degC; not a calibration certificate",
+        )
+        return [plain(line) for line in own]
+
+
+@dataclass(frozen=True, slots=True)
+class Exporter:
+    """One format. `render` gives the text, `read` the constants (glossary's names, units and
+    conventions) back out of it, whatever the receiver's own conventions; `options` with words.
+    """
+
+    name: str
+    extension: str
+    words: str
+    render: Callable[[Source, Options], str]
+    read: Callable[[str], Values]
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+def plain(text: str) -> str:
+    """The text as a comment may hold it in C, XML, shell or CSV: printable, no comment's end."""
+    shown = "".join(char if char.isprintable() else " " for char in text)
+    for ending in ("*/", "--", "\\"):
+        shown = shown.replace(ending, " ")
+    return shown.rstrip("-")
+
+
+def number_option(options: Options, name: str) -> float | None:
+    """An option as a positive number; raises UsageError for another text."""
+    if name not in options:
+        return None
+    try:
+        value = float(options[name])
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < float("inf"):
+        raise UsageError(f"options.{name}={options[name]} is no positive number", "correct it")
+    return value

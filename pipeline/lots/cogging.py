@@ -1,0 +1,113 @@
+"""The cogging torque of a side's motors over one turn, and its orders beside each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.lots.sample import Member
+from pipeline.lots.traits import NO_COGGING, SPECTRUM
+from pipeline.records.estimate import Order
+from pipeline.records.lot_constant import Side
+from pipeline.records.lot_regression import CoggingBand, OrderLevel
+
+Array = NDArray[np.float64]
+POINTS_A_PERIOD = 24
+MOST_POINTS = 2049
+MOST_ORDERS = 12
+
+
+def spectra_of(members: Iterable[Member], side: Side) -> list[tuple[Order, ...]]:
+    """The orders of each motor of a side that was tested for cogging; empty for none found."""
+    found = []
+    for member in members:
+        estimate = member.sheet.constants.get(SPECTRUM)
+        if member.side != side or estimate is None:
+            continue
+        if estimate.orders or estimate.note.startswith(NO_COGGING):
+            found.append(estimate.orders)
+    return found
+
+
+def order_levels(members: Sequence[Member]) -> tuple[OrderLevel, ...]:
+    """Amplitude of each order by side, over the motors tested, those that lack it counted as 0."""
+    levels = []
+    sides: tuple[Side, ...] = ("baseline", "candidate")
+    spectra = {side: spectra_of(members, side) for side in sides}
+    for order in _largest([*spectra["baseline"], *spectra["candidate"]]):
+        for side, own in spectra.items():
+            if not own:
+                continue
+            sizes = [sum(o.amplitude for o in orders if o.order == order) for orders in own]
+            levels.append(
+                OrderLevel(
+                    side,
+                    order,
+                    float(np.mean(sizes)),
+                    float(np.std(sizes, ddof=1)) if len(sizes) > 1 else None,
+                    sum(size > 0.0 for size in sizes),
+                    len(sizes),
+                )
+            )
+    return tuple(levels)
+
+
+def _largest(spectra: Sequence[tuple[Order, ...]]) -> list[int]:
+    """The orders that are largest anywhere, rising."""
+    size: dict[int, float] = {}
+    for orders in spectra:
+        for one in orders:
+            size[one.order] = max(size.get(one.order, 0.0), one.amplitude)
+    return sorted(sorted(size, key=lambda order: (-size[order], order))[:MOST_ORDERS])
+
+
+def cogging_bands(members: Sequence[Member]) -> tuple[CoggingBand, ...]:
+    """Mean wave of each side over one turn ± one standard deviation between motors [N·m].
+
+    The encoder's zero is arbitrary: every motor is turned to where the crest of the leading order
+    lies at zero, and among the crests to the one that puts its next largest order in phase.
+    """
+    bands = []
+    sides: tuple[Side, ...] = ("baseline", "candidate")
+    spectra = {side: [s for s in spectra_of(members, side) if s] for side in sides}
+    highest = max(_largest([s for own in spectra.values() for s in own]), default=0)
+    if highest == 0:
+        return ()
+    points = min(POINTS_A_PERIOD * highest + 1, MOST_POINTS)
+    theta = np.linspace(0.0, 2.0 * math.pi, points)
+    for side, own in spectra.items():
+        if not own:
+            continue
+        waves = np.array([_wave(orders, theta) for orders in own])
+        mean = waves.mean(axis=0)
+        spread = waves.std(axis=0, ddof=1) if len(own) > 1 else np.zeros(points)
+        bands.append(
+            CoggingBand(
+                side,
+                len(own),
+                tuple(theta.tolist()),
+                tuple(mean.tolist()),
+                tuple((mean - spread).tolist()),
+                tuple((mean + spread).tolist()),
+            )
+        )
+    return tuple(bands)
+
+
+def _wave(orders: Sequence[Order], theta: Array) -> Array:
+    by_size = sorted(orders, key=lambda one: (-one.amplitude, one.order))
+    lead = by_size[0]
+    crests = (2.0 * math.pi * np.arange(lead.order) - lead.phase_rad) / lead.order
+    zero = float(crests[0])
+    if len(by_size) > 1:
+        second = by_size[1]
+        zero = float(
+            crests[np.argmax(np.round(np.cos(second.order * crests + second.phase_rad), 9))]
+        )
+    wave: Array = np.zeros(theta.size)
+    for one in orders:
+        wave += one.amplitude * np.cos(one.order * (theta + zero) + one.phase_rad)
+    return wave

@@ -1,0 +1,280 @@
+"""One constant's result, put together from its numbers, limits and place in the family."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.lots.assess import Assessment, label
+from pipeline.lots.bounds import Held, conformity
+from pipeline.lots.capability import NONE as NO_CAPABILITY
+from pipeline.lots.capability import capability
+from pipeline.lots.chart import ewma_chart
+from pipeline.lots.equivalence import NOT_EVALUATED, equivalence
+from pipeline.lots.gauge import study
+from pipeline.lots.lot_test import detectable, power
+from pipeline.lots.outliers import critical_z, robust_z
+from pipeline.lots.sample import Value
+from pipeline.lots.variance import parted
+from pipeline.lots.verdict import judge
+from pipeline.records.limits import ConstantLimits, Limits
+from pipeline.records.lot_constant import (
+    Component,
+    ConstantResult,
+    EffectSize,
+    Equivalence,
+    Gauge,
+    LotMean,
+    LotTest,
+    MotorValue,
+    Power,
+    Side,
+    StationBias,
+)
+
+SHIFT_SD = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """What a constant's test needs of the others: adjusted p values, how many were tested."""
+
+    lot_p_holm: float | None
+    motor_p_holm: float | None
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """Everything known of one constant: values, repeats and golden motors with it."""
+
+    own: ConstantLimits
+    unit: str
+    words: str
+    found: Assessment
+    held: Held
+    golden: tuple[Value, ...]
+    repeats: tuple[Value, ...]
+    missing: tuple[str, ...]
+
+
+def result(
+    made: Material, family: Family, limits: Limits, started: Mapping[str, str]
+) -> ConstantResult:
+    """The record of one constant; `started` are the lots in order of time."""
+    found = made.found
+    candidate = [v for v in found.values if v.side == "candidate"]
+    lots = {lot: list(v) for side in (found.base, found.candidate) for lot, v in side.items()}
+    mean = float(np.mean(found.candidate_means)) if found.candidate else 0.0
+    flat = [value for values in found.candidate.values() for value in values]
+    spread = float(np.std(flat, ddof=1)) if len(flat) > 1 else None
+    conform = conformity(made.held, candidate, found.corrected, mean, spread)
+    test = _test(found, family, limits)
+    same = _equivalence(found, made.held.margin, limits.alpha)
+    told = judge(made.own, made.unit, found, conform, test, same, family.motor_p_holm, limits.alpha)
+    tolerance = made.held.tolerance
+    return ConstantResult(
+        name=made.own.name,
+        unit=made.unit,
+        words=made.words,
+        verdict=told.verdict,
+        why=told.why,
+        decides=made.own.decides,
+        temperature_degc=25.0,
+        motors=_motors(found, made.held),
+        lots=_lots(found, limits, started),
+        bounds=made.held.bounds,
+        conformity=conform,
+        test=test,
+        equivalence=same,
+        effect=_effect(found, limits.k),
+        power=_power(found, limits, family.size),
+        capability=capability(flat, tolerance.lower, tolerance.upper)
+        if tolerance is not None
+        else NO_CAPABILITY,
+        variance=_variance(made, lots),
+        gauge=gauge_of(made.repeats),
+        stations=_stations(made),
+        missing=made.missing,
+    )
+
+
+def _test(found: Assessment, family: Family, limits: Limits) -> LotTest:
+    lots, needed = len(found.base), limits.min_lots
+    if found.confounded:
+        return LotTest("CONFOUNDED", lots, needed, None, None, None, None, False)
+    if found.contrast is None:
+        return LotTest("not_evaluated", lots, needed, None, None, None, None, False)
+    if lots < needed or family.lot_p_holm is None:
+        return LotTest("INSUFFICIENT_HISTORY", lots, needed, None, None, None, None, False)
+    contrast = found.contrast
+    t = contrast.lot_t
+    return LotTest(
+        "evaluated",
+        lots,
+        needed,
+        t if t is not None and math.isfinite(t) else None,
+        contrast.lot_dof,
+        contrast.lot_p,
+        family.lot_p_holm,
+        family.lot_p_holm < limits.alpha,
+    )
+
+
+def _equivalence(found: Assessment, margin: float | None, alpha: float) -> Equivalence:
+    if found.contrast is None or margin is None or found.within_sd is None:
+        return NOT_EVALUATED
+    contrast = found.contrast
+    return equivalence(contrast.difference, contrast.u, contrast.dof, margin, alpha)
+
+
+def _effect(found: Assessment, k: float) -> EffectSize:
+    contrast = found.contrast
+    if contrast is None:
+        return EffectSize(None, None, None, None, None, None)
+    before = float(np.mean(found.base_means))
+    return EffectSize(
+        contrast.difference,
+        contrast.u,
+        k,
+        k * contrast.u,
+        contrast.difference / abs(before) if before else None,
+        contrast.difference / found.within_sd if found.within_sd else None,
+    )
+
+
+def _power(found: Assessment, limits: Limits, family: int) -> Power:
+    """Against a shift of 1.5 standard deviations of motors, at the hardest step of Holm's."""
+    contrast = found.contrast
+    if contrast is None or not found.within_sd:
+        return Power("none", None, None, None)
+    shift, alpha = SHIFT_SD * found.within_sd, limits.alpha / max(family, 1)
+    by_lots = len(found.base) >= limits.min_lots and contrast.lot_se is not None
+    se = contrast.lot_se if by_lots and contrast.lot_se is not None else contrast.u
+    dof = contrast.lot_dof if by_lots and contrast.lot_dof is not None else contrast.dof
+    return Power(
+        "lots" if by_lots else "motors",
+        shift,
+        power(shift, se, dof, alpha),
+        detectable(se, dof, alpha),
+    )
+
+
+def _motors(found: Assessment, held: Held) -> tuple[MotorValue, ...]:
+    by_lot: dict[tuple[Side, str], list[Value]] = {}
+    for value in found.values:
+        if value.side is not None:
+            by_lot.setdefault((value.side, value.lot), []).append(value)
+    keys = {key: f"{key[0]}/{key[1]}" for key in by_lot}
+    scores = robust_z(
+        {keys[key]: [found.corrected[v.motor_id] for v in own] for key, own in by_lot.items()}
+    )
+    limit = critical_z(len(found.values), len(by_lot))
+    return tuple(
+        MotorValue(
+            motor_id=value.motor_id,
+            lot=value.lot,
+            side=key[0],
+            stations=value.stations,
+            value=found.corrected[value.motor_id],
+            u=value.u,
+            correction=-found.correction.of(label(value)),
+            decision=held.decisions.get(value.motor_id, "not_evaluated"),
+            z=z,
+            outlier=abs(z) > limit,
+            capture=value.captures[0] if value.captures else None,
+        )
+        for key, own in by_lot.items()
+        for value, z in zip(own, scores[keys[key]], strict=True)
+    )
+
+
+def _lots(found: Assessment, limits: Limits, started: Mapping[str, str]) -> tuple[LotMean, ...]:
+    """Lot means in order of time; charted where the baseline has lots enough."""
+    sides: list[tuple[Side, str, tuple[float, ...]]] = [
+        ("baseline", lot, values) for lot, values in found.base.items()
+    ]
+    sides += [("candidate", lot, values) for lot, values in found.candidate.items()]
+    charted = len(found.base) >= limits.min_lots and bool(found.lots_sd)
+    if charted:
+        means = np.array([np.mean(values) for _, _, values in sides])
+        centre = np.asarray(np.mean(found.base_means))
+        chart = ewma_chart(means, centre, np.asarray(found.lots_sd))
+    drawn = []
+    for i, (side, lot, values) in enumerate(sides):
+        sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
+        own = found.within_sd if sd is None else sd
+        drawn.append(
+            LotMean(
+                lot,
+                side,
+                started.get(lot),
+                len(values),
+                float(np.mean(values)),
+                (own or 0.0) / math.sqrt(len(values)),
+                sd,
+                float(chart.ewma[i]) if charted else None,
+                float(chart.low[i]) if charted else None,
+                float(chart.high[i]) if charted else None,
+                bool(chart.signal[i]) if charted else False,
+            )
+        )
+    return tuple(drawn)
+
+
+def _variance(made: Material, lots: Mapping[str, Sequence[float]]) -> tuple[Component, ...]:
+    again: dict[tuple[str, str], list[float]] = {}
+    for value in made.repeats:
+        again.setdefault((value.motor_id, label(value)), []).append(value.value)
+    biases = [b.bias for b in _stations(made) if b.bias is not None and b.u is not None]
+    scatter = [v.u_a for v in made.found.values if v.u_a > 0.0]
+    return parted(lots, list(again.values()), scatter, biases)
+
+
+def gauge_of(repeats: Sequence[Value]) -> Gauge | None:
+    """The gauge study of motors measured again on two stations or more; None without one.
+
+    Motors measured twice or more on every one of the most widely used stations, as many readings
+    as the least repeated of them.
+    """
+    cells: dict[str, dict[str, list[float]]] = {}
+    for value in repeats:
+        if value.station is not None:
+            cells.setdefault(value.motor_id, {}).setdefault(value.station, []).append(value.value)
+    by_stations: dict[tuple[str, ...], list[str]] = {}
+    for motor, own in cells.items():
+        full = tuple(sorted(station for station, values in own.items() if len(values) > 1))
+        if len(full) > 1:
+            by_stations.setdefault(full, []).append(motor)
+    if not by_stations:
+        return None
+    stations, motors = max(by_stations.items(), key=lambda item: (len(item[1]), item[0]))
+    if len(motors) < 2:
+        return None
+    repeated = min(len(cells[motor][station]) for motor in motors for station in stations)
+    table = [[cells[motor][s][:repeated] for s in stations] for motor in sorted(motors)]
+    return study(np.array(table))
+
+
+def _stations(made: Material) -> tuple[StationBias, ...]:
+    found = made.found
+    seen = {station: value for value in found.values if (station := label(value))}
+    golden: dict[str, set[str]] = {}
+    for value in made.golden:
+        golden.setdefault(label(value), set()).add(value.motor_id)
+    rows = []
+    for name in sorted(seen):
+        told = found.correction.bias.get(name)
+        motors = len(golden.get(name, ()))
+        by = "golden" if told is not None and motors else "lots" if told is not None else ""
+        if not by:
+            sides = {v.side for v in found.values if label(v) == name}
+            both = sides >= {"baseline", "candidate"} and seen[name].station is not None
+            by = "same_station" if both else "unreferenced"
+        u = found.correction.u_of(name) if told is not None else None
+        shown = seen[name].station or "(not stated)"
+        rows.append(StationBias(shown, told, u, by, motors))  # type: ignore[arg-type]
+    return tuple(rows)

@@ -1,0 +1,173 @@
+"""Gauge R&R: how much of what motors seem to differ by is the bench.
+
+References: [1] AIAG, Measurement Systems Analysis, 4th ed., 2010, III.B (analysis of variance).
+[2] R. K. Burdick, C. M. Borror, D. C. Montgomery, J. Quality Technology 35 (2003) 342 (intervals).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from pipeline.records.lot_constant import Gauge
+
+Array = NDArray[np.float64]
+POOL_FROM = 0.25
+GOOD, ACCEPTABLE = 0.10, 0.30
+DRAWS = 20_000
+SEED = 20_100_806
+LEVEL = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Mean squares [unit²] and degrees of freedom of a crossed study: P motors, O stations, n."""
+
+    motors: int
+    stations: int
+    repeats: int
+    ms_part: float
+    ms_station: float
+    ms_interaction: float
+    ms_error: float
+
+    @property
+    def dof(self) -> tuple[int, int, int, int]:
+        """Of part, station, interaction and error."""
+        p, o, n = self.motors, self.stations, self.repeats
+        return p - 1, o - 1, (p - 1) * (o - 1), p * o * (n - 1)
+
+    @property
+    def interaction_p(self) -> float:
+        """P value of MSI/MSE: do stations rank motors differently."""
+        _, _, i, e = self.dof
+        if self.ms_error == 0.0:
+            return 1.0 if self.ms_interaction == 0.0 else 0.0
+        return float(fdtrc(i, e, self.ms_interaction / self.ms_error))
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """Variances [unit²]; `interaction` is 0 where it was pooled into repeatability."""
+
+    repeatability: float
+    station: float
+    interaction: float
+    part: float
+
+    @property
+    def rr(self) -> float:
+        """Repeatability and reproducibility."""
+        return self.repeatability + self.station + self.interaction
+
+    @property
+    def percent(self) -> float:
+        """Study variation of R&R over the total, 0 to 1."""
+        total = self.rr + self.part
+        return math.sqrt(self.rr / total) if total > 0.0 else 0.0
+
+
+def anova(values: Array) -> Table:
+    """The table of readings [P motors, O stations, n repeats]; raises ValueError for too few."""
+    p, o, n = values.shape
+    if p < 2 or o < 2 or n < 2:
+        raise ValueError("a crossed study needs two motors, two stations and two repeats")
+    grand, cells = values.mean(), values.mean(axis=2)
+    parts, stations = cells.mean(axis=1), cells.mean(axis=0)
+    ss_part = o * n * float(np.sum((parts - grand) ** 2))
+    ss_station = p * n * float(np.sum((stations - grand) ** 2))
+    ss_cells = n * float(np.sum((cells - parts[:, None] - stations[None, :] + grand) ** 2))
+    ss_error = float(np.sum((values - cells[:, :, None]) ** 2))
+    return Table(
+        p,
+        o,
+        n,
+        ss_part / (p - 1),
+        ss_station / (o - 1),
+        ss_cells / ((p - 1) * (o - 1)),
+        ss_error / (p * o * (n - 1)),
+    )
+
+
+def components(table: Table, pool_from: float = POOL_FROM) -> Components:
+    """Variances by expected mean squares; an interaction with p above `pool_from` is pooled [1].
+
+    σ²_rep = MSE; σ²_station = (MSO − MSI)/(P n); σ²_part = (MSP − MSI)/(O n); none below 0.
+    """
+    pooled = table.interaction_p > pool_from
+    return _components(
+        table.motors,
+        table.stations,
+        table.repeats,
+        *_pooled(table) if pooled else (table.ms_interaction, table.ms_error),
+        table.ms_part,
+        table.ms_station,
+        pooled=pooled,
+    )
+
+
+def _pooled(table: Table) -> tuple[float, float]:
+    _, _, i, e = table.dof
+    mean = (i * table.ms_interaction + e * table.ms_error) / (i + e)
+    return mean, mean
+
+
+def _components(
+    p: int, o: int, n: int, msi: float, mse: float, msp: float, mso: float, *, pooled: bool
+) -> Components:
+    return Components(
+        repeatability=mse,
+        station=max(0.0, (mso - msi) / (p * n)),
+        interaction=0.0 if pooled else max(0.0, (msi - mse) / n),
+        part=max(0.0, (msp - msi) / (o * n)),
+    )
+
+
+def study(values: Array, level: float = LEVEL) -> Gauge:
+    """Gauge R&R of readings [P, O, n], with the interval of its share of the study variation.
+
+    The interval is the generalized one [2]: each mean square over its own chi-square draw, the
+    components and their ratio anew for each of the draws, from a fixed seed.
+    """
+    table = anova(values)
+    found = components(table)
+    low, high = _interval(table, level)
+    share = found.percent
+    return Gauge(
+        motors=table.motors,
+        stations=table.stations,
+        repeats=table.repeats,
+        repeatability=math.sqrt(found.repeatability),
+        reproducibility=math.sqrt(found.station + found.interaction),
+        rr=math.sqrt(found.rr),
+        part=math.sqrt(found.part),
+        percent=100.0 * share,
+        percent_low=100.0 * low,
+        percent_high=100.0 * high,
+        level=level,
+        verdict="good"
+        if share < GOOD
+        else "acceptable"
+        if share <= ACCEPTABLE
+        else "not_acceptable",
+    )
+
+
+def _interval(table: Table, level: float) -> tuple[float, float]:
+    rng = np.random.default_rng(SEED)
+    p, o, n = table.motors, table.stations, table.repeats
+    squares = (table.ms_part, table.ms_station, table.ms_interaction, table.ms_error)
+    drawn = [
+        ms * dof / rng.chisquare(dof, DRAWS) for ms, dof in zip(squares, table.dof, strict=True)
+    ]
+    msp, mso, msi, mse = drawn
+    rr = mse + np.maximum((mso - msi) / (p * n), 0.0) + np.maximum((msi - mse) / n, 0.0)
+    part = np.maximum((msp - msi) / (o * n), 0.0)
+    total = rr + part
+    share = np.sqrt(np.divide(rr, total, out=np.zeros_like(rr), where=total > 0.0))
+    low, high = np.quantile(share, [0.5 - level / 2.0, 0.5 + level / 2.0])
+    return float(low), float(high)

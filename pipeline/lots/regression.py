@@ -1,0 +1,221 @@
+"""Lots against lots: every constant of the limits file, what motors show, one verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pipeline.lots.assess import Assessment, assess
+from pipeline.lots.bounds import hold
+from pipeline.lots.cogging import cogging_bands, order_levels
+from pipeline.lots.constant import Family, Material, result
+from pipeline.lots.lot_test import holm
+from pipeline.lots.sample import Member, independent, lots_in_order, values_of
+from pipeline.lots.traits import checks_failed, compare_traits, effects_shown, orders_shown
+from pipeline.lots.verdict import overall
+from pipeline.physics.glossary import Term
+from pipeline.physics.notation import quantity
+from pipeline.records.diagnosis_summary import DiagnosisSummary
+from pipeline.records.limits import ConstantLimits, Limits
+from pipeline.records.lot_constant import ConstantResult, Verdict
+from pipeline.records.lot_regression import (
+    EffectChange,
+    Group,
+    LimitsUsed,
+    LotRegression,
+    Outlier,
+)
+
+WORDS: Mapping[Verdict, str] = {
+    "pass": "the same as the baseline",
+    "marginal": "the same as the baseline, with remarks",
+    "fail": "not the same as the baseline",
+    "undecided": "not shown to be the same as the baseline",
+    "not_evaluated": "not evaluated",
+    "INSUFFICIENT_HISTORY": "not decided: INSUFFICIENT_HISTORY, too few baseline lots",
+    "CONFOUNDED": "not decided: CONFOUNDED, the lot and its station cannot be told apart",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """What is compared: one version a motor on both sides, and what is there for the stations.
+
+    `repeats` are versions of any motor from captures of their own; `golden` those of the golden
+    motors among them, which stand in no lot.
+    """
+
+    baseline: Group
+    candidate: Group
+    members: tuple[Member, ...]
+    repeats: tuple[Member, ...] = ()
+    golden: tuple[Member, ...] = ()
+    diagnoses: Mapping[str, DiagnosisSummary] = field(default_factory=dict)
+
+    def with_diagnoses(self, diagnoses: Mapping[str, DiagnosisSummary]) -> Samples:
+        """The same with what each motor's model lacks."""
+        return replace(self, diagnoses=diagnoses)
+
+
+def compare_lots(
+    samples: Samples, limits: Limits, terms: Mapping[str, Term], notes: Sequence[str] = ()
+) -> LotRegression:
+    """The whole comparison; `terms` gives each constant its unit and words."""
+    lots = lots_in_order(samples.members)
+    order = [lot for lot, _ in lots]
+    materials = [_material(own, samples, limits, terms, order) for own in limits.family()]
+    constants = tuple(
+        result(made, family, limits, dict(lots))
+        for made, family in zip(materials, _families(materials, limits), strict=True)
+    )
+    effects = _effects(samples, limits)
+    verdict, reasons = overall(constants, effects)
+    short = any(one.test.status == "INSUFFICIENT_HISTORY" for one in constants)
+    return LotRegression(
+        mode="lots",
+        verdict=verdict,
+        headline=_headline(samples, verdict, constants, effects),
+        reasons=reasons,
+        history="INSUFFICIENT_HISTORY" if short else "sufficient",
+        baseline=samples.baseline,
+        candidate=samples.candidate,
+        limits=used(limits),
+        constants=constants,
+        effects=effects,
+        orders=order_levels(samples.members),
+        cogging=cogging_bands(samples.members),
+        outliers=_outliers(constants),
+        golden=tuple(sorted({member.sheet.motor_id for member in samples.golden})),
+        notes=(*notes, *_notes(materials)),
+    )
+
+
+def used(limits: Limits) -> LimitsUsed:
+    """The limits file as the report states it."""
+    rule = (
+        f"Limits by their decision rule with guard bands, U = {limits.k:g} u. A change of a lot's "
+        f"mean is tested against the scatter of at least {limits.min_lots} baseline lots, Holm "
+        f"over the constants at {limits.alpha:g}; sameness by two one-sided tests at "
+        f"{limits.alpha:g}."
+    )
+    return LimitsUsed(limits.name, limits.sha256, rule, limits.alpha, limits.min_lots)
+
+
+def _material(
+    own: ConstantLimits,
+    samples: Samples,
+    limits: Limits,
+    terms: Mapping[str, Term],
+    order: Sequence[str],
+) -> Material:
+    values, missing = values_of(own.name, samples.members)
+    golden, _ = values_of(own.name, samples.golden)
+    repeats, _ = values_of(own.name, samples.repeats)
+    golden = independent(golden)
+    found = assess(values, golden, order)
+    mean = float(np.mean(found.base_means)) if found.base else None
+    term = terms.get(own.name)
+    return Material(
+        own,
+        term.unit if term else "1",
+        term.words if term else own.name,
+        found,
+        hold(own, values, found.corrected, mean, found.within_sd, limits.k),
+        tuple(golden),
+        tuple(independent(repeats)),
+        tuple(missing) if values else (),
+    )
+
+
+def _families(materials: Sequence[Material], limits: Limits) -> list[Family]:
+    """Holm over the constants, for the lot-level test and for the motors' own."""
+    lots = [_lot_p(made.found, limits.min_lots) for made in materials]
+    motors = [_motor_p(made.found) for made in materials]
+    size = max(sum(p is not None for p in motors), 1)
+    return [
+        Family(lot, motor, size)
+        for lot, motor in zip(_adjusted(lots), _adjusted(motors), strict=True)
+    ]
+
+
+def _lot_p(found: Assessment, needed: int) -> float | None:
+    if found.contrast is None or len(found.base) < needed or _constant(found):
+        return None
+    return found.contrast.lot_p
+
+
+def _motor_p(found: Assessment) -> float | None:
+    return None if found.contrast is None or _constant(found) else found.contrast.motor_p
+
+
+def _constant(found: Assessment) -> bool:
+    """Whether nothing scatters and nothing changed, as a count of poles does: no test of it."""
+    return found.contrast is not None and found.contrast.u == 0.0 == found.contrast.difference
+
+
+def _adjusted(p_values: Sequence[float | None]) -> list[float | None]:
+    known = [p for p in p_values if p is not None]
+    adjusted = iter(holm(known).tolist() if known else [])
+    return [None if p is None else float(next(adjusted)) for p in p_values]
+
+
+def _effects(samples: Samples, limits: Limits) -> tuple[EffectChange, ...]:
+    """Cogging orders and checks of the datasheets, effects of the diagnoses, each one family."""
+    return (
+        *compare_traits(orders_shown(samples.members, limits.order_share), "datasheet"),
+        *compare_traits(checks_failed(samples.members), "datasheet"),
+        *compare_traits(effects_shown(samples.members, samples.diagnoses), "diagnosis"),
+    )
+
+
+def _headline(
+    samples: Samples,
+    verdict: Verdict,
+    constants: Sequence[ConstantResult],
+    effects: Sequence[EffectChange],
+) -> str:
+    lots = ", ".join(samples.candidate.lots)
+    one = "Lot" if len(samples.candidate.lots) == 1 else "Lots"
+    compared = sum(bool(constant.motors) for constant in constants)
+    text = f"{one} {lots}: {WORDS[verdict]}; {compared} of {len(constants)} constants compared"
+    failed = [f"{c.name} ({c.why.partition(':')[0]})" for c in constants if c.verdict == "fail"]
+    failed += [f"{e.name} ({e.why.partition(':')[0]})" for e in effects if e.verdict == "fail"]
+    return f"{text}: {', '.join(failed)}" if failed else text
+
+
+def _outliers(constants: Sequence[ConstantResult]) -> tuple[Outlier, ...]:
+    """The motors apart from their lot, the furthest first."""
+    found = [
+        Outlier(
+            motor.motor_id,
+            motor.lot,
+            motor.side,
+            one.name,
+            motor.value,
+            one.unit,
+            motor.z or 0.0,
+            motor.capture,
+            f"{quantity(motor.value, one.unit)} is {abs(motor.z or 0.0):.1f} robust standard "
+            f"deviations {'above' if (motor.z or 0.0) > 0 else 'below'} its lot's median",
+        )
+        for one in constants
+        for motor in one.motors
+        if motor.outlier
+    ]
+    return tuple(sorted(found, key=lambda o: (-abs(o.z), o.motor_id, o.constant)))
+
+
+def _notes(materials: Sequence[Material]) -> list[str]:
+    """What the comparison left out, once each."""
+    notes: dict[str, list[str]] = {}
+    for made in materials:
+        if made.found.unlinked and not made.found.confounded:
+            lots = ", ".join(made.found.unlinked)
+            notes.setdefault(
+                f"baseline lots {lots} are of stations that nothing links to the candidate's, "
+                "and are left out",
+                [],
+            ).append(made.own.name)
+    return [f"{words} ({', '.join(names)})" for words, names in notes.items()]

@@ -1,0 +1,247 @@
+"""The words by which versions are chosen: `lot:2026-W*,station:bench-1`.
+
+A selector is a list of terms parted by commas. A term is `field:value` or `field=value`; a value
+alone belongs to the field before it. Values of one field are alternatives, different fields must
+all hold: `lot:A,B,station:S1` is lot A or B on station S1. `*` and `?` stand for any text and any
+character, and a value in quotes is taken as it stands, commas and all. A first value without field
+is looked up as a lot, then as a tag, a motor type, a station, a motor, a version.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, timedelta
+from fnmatch import fnmatchcase
+
+from pipeline.records.errors import UsageError
+from pipeline.records.ledger import Version
+
+FIELDS: Mapping[str, str] = {
+    "lot": "lot",
+    "type": "motor type",
+    "station": "station of any capture",
+    "motor": "serial number",
+    "tag": "name given by `registry tag`",
+    "status": "released, provisional, refused or revoked",
+    "version": "beginning of the version's digest, four hex digits at least",
+    "revision": "1, 2, ... of the motor",
+    "code": "beginning of the code version that made it",
+    "date": "day, month or year of the tests, or FROM..TO",
+    "since": "first day of the tests",
+    "until": "last day of the tests",
+}
+ALIASES = {"motor_type": "type", "motor_id": "motor", "lots": "lot", "code_version": "code"}
+LOOKED_UP = ("lot", "tag", "type", "station", "motor", "version")
+OF_CONTENT = ("code", "date", "since", "until")
+TERM = re.compile(
+    r"""\s*(?:(?P<field>[A-Za-z_]+)\s*[:=]\s*)?"""
+    r"""(?:"(?P<double>[^"]*)"|'(?P<single>[^']*)'|(?P<bare>[^,;"']*))\s*(?:[,;]|$)"""
+)
+DIGEST = re.compile("[0-9a-f]{4,64}")
+MAX_CHARS = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """One value of a selector; `literal` where it was quoted, so that `*` is a star."""
+
+    text: str
+    literal: bool = False
+
+    def fits(self, told: str | None) -> bool:
+        """Whether a text is meant."""
+        if told is None:
+            return False
+        return told == self.text or (not self.literal and fnmatchcase(told, self.text))
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A selector taken apart: alternatives by field, in the order given."""
+
+    text: str
+    terms: Mapping[str, tuple[Wanted, ...]]
+
+    def takes(self, version: Version) -> bool:
+        """Whether a version's row and decisions are meant; revoked ones only by their status."""
+        if "status" not in self.terms and version.status == "revoked":
+            return False
+        return all(
+            any(ROW[name](version, one) for one in wanted)
+            for name, wanted in self.terms.items()
+            if name not in OF_CONTENT
+        )
+
+    def takes_content(self, code_version: str, when: str) -> bool:
+        """Whether a datasheet is meant by its code and the time of its tests (ISO 8601)."""
+        day = _instant(when)
+        for name, wanted in self.terms.items():
+            if name == "code" and not any(
+                code_version.startswith(one.text) or one.fits(code_version) for one in wanted
+            ):
+                return False
+            if name == "date" and not any(_within(day, *_span(one.text)) for one in wanted):
+                return False
+            if name == "since" and any(day < _span(one.text)[0] for one in wanted):
+                return False
+            if name == "until" and any(day >= _span(one.text)[1] for one in wanted):
+                return False
+        return True
+
+
+def parse_selector(text: str, versions: Sequence[Version]) -> Query:
+    """The query of a selector; `versions` are what a value without field is looked up in.
+
+    Raises UsageError for an empty one, an unknown field, an open quote, a value that is no date,
+    revision or digest, and for a value without field that nothing bears.
+    """
+    if not text.strip() or len(text) > MAX_CHARS:
+        raise UsageError("the selector is empty or too long", _example())
+    terms: dict[str, list[Wanted]] = {}
+    field: str | None = None
+    for said, one in _terms(text):
+        if said is not None:
+            field = ALIASES.get(said.lower(), said.lower())
+            if field not in FIELDS:
+                raise UsageError(
+                    f"selector {text!r}: no field {said!r}", f"known are {', '.join(FIELDS)}"
+                )
+        elif field is None:
+            field = _looked_up(text, one, versions)
+        _checked(text, field, one)
+        terms.setdefault(field, []).append(one)
+    return Query(text, {name: tuple(wanted) for name, wanted in terms.items()})
+
+
+def _terms(text: str) -> Iterable[tuple[str | None, Wanted]]:
+    place = 0
+    while place < len(text):
+        match = TERM.match(text, place)
+        if match is None or match.end() == place:
+            raise UsageError(f"selector {text!r}: cannot read {text[place:]!r}", _example())
+        place = match.end()
+        quoted = match["double"] if match["double"] is not None else match["single"]
+        value = (match["bare"] or "").strip() if quoted is None else quoted
+        if not value:
+            raise UsageError(f"selector {text!r}: a value is missing", _example())
+        yield match["field"], Wanted(value, quoted is not None)
+
+
+def _example() -> str:
+    return "write lot:A, or lot:A,B,station:bench-1; `regress --help` lists the fields"
+
+
+def _looked_up(text: str, one: Wanted, versions: Sequence[Version]) -> str:
+    for name in LOOKED_UP:
+        if name == "version" and not DIGEST.fullmatch(one.text):
+            continue
+        if any(ROW[name](version, one) for version in versions):
+            return name
+    raise UsageError(f"selector {text!r}: nothing is called {one.text!r}", known(versions))
+
+
+def known(versions: Sequence[Version], most: int = 12) -> str:
+    """What there is to choose from, in one line."""
+    own = [version.published for version in versions]
+    groups = (
+        ("lots", {row.lot for row in own}),
+        ("types", {row.motor_type for row in own}),
+        ("stations", {station for row in own for station in row.stations}),
+        ("tags", {tag for version in versions for tag in version.tags}),
+    )
+    told = []
+    for name, texts in groups:
+        names = sorted(text for text in texts if text)
+        if names:
+            more = f" and {len(names) - most} more" if len(names) > most else ""
+            told.append(f"{name} {', '.join(names[:most])}{more}")
+    return "there are " + "; ".join(told) if told else "the registry names no lot, type or station"
+
+
+def _checked(text: str, field: str, one: Wanted) -> None:
+    if field in ("date", "since", "until"):
+        try:
+            _span(one.text)
+        except (ValueError, OverflowError) as error:
+            raise UsageError(
+                f"selector {text!r}: {one.text!r} is no date", "write 2026-03-01 or 2026-03"
+            ) from error
+    if field == "revision" and not (one.text.isascii() and one.text.isdigit()):
+        raise UsageError(f"selector {text!r}: {one.text!r} is no revision", "write 1, 2, ...")
+    if field == "version" and not DIGEST.fullmatch(one.text):
+        raise UsageError(f"selector {text!r}: {one.text!r} is no digest", "at least 4 hex digits")
+
+
+def _span(text: str) -> tuple[datetime, datetime]:
+    """The time from, and the time before which: of a day, a month, a year or `FROM..TO`."""
+    if ".." in text:
+        first, last = text.split("..", 1)
+        return _span(first)[0], _span(last)[1]
+    parts = [int(part) for part in text.strip().split("-")]
+    if len(parts) == 1:
+        return _midnight(date(parts[0], 1, 1)), _midnight(date(parts[0] + 1, 1, 1))
+    if len(parts) == 2:
+        year, month = parts
+        after = date(year + month // 12, month % 12 + 1, 1)
+        return _midnight(date(year, month, 1)), _midnight(after)
+    day = date(*parts)
+    return _midnight(day), _midnight(day + timedelta(days=1))
+
+
+def _midnight(day: date) -> datetime:
+    return datetime(day.year, day.month, day.day, tzinfo=UTC)
+
+
+def _instant(when: str) -> datetime:
+    found = datetime.fromisoformat(when)
+    return (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+
+
+def _within(day: datetime, low: datetime, high: datetime) -> bool:
+    return low <= day < high
+
+
+def _row_lot(version: Version, one: Wanted) -> bool:
+    return one.fits(version.published.lot)
+
+
+def _row_type(version: Version, one: Wanted) -> bool:
+    return one.fits(version.published.motor_type)
+
+
+def _row_station(version: Version, one: Wanted) -> bool:
+    return any(one.fits(station) for station in version.published.stations)
+
+
+def _row_motor(version: Version, one: Wanted) -> bool:
+    return one.fits(version.motor_id)
+
+
+def _row_tag(version: Version, one: Wanted) -> bool:
+    return any(one.fits(tag) for tag in version.tags)
+
+
+def _row_status(version: Version, one: Wanted) -> bool:
+    return one.fits(version.status)
+
+
+def _row_version(version: Version, one: Wanted) -> bool:
+    return version.version.startswith(one.text)
+
+
+def _row_revision(version: Version, one: Wanted) -> bool:
+    return version.revision == int(one.text)
+
+
+ROW: Mapping[str, Callable[[Version, Wanted], bool]] = {
+    "lot": _row_lot,
+    "type": _row_type,
+    "station": _row_station,
+    "motor": _row_motor,
+    "tag": _row_tag,
+    "status": _row_status,
+    "version": _row_version,
+    "revision": _row_revision,
+}

@@ -1,0 +1,91 @@
+"""How much of the spread is lot, station, motor, capture.
+
+Nested analysis of variance with unequal numbers, by expected mean squares; no component below 0.
+Reference: S. R. Searle, G. Casella, C. E. McCulloch, Variance Components, 1992, 3.6.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.records.lot_constant import Component
+
+
+@dataclass(frozen=True, slots=True)
+class Nested:
+    """Variances [unit²] between groups and within them, with degrees of freedom.
+
+    `between` is None for fewer than two groups, `within` where no group has two members.
+    """
+
+    between: float | None
+    within: float | None
+    dof_between: int
+    dof_within: int
+
+
+def nested(groups: Sequence[Sequence[float]]) -> Nested:
+    """σ²_within = MSW; σ²_between = (MSB − MSW)/n₀, n₀ = (N − Σn²/N)/(k − 1)."""
+    filled = [np.asarray(group, float) for group in groups if len(group)]
+    sizes = np.array([group.size for group in filled], float)
+    total, count = float(sizes.sum()), len(filled)
+    dof_within = int(total) - count
+    within = None
+    if dof_within > 0:
+        within = sum(float(np.sum((g - g.mean()) ** 2)) for g in filled) / dof_within
+    if count < 2:
+        return Nested(None, within, 0, dof_within)
+    means = np.array([group.mean() for group in filled])
+    grand = float(np.sum(sizes * means)) / total
+    ms = float(np.sum(sizes * (means - grand) ** 2)) / (count - 1)
+    each = (total - float(np.sum(sizes**2)) / total) / (count - 1)
+    between = None if within is None else max(0.0, (ms - within) / each)
+    return Nested(between, within, count - 1, dof_within)
+
+
+def parted(
+    lots: Mapping[str, Sequence[float]],
+    repeats: Sequence[Sequence[float]],
+    u_a: Sequence[float],
+    biases: Sequence[float],
+) -> tuple[Component, ...]:
+    """The four parts: of motors' values by lot, repeats of single motors, fits' u_a, biases.
+
+    What one motor's captures scatter by comes from repeated motors, or else from the fits; it is
+    taken off the spread of motors within their lot. The station's is the variance of the biases
+    of linked stations.
+    """
+    among = nested(list(lots.values()))
+    again = nested([group for group in repeats if len(group) > 1])
+    if again.within is not None:
+        capture, note, dof = again.within, "from motors measured again", again.dof_within
+    elif u_a:
+        capture, note, dof = float(np.mean(np.square(u_a))), "from the scatter of each fit", None
+    else:
+        capture, note, dof = None, "no repeats and no scatter stated", None
+    motor = among.within
+    if motor is not None and capture is not None:
+        motor = max(0.0, motor - capture)
+    station = float(np.var(biases, ddof=1)) if len(biases) > 1 else None
+    told = "from linked stations" if station is not None else "one station, or none linked"
+    sized = (
+        ("lot", among.between, among.dof_between, "needs two lots" * (among.between is None)),
+        ("station", station, max(len(biases) - 1, 0), told),
+        ("motor", motor, among.dof_within, "needs two motors in a lot" * (motor is None)),
+        ("capture", capture, dof, note),
+    )
+    total = sum(variance for _, variance, _, _ in sized if variance is not None)
+    return tuple(
+        Component(
+            name,  # type: ignore[arg-type]
+            None if variance is None else math.sqrt(variance),
+            None if variance is None or total == 0.0 else variance / total,
+            None if variance is None or dof is None else float(dof),
+            words,
+        )
+        for name, variance, dof, words in sized
+    )

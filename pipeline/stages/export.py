@@ -1,0 +1,90 @@
+"""`export`: one controller's configuration from a released datasheet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.export.protocol import Exporter, Source
+from pipeline.export.registry import exporters
+from pipeline.fit.registry import estimators
+from pipeline.io.publish import write_whole
+from pipeline.io.registry import Registry, one_of
+from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.errors import UsageError
+from pipeline.records.ledger import Selection, Version, in_force
+from pipeline.records.naming import file_stem
+from pipeline.records.outcome import Outcome
+from pipeline.settings import ExportSettings
+
+
+def main(settings: ExportSettings) -> Outcome:
+    """Prints the configuration and writes it to `export/` of output.
+
+    Raises UsageError for an unknown format or motor, a datasheet that is not released, and a
+    constant that is not measured or whose convention is unknown.
+    """
+    exporter = _exporter(settings)
+    options = {name: str(value) for name, value in settings.options.items()}
+    for name in options:
+        if name not in exporter.options:
+            has = ", ".join(exporter.options) or "none"
+            raise UsageError(f"options.{name}: {exporter.name} has no such option", f"it has {has}")
+    place = settings.registry
+    if place in ("", "auto"):
+        place = (Path(settings.output) / "registry").as_posix()
+    registry = Registry(place, {k: str(v) for k, v in settings.registry_options.items()})
+    version, notes = _version(registry, settings)
+    (sheet,) = registry.datasheets([version])
+    own = {term.name: term for estimator in estimators() for term in estimator.terms}
+    text = exporter.render(Source(sheet, version.revision, {**own, **CONSTANTS}), options)
+    ending = dict.fromkeys((exporter.name, exporter.extension))
+    name = ".".join((file_stem(version.motor_id), *ending))
+    path = Path(settings.output) / "export" / name
+    write_whole(path, text.encode())
+    return Outcome(text=text, errors=(*notes, f"note: wrote {path.as_posix()}"))
+
+
+def _exporter(settings: ExportSettings) -> Exporter:
+    known = exporters()
+    if settings.format not in known:
+        said = f"no format {settings.format!r}" if settings.format else "format= is missing"
+        raise UsageError(f"export: {said}", f"known are {', '.join(known)}")
+    if not settings.motor.strip():
+        raise UsageError("export: motor= is missing", "name the motor by its serial number")
+    return known[settings.format]
+
+
+def _version(registry: Registry, settings: ExportSettings) -> tuple[Version, tuple[str, ...]]:
+    """The version asked for, or the newest released one; raises UsageError for none released."""
+    history = registry.history(settings.motor)
+    if not history:
+        raise UsageError(
+            f"no motor {settings.motor!r} in {registry.place}", "`registry list` shows all"
+        )
+    if settings.revision is None and settings.version is None:
+        found, last = in_force(history), history[-1]
+        if found is None:
+            raise _unreleased(last)
+        newer = f"note: revision {last.revision} is newer and {last.status}; it is not exported"
+        return found, (newer,) * (last.revision > found.revision)
+    wanted = Selection(settings.motor, revision=_whole(settings.revision), version=settings.version)
+    version = one_of([v for v in history if wanted.takes(v)], wanted, registry.place)
+    if version.status != "released":
+        raise _unreleased(version)
+    return version, ()
+
+
+def _unreleased(version: Version) -> UsageError:
+    name = f"motor {version.motor_id!r} revision {version.revision}"
+    points = "; ".join(version.open_points[:3])
+    remedy = "complete it first" if points else "`registry approve` releases it"
+    why = f": {points}" if points else ""
+    return UsageError(f"{name} is {version.status}, not released{why}", remedy)
+
+
+def _whole(text: str | None) -> int | None:
+    if text is None:
+        return None
+    if not (text.isascii() and text.isdigit() and len(text) < 19):
+        raise UsageError(f"revision={text} is no revision", "a whole number: 1, 2, ...")
+    return int(text)

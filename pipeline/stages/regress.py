@@ -1,0 +1,108 @@
+"""`regress`: does a lot, or a version of the code, still give the same as the baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.fit.registry import estimators
+from pipeline.io.diagnoses import read_diagnoses
+from pipeline.io.limits import limits_file, read_limits
+from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.registry import Registry
+from pipeline.lots.code import compare_versions
+from pipeline.lots.limits_lint import lint
+from pipeline.lots.regression import compare_lots
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.records.errors import UsageError
+from pipeline.records.limits import Limits
+from pipeline.records.lot_regression import LotRegression
+from pipeline.records.outcome import Outcome
+from pipeline.report.junit import junit_xml
+from pipeline.report.lot_page import render_regression
+from pipeline.report.lot_text import regression_text
+from pipeline.settings import RegressSettings, configuration_folder
+from pipeline.stages.selection import Chosen, choose
+
+MODES = ("auto", "lots", "code")
+EXIT_CODES = {"pass": 0, "marginal": 0, "fail": 1}
+UNDECIDED = 4
+
+
+def main(settings: RegressSettings) -> Outcome:
+    """Writes `regression/report.{json,html,xml}`; 0 the same, 1 not, 4 undecided, 2 wrong usage.
+
+    Every verdict that is neither a pass nor a failure (CONFOUNDED, INSUFFICIENT_HISTORY and the
+    like) is undecided.
+    """
+    terms = _terms()
+    limits = read_limits(limits_file(configuration_folder() / "limits", settings.limits))
+    faults = lint(limits, terms)
+    if faults:
+        lines = tuple(f"error: limits {limits.name}: {fault}" for fault in faults)
+        return Outcome(2, errors=lines)
+    if settings.lint:
+        return Outcome(text=f"limits {limits.name}: {len(limits.family())} constants, no fault")
+    if settings.mode not in MODES:
+        raise UsageError(f"regress: no mode {settings.mode!r}", f"one of {', '.join(MODES)}")
+    for name in ("baseline", "candidate"):
+        if not getattr(settings, name).strip():
+            raise UsageError(f"regress: {name}= is missing", f"write {name}=lot:A, or a tag, ...")
+    chosen = choose(
+        Registry(_place(settings), {k: str(v) for k, v in settings.registry_options.items()}),
+        settings.baseline,
+        settings.candidate,
+        settings.mode,
+        limits.golden,
+    )
+    regression = _compare(settings, chosen, limits, terms)
+    files = _write(Path(settings.output), regression)
+    text = regression_text(regression, files)
+    return Outcome(EXIT_CODES.get(regression.verdict, UNDECIDED), text)
+
+
+def _place(settings: RegressSettings) -> str:
+    if settings.registry in ("", "auto"):
+        return (Path(settings.output) / "registry").as_posix()
+    return settings.registry
+
+
+def _terms() -> dict[str, Term]:
+    """Every constant of the glossary and of the estimators' own files."""
+    own = {term.name: term for estimator in estimators() for term in estimator.terms}
+    return {**own, **CONSTANTS}
+
+
+def _compare(
+    settings: RegressSettings, chosen: Chosen, limits: Limits, terms: dict[str, Term]
+) -> LotRegression:
+    if chosen.pairs:
+        groups = chosen.samples.baseline, chosen.samples.candidate
+        return compare_versions(chosen.pairs, groups, limits, terms, chosen.notes)
+    diagnoses = read_diagnoses(_diagnosis_folders(settings))
+    samples = chosen.samples.with_diagnoses(diagnoses)
+    return compare_lots(samples, limits, terms, chosen.notes)
+
+
+def _diagnosis_folders(settings: RegressSettings) -> Sequence[Path]:
+    if settings.diagnoses not in ("", "auto"):
+        folders = [Path(name.strip()) for name in settings.diagnoses.split(",") if name.strip()]
+        for folder in folders:
+            if not folder.is_dir():
+                raise UsageError(f"diagnoses={folder} is no folder", "name what `diagnose` wrote")
+        return folders
+    place = _place(settings)
+    beside = [] if "://" in place else [Path(place).parent / "diagnosis"]
+    return [*beside, Path(settings.output) / "diagnosis"]
+
+
+def _write(output: Path, regression: LotRegression) -> tuple[str, ...]:
+    folder = output / "regression"
+    files = {
+        "report.json": canonical_json(regression.document()),
+        "report.xml": junit_xml(regression),
+        "report.html": render_regression(regression).encode(),
+    }
+    for name, content in files.items():
+        write_whole(folder / name, content)
+    return tuple((folder / name).as_posix() for name in files)
