@@ -78,6 +78,10 @@ class Layout:
     loose_start: Integers = field(default_factory=lambda: np.empty(0, np.int64))
     loose_length: Integers = field(default_factory=lambda: np.empty(0, np.int64))
     data_crc_holds: bool = False
+    cut: CaptureError | None = None
+    """Why the file is known to be cut off, where its good part is used all the same."""
+    kept_bytes: int = 0
+    """Bytes of a cut file up to the end of its last whole record."""
 
     @property
     def messages_seen(self) -> int:
@@ -95,8 +99,11 @@ class Layout:
         return merged
 
 
-def scan(data: bytes) -> Layout:
-    """The layout of a whole MCAP file, or a CaptureError with what is wrong with it."""
+def scan(data: bytes, *, recover: bool = False) -> Layout:
+    """The layout of a whole MCAP file, or a CaptureError with what is wrong with it.
+
+    `recover` takes the whole records of a file that lacks its end; `Layout.cut` then says so.
+    """
     if not data.startswith(MAGIC):
         raise CaptureError(
             "not_mcap",
@@ -108,10 +115,30 @@ def scan(data: bytes) -> Layout:
     spans = walk(data, len(MAGIC), len(data) - len(MAGIC) if whole else len(data))
     end = _data_section(layout, spans)
     if not whole or spans.fault is not None or end is None:
-        raise _cut(layout, spans.fault)
+        cut = _cut(layout, spans.fault)
+        if whole or not recover:
+            raise cut
+        return _good_part(layout, spans, end, cut)
     _data_end(layout, spans, end)
     _summary(layout, spans, end)
     _check_index(layout)
+    return layout
+
+
+def _good_part(layout: Layout, spans: RecordSpans, end: int | None, cut: CaptureError) -> Layout:
+    """The layout of the whole records of a file that lacks its end; nothing proves it complete.
+
+    The summary is not believed, and the last chunk is walked, for its index may be cut off too.
+    """
+    if spans.opcode.size == 0:
+        raise cut
+    if end is not None:
+        _data_end(layout, spans, end)
+        layout.data_crc_holds = False
+    if layout.chunks:
+        layout.message_indexes[layout.chunks[-1].offset] = []
+    layout.cut = cut
+    layout.kept_bytes = int(spans.start[-1] + spans.length[-1])
     return layout
 
 

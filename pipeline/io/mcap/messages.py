@@ -50,6 +50,11 @@ def batches(layout: Layout) -> Iterator[Batch]:
     ledger.close(layout)
 
 
+def count_messages(layout: Layout) -> int:
+    """How many messages a file holds, each unpacked and checked as when it is decoded."""
+    return sum(int(batch.start.size) for batch in batches(layout))
+
+
 def _all(layout: Layout) -> Iterator[Batch]:
     if layout.loose_start.size:
         yield _batch(layout.data, layout.loose_start, layout.loose_length)
