@@ -82,6 +82,14 @@ def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
     )
 
 
+def size_bytes(path: Path) -> int:
+    """The size of a file [bytes]; 0 where it is gone, which reading it will say."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
 def read_whole(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
     """All bytes of a regular file; raises CaptureError for anything else or for too many."""
     with _opened(path) as stream:
@@ -90,7 +98,7 @@ def read_whole(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
             words = f"the file has {size} bytes, where {most_bytes} are the most"
             raise CaptureError("limit", words, "split it")
         try:
-            return stream.read(most_bytes)
+            return stream.read(size)
         except OSError as fault:
             raise _not_readable(fault) from None
 

@@ -143,6 +143,18 @@ def survey(
     return Survey(tuple(entries.values()), tuple(sorted(findings, key=_order)), tuple(others))
 
 
+def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) -> Answer | None:
+    """The answer where name and first bytes say that a file is no capture, else None."""
+    if question.sidecar is not None or question.listed:
+        return None
+    try:
+        if _may_be_capture(folder, question.path, {}, {}, sources):
+            return None
+    except CaptureError as fault:
+        return Answer(question.path, None, None, (Finding.refusal(question.path, fault),))
+    return Answer(question.path, None, None)
+
+
 def look(
     folder: Path, question: Question, sources: Mapping[str, SourceMap], *, recover: bool = False
 ) -> Answer:
