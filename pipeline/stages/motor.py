@@ -25,6 +25,7 @@ from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
+from pipeline.stages.fleet.fits import FitMemory
 from pipeline.stages.fleet.jobs import MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import Files, Finished, note_motor
 from pipeline.stages.fleet.looking import died
@@ -49,7 +50,10 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     campaign = Campaign(job.motor_id, captures)
     findings.extend(agree(campaign))
     with watch.stage("fit"):
-        constants, evidence, failures = fit_all(campaign, job.fit)
+        recall = None if job.key is None else FitMemory(Path(job.output), campaign, job.gates)
+        constants, evidence, failures = fit_all(campaign, job.fit, recall)
+        if recall is not None:
+            recall.save()
     findings.extend(Finding(job.motor_id, "warning", *failure) for failure in failures)
     with watch.stage("crosscheck"):
         checks = check_all(constants, campaign, job.crosscheck)

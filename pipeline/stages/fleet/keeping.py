@@ -33,10 +33,15 @@ Files = tuple[tuple[str, str], ...]
 
 
 @cache
-def tools_version() -> str:
-    """The code with the versions of Python and of the libraries that results hang on."""
+def libraries_version() -> str:
+    """The versions of Python and of the libraries that results hang on."""
     libraries = [f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES]
-    return "; ".join([code_version(), platform.python_version(), platform.machine(), *libraries])
+    return "; ".join([platform.python_version(), platform.machine(), *libraries])
+
+
+def tools_version() -> str:
+    """The code, with all that it runs on."""
+    return f"{code_version()}; {libraries_version()}"
 
 
 def digest_of(*parts: Any) -> str:
