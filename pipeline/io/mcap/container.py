@@ -310,5 +310,5 @@ def _match(what: str, stated: Iterable[object], actual: Iterable[object]) -> Non
     left, right = list(stated), list(actual)
     if len(left) != len(right):
         raise corrupt(f"the index names {len(left)} {what} records, the file holds {len(right)}")
-    if any(item not in right for item in left) or any(item not in left for item in right):
+    if set(left) != set(right):
         raise corrupt(f"the index contradicts the file on a {what} record")

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.io.mcap.messages import Batch
 from pipeline.io.mcap.protobuf_plan import FIXED32, FIXED64, Message, Scalar
 from pipeline.io.mcap.walk import Bytes, Integers
 
@@ -83,3 +84,12 @@ def shaped_rows(
             left[rows] = False
             members = members[~same]
     return found, left
+
+
+def even_rows(batch: Batch, plan: Message) -> dict[int, int] | None:
+    """Value offset by field in evenly spaced messages of one shape; None for any others."""
+    first = int(batch.start[0])
+    shape = shape_of(batch.buffer[first : first + int(batch.length[0])], plan)
+    if shape is None or any(np.any(batch.at(at, "u1") != byte) for at, byte in shape.tags):
+        return None
+    return dict(shape.values)

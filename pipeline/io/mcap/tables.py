@@ -68,7 +68,7 @@ def read_tables(layout: Layout, wanted: WantedIn, joint: str | None = None) -> l
             continue
         low = int(batch.log_time.min())
         first = low if first is None else min(first, low)
-        for number in np.unique(batch.channel).tolist():
+        for number in batch.counts():
             if number not in known:
                 known[number] = _stream(streams, layout.definitions, number)
         for stream in streams.values():
@@ -111,7 +111,9 @@ def _table(stream: _Stream, first: int) -> RawTable | None:
     messages = sum(times.size for _, times in stream.parts)
     leaves = {name: _whole(stream, name) for name in names}
     counts, blocks = _counts(stream.topic, leaves, messages)
-    log_time = np.concatenate([times for _, times in stream.parts]) - np.uint64(first)
+    log_time = np.concatenate([times for _, times in stream.parts])
+    log_time -= np.uint64(first)
+    ordered = not np.any(log_time[1:] < log_time[:-1])
     fields: dict[str, NDArray[Any]] = {}
     for name, leaf in leaves.items():
         if counts is not None and leaf.counts is None:
@@ -120,7 +122,7 @@ def _table(stream: _Stream, first: int) -> RawTable | None:
             fields[name] = leaf.values
     if counts is not None:
         log_time = np.repeat(log_time, counts)
-    if np.any(log_time[1:] < log_time[:-1]):
+    if not ordered:
         order = np.argsort(log_time, kind="stable")
         log_time = log_time[order]
         fields = {name: values[order] for name, values in fields.items()}
