@@ -22,7 +22,7 @@ from pipeline.records.errors import CaptureError
 _ENCAPSULATION = 4
 _PADDING = 8
 _SLICES_FROM = 32
-_MAX_ELEMENTS = 100_000
+_MAX_ELEMENTS = 4096
 _KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 """Representation identifier: byte order, and the largest alignment (CDR1 8, CDR2 4)."""
 
@@ -94,7 +94,7 @@ class _Pass:
                 order = np.argsort(owner, kind="stable")
                 owner, values = owner[order], values[order]
             counts = np.bincount(owner, minlength=self.origin.size).astype(np.int64)
-            found[name] = Leaf(values, counts)
+            found[name] = Leaf(values, counts, values.ndim == 2)
         return found
 
     def field(self, part: Field, prefix: str, rows: Integers | None) -> None:
@@ -130,18 +130,14 @@ class _Pass:
         return rows is None and self.batch.stride > 0 and isinstance(self.at, int)
 
     def values(self, dtype: str, width: int, rows: Integers | None) -> NDArray[Any]:
-        """The numbers that the positions were just moved past, in the byte order of this machine.
-
-        Where they are evenly spaced they are copied by stride, which the cache likes best.
-        """
+        """The numbers that the positions were just moved past: a view where evenly spaced."""
         if self.evenly(rows):
-            found = self.batch.at(_ENCAPSULATION + self.at - width, dtype)
-            return found.astype(found.dtype.newbyteorder("="))
+            return self.batch.at(_ENCAPSULATION + self.at - width, dtype)
         return view_at_every_byte(self.raw, dtype)[self.places(rows) - width]
 
     def keep(self, name: str, values: NDArray[Any], rows: Integers | None) -> None:
         if rows is None:
-            self.whole[name] = Leaf(values)
+            self.whole[name] = Leaf(values, None, values.ndim == 2)
         else:
             self.arrays.setdefault(name, []).append((rows, values))
 
@@ -178,11 +174,10 @@ class _Pass:
         self.whole[prefix + part.name] = Leaf(values, count)
 
     def table(self, dtype: str, at: int, count: int) -> NDArray[Any]:
-        """Arrays of one length at one position of evenly spaced messages, one after another."""
+        """Arrays of one length at one position of evenly spaced messages [messages, count]."""
         first = int(self.origin[0]) + at
         shape, strides = (self.origin.size, count), (self.batch.stride, np.dtype(dtype).itemsize)
-        found = np.ndarray(shape, dtype, self.buffer, first, strides)
-        return found.astype(found.dtype.newbyteorder("=")).reshape(-1)
+        return np.ndarray(shape, dtype, self.buffer, first, strides)
 
     def elements(self, part: Field, prefix: str, rows: Integers | None) -> None:
         """An array of messages or strings, element by element over all messages at once."""

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.io.mcap import records as rec
+from pipeline.io.mcap.limits import MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO
 from pipeline.io.mcap.walk import HEAD_BYTES, Integers, RecordSpans, walk
-from pipeline.io.mcap.wire import Fields, corrupt, truncated
+from pipeline.io.mcap.wire import Fields, corrupt, too_large, truncated
 from pipeline.records.errors import CaptureError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -137,6 +138,7 @@ def _good_part(layout: Layout, spans: RecordSpans, end: int | None, cut: Capture
         layout.data_crc_holds = False
     if layout.chunks:
         layout.message_indexes[layout.chunks[-1].offset] = []
+    _check_size(layout)
     layout.cut = cut
     layout.kept_bytes = int(spans.start[-1] + spans.length[-1])
     return layout
@@ -273,6 +275,7 @@ def _check_index(layout: Layout) -> None:
     """The summary's index must name each chunk, attachment and metadata record exactly once."""
     if not layout.chunks:
         check_definitions(layout)
+    _check_size(layout)
     if layout.chunk_indexes:
         actual = [_index_of(layout, chunk) for chunk in layout.chunks]
         _match("chunk", layout.chunk_indexes, actual)
@@ -280,6 +283,13 @@ def _check_index(layout: Layout) -> None:
         _match("attachment", layout.attachment_indexes, layout.attachments)
     if layout.metadata_indexes:
         _match("metadata", layout.metadata_indexes, layout.metadata_places)
+
+
+def _check_size(layout: Layout) -> None:
+    """Each chunk may be modest and a thousand of them a bomb."""
+    plain = sum(chunk.size for chunk in layout.chunks)
+    if plain > max(MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO * len(layout.data)):
+        raise too_large(f"its {len(layout.data)} bytes claim to unpack to {plain}")
 
 
 def check_definitions(layout: Layout) -> None:

@@ -80,7 +80,7 @@ class ProtobufDecoder:
             if not any(map(wanted, _names(part, ""))):
                 continue
             if number in places and isinstance(part, Scalar):
-                found[part.name] = Leaf(batch.at(places[number], part.dtype).copy())
+                found[part.name] = Leaf(batch.at(places[number], part.dtype))
             elif isinstance(part, Scalar) and not part.repeated:
                 found[part.name] = Leaf(_absent(part, batch.start.size))
             else:
