@@ -17,6 +17,7 @@ from typing import BinaryIO
 from pipeline.io.mcap.limits import MAX_FILE_BYTES
 from pipeline.records.errors import CaptureError, MachineError, UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ def list_files(folder: Path) -> Listing:
             relative = path.relative_to(folder).as_posix()
             fault = _fault(path, root, relative)
             if fault is not None:
-                findings.append(Finding.refusal(_printable(relative), fault))
+                findings.append(Finding.refusal(printable(relative), fault))
             elif name not in links:
                 paths.append(relative)
     return Listing(tuple(sorted(paths)), tuple(sorted(findings, key=lambda f: f.file)))
@@ -57,13 +58,9 @@ def _unreadable(fault: OSError) -> None:
     raise MachineError(f"a folder cannot be listed: {fault}", "check its permissions") from fault
 
 
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
 def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
     """Why a directory entry cannot be used, or None."""
-    if _printable(relative) != relative:
+    if printable(relative) != relative:
         return CaptureError(
             "file_name", "the name holds bytes that are no printable text", "rename the file"
         )

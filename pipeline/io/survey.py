@@ -280,8 +280,10 @@ def _entry(
 
 
 def _recovered(path: str, layout: Layout) -> Finding:
-    """The mark on a file of which the good part is used."""
+    """The mark on a file of which the good part is used; raises its CaptureError if it is empty."""
     count, kept = count_messages(layout), layout.kept_bytes
+    if layout.cut is not None and not count:
+        raise layout.cut
     reason = "" if layout.cut is None else layout.cut.message.split(";")[0]
     return Finding(
         path,
@@ -290,7 +292,7 @@ def _recovered(path: str, layout: Layout) -> Finding:
         f"it is cut off ({reason}); the {count} messages in its first {kept} of "
         f"{len(layout.data)} bytes are used, without proof that they are all",
         "copy the file again or record the test again; recover=false refuses such files",
-        (0, count - 1) if count else None,
+        (0, count - 1),
     )
 
 

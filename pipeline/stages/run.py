@@ -19,6 +19,7 @@ from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.report.progress import progress
 from pipeline.settings import RunSettings, configuration_folder, result_document
@@ -161,8 +162,8 @@ def _register(
     counts = f"{len(receipt.added)} new, {len(receipt.known)} known"
     text = f"registry {registry.place}: {counts}"
     errors = tuple(
-        f"error: motor {event.motor_id}: version {event.version[:12]} is registered with other "
-        "content; the same work gave other bytes, so the registered one stays"
+        f"error: motor {printable(event.motor_id)}: version {event.version[:12]} is registered "
+        "with other content; the same work gave other bytes, so the registered one stays"
         for event in receipt.conflicts
     )
     return Registered(1 if errors else 0, text, errors)

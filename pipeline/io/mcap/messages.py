@@ -49,6 +49,12 @@ class Batch:
         first = int(self.start[0]) + offset
         return np.ndarray((self.start.size,), dtype, self.buffer, first, (self.stride,))
 
+    def table(self, offset: int, dtype: str, count: int) -> NDArray[Any]:
+        """Arrays [n, count] at one offset of every payload, where there is a stride: a view."""
+        first = int(self.start[0]) + offset
+        strides = (self.stride, np.dtype(dtype).itemsize)
+        return np.ndarray((self.start.size, count), dtype, self.buffer, first, strides)
+
     def counts(self) -> dict[int, int]:
         """How many messages each channel has."""
         if self.stride:

@@ -22,7 +22,7 @@ from pipeline.io.mcap.protobuf_plan import (
     Message,
     Scalar,
 )
-from pipeline.io.mcap.protobuf_rows import even_rows, shaped_rows
+from pipeline.io.mcap.protobuf_rows import even_shape, shaped_rows
 from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
 from pipeline.records.errors import CaptureError
 
@@ -72,19 +72,28 @@ class ProtobufDecoder:
 
     def _evenly(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf] | None:
         """The leaves of evenly spaced messages of one shape, copied by stride."""
-        places = even_rows(batch, self.plan)
-        if places is None:
+        shape = even_shape(batch, self.plan)
+        if shape is None:
             return None
+        values = dict(shape.values)
+        packed = {number: place for number, *place in shape.packed}
+        rows = batch.start.size
         found: dict[str, Leaf] = {}
         for number, part in self.plan.fields.items():
             if not any(map(wanted, _names(part, ""))):
                 continue
-            if number in places and isinstance(part, Scalar):
-                found[part.name] = Leaf(batch.at(places[number], part.dtype))
-            elif isinstance(part, Scalar) and not part.repeated:
-                found[part.name] = Leaf(_absent(part, batch.start.size))
-            else:
+            if isinstance(part, Message):
                 return None
+            if number in values:
+                found[part.name] = Leaf(batch.at(values[number], part.dtype))
+            elif number in packed:
+                at, count = packed[number]
+                table = batch.table(at, part.dtype, count)
+                found[part.name] = Leaf(table, np.full(rows, count, np.int64))
+            elif part.repeated:
+                found[part.name] = Leaf(np.empty(0, _storage(part.dtype)), np.zeros(rows, np.int64))
+            else:
+                found[part.name] = Leaf(_absent(part, rows))
         return found
 
 

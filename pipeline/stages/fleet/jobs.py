@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pipeline.io.guard import ReadLimits
 from pipeline.io.survey import Entry
 from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
 from pipeline.stages.fleet.keeping import Finished
 
 
@@ -39,7 +40,7 @@ class MotorJob:
     @property
     def name(self) -> str:
         """What the task works on."""
-        return f"motor {self.motor_id}"
+        return f"motor {printable(self.motor_id)}"
 
     def without(self, path: str, reason: str) -> MotorJob:
         """The job with a file refused for a reason."""
