@@ -25,7 +25,7 @@ def listening(processes: list[int]) -> set[str]:
     for process in processes:
         try:
             for link in Path(f"/proc/{process}/fd").iterdir():
-                sockets.add(os.readlink(link))
+                sockets.add(str(link.readlink()))
         except OSError:
             continue
     found = set()
