@@ -8,7 +8,7 @@ from __future__ import annotations
 import gzip
 import io
 import json
-import resource
+import os
 import struct
 import sys
 import time
@@ -20,6 +20,7 @@ import lz4.frame
 import zstandard
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
 
+from tests.faults.fleet import peak_mb
 from tests.unit.io.recordings import START_NS, json_messages, mcap_file, protobuf_schema
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -168,7 +169,7 @@ def refuse(path: Path) -> dict[str, object]:
         else:
             codes.append("READ")
     seconds = time.process_time() - start
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    peak = round(peak_mb(os.getpid()))
     return {"file": path.name, "codes": codes, "seconds": seconds, "peak_mb": peak}
 
 
