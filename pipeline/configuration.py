@@ -33,6 +33,11 @@ def load_settings(command: Command, words: list[str]) -> Settings:
         elif command.free and key not in kinds:
             free[key] = _unquoted(value)
         else:
+            if key.lstrip("+").split(".")[0] not in kinds:
+                raise UsageError(
+                    f"{command.name}: no key {key.lstrip('+')!r}",
+                    f"`python -m pipeline {command.name} --help` lists the keys",
+                )
             nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict
             rest.append(f"++{word}" if nested else word)
     settings = _composed(command, rest)

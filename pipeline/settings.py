@@ -38,7 +38,22 @@ class RunSettings(Settings):
     source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
     release: str = key("manual", "manual, or auto: release a datasheet that meets every condition")
     limits: str = key("default", "limits file of conf/limits/: constants a release must hold")
+    recover: bool = key(False, "use the good part of MCAP files that are cut off, unverified")
     workers: int = key(0, "motors worked on at once; 0 is one a core", result=False)
+    executor: str = key("local", "local processes, or dask", result=False)
+    scheduler: str | None = key(
+        None, "tls://HOST:PORT of a Dask cluster; dask starts its own without", result=False
+    )
+    tls_ca: str | None = key(None, "certificate of the cluster's authority", result=False)
+    tls_cert: str | None = key(None, "certificate of this client", result=False)
+    tls_key: str | None = key(None, "key of that certificate", result=False)
+    cache: bool = key(True, "remember in output/.cache what need not be done again", result=False)
+    read_seconds: float = key(
+        60.0, "longest time for reading one file, and 1 s more a MB", result=False
+    )
+    read_memory_mb: int = key(
+        1024, "most memory for reading one file, and 16 times its size more", result=False
+    )
     recordings: bool = key(True, "write a Rerun recording a capture", result=False)
     report: bool = key(True, "write the HTML report", result=False)
     registry: str | None = key(

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import hypothesis
+import pytest
 
 from pipeline.__main__ import THREADS
 
@@ -15,3 +19,21 @@ hypothesis.settings.register_profile(
     "house", deadline=None, derandomize=True, database=None, print_blob=True
 )
 hypothesis.settings.load_profile("house")
+
+
+@pytest.fixture(autouse=True)
+def _in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`main([...])` works in a thread of the test's own process; `@pytest.mark.workers` does not.
+
+    Starting a worker costs seconds of imports. Who needs a real one starts a command or is marked.
+    """
+    if request.node.get_closest_marker("workers") is not None:
+        return
+    from pipeline.stages.fleet import pools
+
+    @contextmanager
+    def threads(workers: int) -> Iterator[pools.Pool]:
+        with ThreadPoolExecutor(1) as executor:
+            yield pools.Pool(executor, ())
+
+    monkeypatch.setattr(pools, "local_pool", threads)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from graphlib import TopologicalSorter
 from typing import NamedTuple
@@ -48,10 +48,18 @@ def estimators() -> tuple[Estimator, ...]:
     return tuple(found[name] for name in TopologicalSorter(graph).static_order())
 
 
+Recall = Callable[[Estimator, Constants, Mapping[str, float], Callable[[], Fit]], Fit]
+"""Gives a fit that was kept, or does it: (estimator, the constants it uses, options, fit)."""
+
+
 def fit_all(
-    campaign: Campaign, options: Mapping[str, Mapping[str, float]]
+    campaign: Campaign,
+    options: Mapping[str, Mapping[str, float]],
+    recall: Recall | None = None,
 ) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
-    """Runs every estimator on one motor's campaign.
+    """Runs every estimator on one motor's campaign, or recalls what it gave before.
+
+    An estimator sees those constants alone that it declares to use.
 
     Returns all estimates in order of preference (rank, then dependency order), the evidence, and
     the estimators that broke on this data: their constants are then not_identifiable.
@@ -63,7 +71,7 @@ def fit_all(
         if campaign.of(*estimator.tests):
             chosen = {**estimator.options, **options.get(estimator.name, {})}
             try:
-                result = estimator.fit(campaign, known, chosen)
+                result = _fitted(estimator, campaign, known, chosen, recall)
             except BROKEN as error:
                 reason = f"{estimator.name} broke on this data: {type(error).__name__}: {error}"
                 failures.append(Failure("estimator_failed", reason, REPORT))
@@ -75,6 +83,19 @@ def fit_all(
         known = Constants(tuple(e for _, _, fit in ranked for e in fit.estimates))
     evidence = tuple(e for _, _, fit in found for e in fit.evidence)
     return known, evidence, tuple(failures)
+
+
+def _fitted(
+    estimator: Estimator,
+    campaign: Campaign,
+    known: Constants,
+    options: Mapping[str, float],
+    recall: Recall | None,
+) -> Fit:
+    used = known.only(estimator.uses)
+    if recall is None:
+        return estimator.fit(campaign, used, options)
+    return recall(estimator, used, options, lambda: estimator.fit(campaign, used, options))
 
 
 def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -18,3 +20,57 @@ def code_version() -> str:
         digest.update(source.relative_to(root).as_posix().encode() + b"\0")
         digest.update(source.read_bytes() + b"\0")
     return f"{pipeline.__version__}+{digest.hexdigest()[:12]}"
+
+
+@cache
+def rooms_digest(rooms: tuple[str, ...]) -> str:
+    """sha256 of every source of some rooms of the package."""
+    root = Path(pipeline.__file__).parent
+    return _digest(path for room in rooms for path in sorted((root / room).rglob("*.py")))
+
+
+@cache
+def closure_digest(module: str) -> str:
+    """sha256 of a module's source and of all of the package that it imports, directly or not."""
+    root = Path(pipeline.__file__).parent
+    left, found = [module], set[Path]()
+    while left:
+        path = _source(root, left.pop())
+        if path is not None and path not in found:
+            found.add(path)
+            left += _imported(ast.parse(path.read_bytes()))
+    return _digest(sorted(found))
+
+
+def _digest(sources: Iterable[Path]) -> str:
+    digest = hashlib.sha256()
+    for source in sources:
+        digest.update(
+            source.relative_to(Path(pipeline.__file__).parent).as_posix().encode()
+            + b"\0"
+            + source.read_bytes()
+            + b"\0"
+        )
+    return digest.hexdigest()
+
+
+def _source(root: Path, module: str) -> Path | None:
+    """The file of a module of the package; None where the name is none."""
+    parts = module.split(".")
+    if parts[0] != pipeline.__name__:
+        return None
+    place = root.joinpath(*parts[1:])
+    for path in (place / "__init__.py", place.with_suffix(".py")):
+        if path.is_file():
+            return path
+    return None
+
+
+def _imported(tree: ast.Module) -> Iterator[str]:
+    """Names that may be modules: of every import, and of every name that is taken from one."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)

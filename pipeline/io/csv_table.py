@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.io.raw_table import RawTable
@@ -20,6 +21,7 @@ from pipeline.records.errors import CaptureError
 
 MAX_HEAD_BYTES = 2**18
 _MAX_COLUMNS = 4096
+_BLOCK_BYTES = 2**22
 SEPARATORS = (";", "\t", ",", "|")
 _COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
 _LONG_INTEGER = re.compile(r"^-?\d{16,}$")
@@ -169,7 +171,10 @@ def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
     at = 0
     pattern = re.compile(dialect.header_match) if dialect.header_match else None
     while at < min(len(body), MAX_HEAD_BYTES):
-        stop = body.find(b"\n", at)
+        stop = body.find(b"\n", at, at + MAX_HEAD_BYTES)
+        if stop < 0 and len(body) > at + MAX_HEAD_BYTES:
+            words = f"the line at byte {at} is longer than {MAX_HEAD_BYTES} bytes"
+            raise _refuse("limit", words, "record fewer columns, one line a row")
         stop = len(body) if stop < 0 else stop
         head.append(body[at:stop])
         at = stop + 1
@@ -247,10 +252,7 @@ def _even_out(rows: bytes, dialect: CsvDialect) -> bytes:
 
 def _check_shape(rows: bytes, names: list[str], dialect: CsvDialect) -> list[str]:
     """The names of the fields that every row has; a row with fewer or more is refused."""
-    raw = np.frombuffer(rows, np.uint8)
-    ends = np.flatnonzero(raw == ord("\n"))
-    marks = np.flatnonzero(raw == ord(dialect.separator))
-    per_row = np.diff(np.searchsorted(marks, ends), prepend=0)
+    per_row = _fields_a_row(rows, dialect.separator)
     expected = len(names) - 1
     if per_row.size and dialect.fewer_columns and per_row[0] < expected:
         expected = int(per_row[0])
@@ -270,6 +272,23 @@ def _check_shape(rows: bytes, names: list[str], dialect: CsvDialect) -> list[str
             "duplicate_column", f"the column {min(twice)!r} is there twice", "rename one of them"
         )
     return names
+
+
+def _fields_a_row(rows: bytes, separator: str) -> NDArray[np.int64]:
+    """Separators in each row [rows], counted a few megabytes at a time."""
+    counts: list[NDArray[np.int64]] = []
+    begin = 0
+    while begin < len(rows):
+        stop = rows.rfind(b"\n", begin, begin + _BLOCK_BYTES) + 1
+        if stop == 0:
+            row = sum(part.size for part in counts)
+            words = f"a line is longer than {_BLOCK_BYTES} bytes"
+            raise _refuse("limit", words, "record one line a row", (row, row))
+        raw = np.frombuffer(rows, np.uint8, stop - begin, begin)
+        ends, marks = np.flatnonzero(raw == ord("\n")), np.flatnonzero(raw == ord(separator))
+        counts.append(np.diff(np.searchsorted(marks, ends), prepend=0).astype(np.int64))
+        begin = stop
+    return np.concatenate(counts) if counts else np.empty(0, np.int64)
 
 
 def _parse(

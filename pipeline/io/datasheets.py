@@ -25,11 +25,12 @@ def read_datasheets(output: Path) -> tuple[Datasheet, ...]:
     paths = sorted((output / "datasheets").glob("*.json"))
     if not paths:
         raise UsageError(f"no datasheets in {output}", "name the output folder of a run")
-    sheets = [_read(path) for path in paths]
+    sheets = [read_datasheet(path) for path in paths]
     return tuple(sorted(sheets, key=lambda sheet: sheet.motor_id))
 
 
-def _read(path: Path) -> Datasheet:
+def read_datasheet(path: Path) -> Datasheet:
+    """One datasheet; raises UsageError where the file is no datasheet of version 1."""
     if path.stat().st_size > MAX_BYTES:
         raise UsageError(f"{path.name} is too large for a datasheet", "run again")
     try:

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from pipeline.io.mcap.limits import MAX_FILE_BYTES
 from pipeline.records.errors import CaptureError, MachineError, UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +48,7 @@ def list_files(folder: Path) -> Listing:
             relative = path.relative_to(folder).as_posix()
             fault = _fault(path, root, relative)
             if fault is not None:
-                findings.append(Finding.refusal(_printable(relative), fault))
+                findings.append(Finding.refusal(printable(relative), fault))
             elif name not in links:
                 paths.append(relative)
     return Listing(tuple(sorted(paths)), tuple(sorted(findings, key=lambda f: f.file)))
@@ -54,13 +58,9 @@ def _unreadable(fault: OSError) -> None:
     raise MachineError(f"a folder cannot be listed: {fault}", "check its permissions") from fault
 
 
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
 def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
     """Why a directory entry cannot be used, or None."""
-    if _printable(relative) != relative:
+    if printable(relative) != relative:
         return CaptureError(
             "file_name", "the name holds bytes that are no printable text", "rename the file"
         )
@@ -79,24 +79,47 @@ def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
     )
 
 
-def read_whole(path: Path) -> bytes:
+def size_bytes(path: Path) -> int:
+    """The size of a file [bytes]; 0 where it is gone, which reading it will say."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
+def read_whole(path: Path, most_bytes: int = MAX_FILE_BYTES) -> bytes:
     """All bytes of a regular file; raises CaptureError for anything else or for too many."""
+    with _opened(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if size > most_bytes:
+            words = f"the file has {size} bytes, where {most_bytes} are the most"
+            raise CaptureError("limit", words, "split it")
+        try:
+            return stream.read(size)
+        except OSError as fault:
+            raise _not_readable(fault) from None
+
+
+def read_head(path: Path, count: int) -> bytes:
+    """The first bytes of a regular file; raises CaptureError for anything else."""
+    with _opened(path) as stream:
+        try:
+            return stream.read(count)
+        except OSError as fault:
+            raise _not_readable(fault) from None
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    """A regular file, opened so that a pipe that took its place cannot block."""
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     except OSError as fault:
         raise _not_readable(fault) from None
     with os.fdopen(handle, "rb") as stream:
-        status = os.fstat(stream.fileno())
-        if not stat.S_ISREG(status.st_mode):
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
             raise CaptureError("not_a_file", "it is no regular file", "save the data to a file")
-        if status.st_size > MAX_FILE_BYTES:
-            raise CaptureError(
-                "limit", f"the file has {status.st_size} bytes", "split the recording below 4 GiB"
-            )
-        try:
-            return stream.read(MAX_FILE_BYTES)
-        except OSError as fault:
-            raise _not_readable(fault) from None
+        yield stream
 
 
 def _not_readable(fault: OSError) -> CaptureError:

@@ -17,7 +17,8 @@ from pipeline.records.finding import Finding
 MANIFEST = "manifest.csv"
 SIDECAR_SUFFIX = ".meta.yaml"
 CONTRACT_VERSION = "1"
-_MAX_MANIFEST_BYTES = 2**22
+MAX_MANIFEST_BYTES = 2**22
+MAX_SIDECAR_BYTES = 2**17
 _CHOICES = {
     "winding": ("wye", "delta"),
     "pair": ("ab", "bc", "ca"),
@@ -81,7 +82,7 @@ def manifest(data: bytes, folder: str) -> dict[str, dict[str, str]]:
 
     Raises CaptureError where it is no table with `file` as its first column.
     """
-    if len(data) > _MAX_MANIFEST_BYTES:
+    if len(data) > MAX_MANIFEST_BYTES:
         raise _bad_manifest("is larger than 4 MiB")
     try:
         text = data.decode("utf-8-sig")

@@ -40,6 +40,12 @@ def write_whole(path: Path, content: bytes) -> None:
         ) from error
 
 
+def partial_owner(path: Path) -> int | None:
+    """The process that was writing a file of a temporary name; None where the name is no such."""
+    words = path.name.split(".")
+    return int(words[-2]) if words[-1] == "partial" and words[-2].isdigit() else None
+
+
 def _remedy(error: OSError) -> str:
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return "free the disk and run again"

@@ -13,16 +13,25 @@ from numpy.typing import NDArray
 class RawTable:
     """Fields [rows] by their own names.
 
-    `log_time_ns` [rows] counts from the capture's first message, or is None where the file has no
-    log clock; `blocks` says that rows of one message share it. `units` holds what a units row said.
+    `log_ns` [messages] counts from the capture's first message, or is None where the file has no
+    log clock; `rows_each` [messages] is how many rows a message has, None for one; `blocks` says
+    that messages are blocks. `units` holds what a units row said.
     """
 
     name: str
     fields: dict[str, NDArray[Any]]
-    log_time_ns: NDArray[np.uint64] | None = None
+    log_ns: NDArray[np.uint64] | None = None
     blocks: bool = False
     joint_state: bool = False
     units: tuple[tuple[str, str], ...] = ()
+    rows_each: NDArray[np.int64] | None = None
+
+    @property
+    def log_time_ns(self) -> NDArray[np.uint64] | None:
+        """Log clock [rows], which rows of one message share."""
+        if self.log_ns is None or self.rows_each is None:
+            return self.log_ns
+        return np.repeat(self.log_ns, self.rows_each)
 
     @property
     def rows(self) -> int:

@@ -207,6 +207,20 @@ class Registry:
         """A motor's versions, oldest first, as they stood at a moment; empty if unknown."""
         return histories(self.events(), until).get(motor_id, ())
 
+    def has_files(self, contents: Iterable[tuple[Key, str]]) -> bool:
+        """Whether every version has its file, of this sha256 (disk only).
+
+        A file gets its name when its row is safe.
+        """
+        return self._table_is_there() and all(
+            (content := self._exports.read(key)) is not None and _digest(content) == sha256
+            for key, sha256 in contents
+        )
+
+    def _table_is_there(self) -> bool:
+        folder = self._table.folder
+        return folder is not None and (folder / "_delta_log").is_dir()
+
     def latest(self, motor_id: str, *, released: bool = False) -> Version | None:
         """A motor's newest version, or its newest released one; None if there is none."""
         history = self.history(motor_id)

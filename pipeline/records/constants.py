@@ -18,6 +18,11 @@ class Constants:
         """These constants and further, less preferred ones."""
         return Constants(self.estimates + tuple(estimates))
 
+    def only(self, names: Iterable[str]) -> Constants:
+        """The estimates of these names."""
+        kept = frozenset(names)
+        return Constants(tuple(e for e in self.estimates if e.name in kept))
+
     def best(self, name: str) -> Estimate | None:
         """The preferred estimate of a constant that has a value, or None."""
         return next((e for e in self.estimates if e.name == name and e.known), None)

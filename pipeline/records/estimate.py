@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from scipy.special import stdtrit
-
 from pipeline.records.uncertainty import (
     Budget,
     effective_dof,
@@ -94,6 +92,8 @@ class Estimate:
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Coverage interval [unit] from Student's t with the effective degrees of freedom."""
+        from scipy.special import stdtrit
+
         dof = min(self.dof, 1e9)
         half = float(stdtrit(dof, 0.5 + level / 2)) * self.u
         return self.number - half, self.number + half

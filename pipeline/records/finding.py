@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from pipeline.records.errors import CaptureError
+from pipeline.records.naming import printable
 
 Severity = Literal["refused", "warning"]
 
@@ -29,7 +30,8 @@ class Finding:
     def line(self) -> str:
         """The one line that standard error carries."""
         rows = "" if self.rows is None else f" rows {self.rows[0]}-{self.rows[1]}"
-        return f"{self.severity}: {self.file}{rows}: {self.message}; {self.remedy} [{self.code}]"
+        said = f"{self.severity}: {self.file}{rows}: {self.message}; {self.remedy} [{self.code}]"
+        return printable(said)
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""

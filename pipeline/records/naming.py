@@ -35,6 +35,11 @@ def file_stem(motor_id: str) -> str:
     return f"{stem[: MAX_CHARS - len(digest) - 2]}~h{digest}"
 
 
+def printable(text: str) -> str:
+    """The text in one line that a terminal shows and does not obey."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "surrogatepass")
 

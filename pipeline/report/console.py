@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
 
 COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("p", "pole_pairs", 1.0),
@@ -32,7 +33,7 @@ def summary(
         lines += [*_table(datasheets), ""]
     for sheet in datasheets:
         lines += [
-            f"{sheet.motor_id}: {c.name} {c.status}: {c.meaning}"
+            f"{printable(sheet.motor_id)}: {c.name} {c.status}: {c.meaning}"
             + (f"; suspect: {c.suspect}" if c.suspect else "")
             for c in sheet.checks
             if c.status in ("fail", "marginal")
@@ -50,8 +51,8 @@ def _table(datasheets: Sequence[Datasheet]) -> list[str]:
     head = ["motor", "lot", "status", *(title for title, *_ in COLUMNS)]
     rows = [
         [
-            sheet.motor_id,
-            sheet.lot or NONE,
+            printable(sheet.motor_id),
+            printable(sheet.lot or NONE),
             sheet.status,
             *(_cell(sheet.constants.get(name), scale) for _, name, scale in COLUMNS),
         ]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,9 @@ from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.verdict import verdict
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.code_version import code_version
-from pipeline.io.ingest import Entry, read_capture
+from pipeline.io.files import size_bytes
+from pipeline.io.guard import reading
+from pipeline.io.ingest import read_capture
 from pipeline.io.publish import canonical_json, write_whole
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -24,63 +25,54 @@ from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
-
-
-@dataclass(frozen=True, slots=True)
-class MotorJob:
-    """Everything a worker needs for one motor; plain data, so that it crosses a process."""
-
-    motor_id: str
-    entries: tuple[Entry, ...]
-    input: str
-    output: str
-    config_sha256: str
-    required: tuple[str, ...]
-    release: str
-    report: bool
-    recordings: bool
-    gates: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    fit: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    crosscheck: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    findings: tuple[Finding, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class MotorResult:
-    """What comes back: the datasheet (None if no capture was usable), findings, files, times."""
-
-    motor_id: str
-    datasheet: Datasheet | None
-    findings: tuple[Finding, ...]
-    files: tuple[str, ...]
-    seconds: Mapping[str, float]
+from pipeline.stages.fleet.fits import FitMemory
+from pipeline.stages.fleet.jobs import MotorJob, MotorResult
+from pipeline.stages.fleet.keeping import Files, Finished, note_motor
+from pipeline.stages.fleet.looking import died
 
 
 def process_motor(job: MotorJob) -> MotorResult:
-    """Reads, validates, fits, checks and writes one motor; refused captures become findings."""
+    """Reads, validates, fits, checks and writes one motor; refused captures become findings.
+
+    When all its files are on the disk, this is noted, so that a batch that was stopped goes on.
+    """
     watch = Stopwatch()
+    finished = _finish(job, watch)
+    if job.key is not None and not job.refused:
+        note_motor(Path(job.output), job.motor_id, job.key, finished)
+    return MotorResult(job.motor_id, finished, watch.seconds)
+
+
+def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     captures, findings = _usable_captures(job, watch)
     if not captures:
-        return MotorResult(job.motor_id, None, tuple(findings), (), watch.seconds)
+        return Finished(tuple(findings), ())
     campaign = Campaign(job.motor_id, captures)
     findings.extend(agree(campaign))
     with watch.stage("fit"):
-        constants, evidence, failures = fit_all(campaign, job.fit)
+        recall = None if job.key is None else FitMemory(Path(job.output), campaign, job.gates)
+        constants, evidence, failures = fit_all(campaign, job.fit, recall)
+        if recall is not None:
+            recall.save()
     findings.extend(Finding(job.motor_id, "warning", *failure) for failure in failures)
     with watch.stage("crosscheck"):
         checks = check_all(constants, campaign, job.crosscheck)
     datasheet = assemble(job, campaign, constants, checks)
     files = _write(job, campaign, datasheet, evidence, (*job.findings, *findings), watch)
-    return MotorResult(job.motor_id, datasheet, tuple(findings), files, watch.seconds)
+    return Finished(tuple(findings), files)
 
 
 def _usable_captures(job: MotorJob, watch: Stopwatch) -> tuple[tuple[Capture, ...], list[Finding]]:
     captures: list[Capture] = []
     findings: list[Finding] = []
+    folder, refused = Path(job.input), dict(job.refused)
     for entry in job.entries:
         try:
-            with watch.stage("read"):
-                capture = read_capture(Path(job.input), entry)
+            if entry.path in refused:
+                raise died(refused[entry.path])
+            size = size_bytes(folder / entry.path)
+            with watch.stage("read"), reading(entry.path, size, job.limits):
+                capture = read_capture(folder, entry)
             with watch.stage("validate"):
                 capture, found = validate(capture, job.gates)
         except CaptureError as error:
@@ -136,28 +128,32 @@ def _write(
     evidence: tuple[Evidence, ...],
     findings: tuple[Finding, ...],
     watch: Stopwatch,
-) -> tuple[str, ...]:
+) -> Files:
     """Writes what the job asks for; returns the files, relative to the output folder."""
     output, stem = Path(job.output), file_stem(job.motor_id)
-    files = [f"datasheets/{stem}.json"]
+    files: list[tuple[str, str]] = []
+
+    def write(name: str, content: bytes) -> None:
+        write_whole(output / name, content)
+        files.append((name, hashlib.sha256(content).hexdigest()))
+
     with watch.stage("datasheet"):
-        write_whole(output / files[0], canonical_json(datasheet.document()))
+        write(f"datasheets/{stem}.json", canonical_json(datasheet.document()))
     if job.report:
         from pipeline.report.motor_page import render_motor
 
-        files.append(f"report/{stem}.html")
         with watch.stage("report"):
             terms = {term.name: term for estimator in estimators() for term in estimator.terms}
             page = render_motor(datasheet, evidence, findings, terms)
-            write_whole(output / files[-1], page.encode())
+            write(f"report/{stem}.html", page.encode())
     if job.recordings:
-        from pipeline.io.recording import write_recording
+        from pipeline.io.recording import recording_bytes
 
         with watch.stage("recordings"):
             for capture in campaign.captures:
-                files.append(f"recordings/{stem}/{_place(capture.path)}.rrd")
                 own = tuple(f for f in findings if f.file == capture.path)
-                write_recording(capture, evidence, output / files[-1], datasheet, own)
+                content = recording_bytes(capture, evidence, datasheet, own)
+                write(f"recordings/{stem}/{_place(capture.path)}.rrd", content)
     return tuple(files)
 
 

@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipeline.contracts.registry import gates
-from pipeline.crosscheck.registry import rules
-from pipeline.fit.registry import estimators
-from pipeline.io.ingest import Entry, Survey, survey
+from pipeline.io.files import size_bytes
+from pipeline.io.guard import ReadLimits
 from pipeline.io.limits import limits_file, required_constants
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.publish import canonical_json
 from pipeline.io.registry import Registry
 from pipeline.io.source_map import SourceMap, find_map, load_source_maps
-from pipeline.records.datasheet import Datasheet
-from pipeline.records.errors import MachineError, PipelineError, UsageError
+from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
+from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
-from pipeline.report.console import summary
+from pipeline.report.progress import progress
 from pipeline.settings import RunSettings, configuration_folder, result_document
-from pipeline.stages.motor import MotorJob, MotorResult, process_motor
+from pipeline.stages.fleet.crew import Crew
+from pipeline.stages.fleet.jobs import MotorJob, MotorResult
+from pipeline.stages.fleet.keeping import Batch, Keeping, digest_of, tools_version
+from pipeline.stages.fleet.looking import look_with
+from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
+from pipeline.stages.fleet.publishing import datasheets_of, outcome_of, placed, publish
 
-MANIFEST = "outputs.json"
+CRUMBS = ".work"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,42 +44,84 @@ class Registered:
 
 def main(settings: RunSettings) -> Outcome:
     """Every motor of `input` to `output`; refused captures are named and the rest goes on."""
-    watch = Stopwatch()
     _known_options(settings)
-    folder = Path(settings.input)
+    folder, output = Path(settings.input), Path(settings.output)
     if not folder.is_dir():
         raise UsageError(f"input={settings.input} is no folder", "name the folder of captures")
-    if Path(settings.output).exists() and not Path(settings.output).is_dir():
+    if output.exists() and not output.is_dir():
         raise UsageError(f"output={settings.output} is a file", "name a folder to write to")
+    if settings.workers < 0:
+        raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
     registry = _registry(settings)
+    cluster = Cluster(settings.scheduler, settings.tls_ca, settings.tls_cert, settings.tls_key)
+    crew = Crew(
+        open_pool(settings.executor, cluster), settings.workers or core_count(), output / CRUMBS
+    )
+    with crew:
+        return _run(settings, registry, crew)
+
+
+def process_motor(job: MotorJob) -> MotorResult:
+    """One motor, in a worker: what it needs is imported there and not in the driver."""
+    from pipeline.stages import motor
+
+    return motor.process_motor(job)
+
+
+def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcome:
+    watch = Stopwatch()
+    folder, output = Path(settings.input), Path(settings.output)
     conf = configuration_folder()
     limits = limits_file(conf / "limits", settings.limits)
+    sources = _source_maps(conf / "source", settings.source)
+    keeping = Keeping(folder, output, on=settings.cache)
     with watch.stage("survey"):
-        found = survey(folder, _source_maps(conf / "source", settings.source))
+        ask = partial(_answers, settings, sources, crew, keeping)
+        found = survey(folder, sources, ask, recover=settings.recover)
     jobs = _jobs(settings, found, limits)
+    batch = _batch_key(settings, jobs, found)
+    if (same := _same_again(settings, registry, keeping, batch)) is not None:
+        return replace(same, timings=watch.table())
     with watch.stage("motors"):
-        results, died = _process(jobs, settings.workers)
+        results, died = _process(settings, jobs, crew, keeping)
     findings = tuple(
-        sorted({*found.findings, *(f for r in results for f in r.findings)}, key=_order)
+        sorted({*found.findings, *(f for r in results for f in r.finished.findings)}, key=_order)
     )
     with watch.stage("fleet"):
-        _publish(settings, results, findings)
+        datasheets = datasheets_of(output, results)
+        files = publish(settings, results, datasheets, findings)
+        outcome = outcome_of(datasheets, findings, found, report=settings.report)
     with watch.stage("registry"):
-        registered = _register(registry, Path(settings.output), results)
+        registered = _register(registry, output, results)
+    if not died and registered.code == 0:
+        made = (file for result in results for file in result.finished.files)
+        digests = [sha256 for name, sha256 in made if name.startswith("datasheets/")]
+        contents = tuple(
+            ((sheet.motor_id, sheet.version), sha256)
+            for sheet, sha256 in zip(datasheets, digests, strict=True)
+        )
+        keeping.keep_outcome(batch, Batch(outcome, contents), files)
+    keeping.forget_others([job.motor_id for job in jobs])
+    outcome = placed(outcome, settings)
     for result in results:
         for name, seconds in result.seconds.items():
             watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
-    outcome = _outcome(settings, results, findings, found, watch)
     return Outcome(
         first_that_applies(outcome.exit_code, registered.code, *(e.exit_code for e in died)),
         "\n".join(filter(None, [outcome.text, registered.text])),
         (*outcome.errors, *registered.errors, *(f"error: {e}" for e in died)),
-        outcome.timings,
+        watch.table(),
     )
 
 
 def _known_options(settings: RunSettings) -> None:
     """Refuses an option of an estimator or check that does not exist: a typo must not be silent."""
+    if not (settings.fit or settings.gates or settings.crosscheck):
+        return
+    from pipeline.contracts.registry import gates
+    from pipeline.crosscheck.registry import rules
+    from pipeline.fit.registry import estimators
+
     plugs: tuple[tuple[str, Mapping[str, Any], Mapping[str, Mapping[str, float]]], ...] = (
         ("fit", settings.fit, {e.name: e.options for e in estimators()}),
         ("gates", settings.gates, {g.name: g.settings() for g in gates()}),
@@ -108,7 +151,7 @@ def _register(
     registry: Registry | None, output: Path, results: Sequence[MotorResult]
 ) -> Registered:
     """Publishes all datasheets in one commit; a registry that fails leaves the outputs whole."""
-    names = [name for r in results for name in r.files if name.startswith("datasheets/")]
+    names = [n for r in results for n, _ in r.finished.files if n.startswith("datasheets/")]
     if registry is None or not names:
         return Registered()
     try:
@@ -119,8 +162,8 @@ def _register(
     counts = f"{len(receipt.added)} new, {len(receipt.known)} known"
     text = f"registry {registry.place}: {counts}"
     errors = tuple(
-        f"error: motor {event.motor_id}: version {event.version[:12]} is registered with other "
-        "content; the same work gave other bytes, so the registered one stays"
+        f"error: motor {printable(event.motor_id)}: version {event.version[:12]} is registered "
+        "with other content; the same work gave other bytes, so the registered one stays"
         for event in receipt.conflicts
     )
     return Registered(1 if errors else 0, text, errors)
@@ -132,8 +175,28 @@ def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:
     return maps if name == "auto" else {name: find_map(maps, name)}
 
 
-def _order(finding: Finding) -> tuple[str, str, str, tuple[int, int]]:
-    return finding.file, finding.severity, finding.code, finding.rows or (-1, -1)
+def _answers(
+    settings: RunSettings,
+    sources: Mapping[str, SourceMap],
+    crew: Crew,
+    keeping: Keeping,
+    questions: Sequence[Question],
+) -> list[Answer]:
+    """The survey's answers: those that are known, and those of the crew for the others."""
+    folder = Path(settings.input)
+    answers = keeping.known_answers(questions, sources, settings.recover)
+    for number, question in enumerate(questions):
+        if number not in answers and (answer := settled(folder, question, sources)) is not None:
+            answers[number] = answer
+    open_ = [number for number in range(len(questions)) if number not in answers]
+    limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
+    asked = [questions[number] for number in open_]
+    found = look_with(crew, folder, sources, limits, asked, recover=settings.recover)
+    answers.update(zip(open_, found, strict=True))
+    told = [answers[number] for number in range(len(questions))]
+    if open_:
+        keeping.keep_answers(questions, told)
+    return told
 
 
 def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
@@ -143,7 +206,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     required = required_constants(limits)
     # Of the limits file, what a lot is held to changes no datasheet.
     work = canonical_json({**result_document(settings), "required": required})
-    return [
+    jobs = [
         MotorJob(
             motor_id=motor_id,
             entries=tuple(own),
@@ -158,9 +221,50 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             fit=settings.fit,
             crosscheck=settings.crosscheck,
             findings=tuple(f for f in found.findings if f.file in {e.path for e in own}),
+            limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )
         for motor_id, own in sorted(motors.items())
     ]
+    return [replace(job, key=_key(job)) for job in jobs] if settings.cache else jobs
+
+
+def _key(job: MotorJob) -> str:
+    """Digest of all that the files of a motor are made from."""
+    return digest_of(
+        tools_version(),
+        job.motor_id,
+        [[e.path, e.sha256, e.form, repr(e.source), e.metadata, e.recovered] for e in job.entries],
+        job.config_sha256,
+        [job.report, job.recordings],
+        [finding.document() for finding in job.findings],
+    )
+
+
+def _batch_key(settings: RunSettings, jobs: Sequence[MotorJob], found: Survey) -> str:
+    """Digest of all that the outcome of a batch is made from, but for where it lies."""
+    return digest_of(
+        tools_version(),
+        [job.key for job in jobs],
+        [finding.document() for finding in found.findings],
+        found.note,
+        [settings.report, settings.recordings],
+    )
+
+
+def _same_again(
+    settings: RunSettings, registry: Registry | None, keeping: Keeping, key: str
+) -> Outcome | None:
+    """The outcome of a batch that was done before and of which everything is still there."""
+    batch = keeping.outcome(key) if settings.cache else None
+    if batch is None:
+        return None
+    text = ""
+    if registry is not None and batch.contents:
+        if not registry.has_files(batch.contents):
+            return None
+        text = f"registry {registry.place}: 0 new, {len(batch.contents)} known"
+    outcome = placed(batch.outcome, settings)
+    return replace(outcome, text="\n".join(filter(None, [outcome.text, text])))
 
 
 def _digest(work: bytes, entries: Sequence[Entry]) -> str:
@@ -170,85 +274,29 @@ def _digest(work: bytes, entries: Sequence[Entry]) -> str:
 
 
 def _process(
-    jobs: Sequence[MotorJob], workers: int
+    settings: RunSettings, jobs: Sequence[MotorJob], crew: Crew, keeping: Keeping
 ) -> tuple[list[MotorResult], tuple[MachineError, ...]]:
-    """The results in the order of the jobs, and an error for each job whose worker died.
-
-    What was raised on purpose (a full disk) ends the run: it would meet the next motor too.
-    """
-    if not jobs:
-        return [], ()
-    with _executor(min(workers or os.cpu_count() or 1, len(jobs))) as executor:
-        futures = [executor.submit(process_motor, job) for job in jobs]
-        errors = [future.exception() for future in futures]
-    died = []
-    for job, error in zip(jobs, errors, strict=True):
-        if isinstance(error, PipelineError):
-            raise error
-        if error is not None:
-            what = f"motor {job.motor_id} could not be finished: {type(error).__name__}: {error}"
-            remedy = "report it with this line; the other motors are done"
-            died.append(MachineError(what, remedy))
-    return [f.result() for f, e in zip(futures, errors, strict=True) if e is None], tuple(died)
+    """The results in the order of the jobs, and an error for each that could not be finished."""
+    ends: list[Any] = [None] * len(jobs)
+    for number, job in enumerate(jobs):
+        if job.key is not None and (done := keeping.finished(job.motor_id, job.key)) is not None:
+            ends[number] = MotorResult(job.motor_id, done, {})
+    due = [number for number, end in enumerate(ends) if end is None]
+    with progress([_size(settings, jobs[number]) for number in due]) as bar:
+        found = crew.work_through(
+            process_motor, [jobs[number] for number in due], lambda at, _: bar.advance(at)
+        )
+    for number, end in zip(due, found, strict=True):
+        ends[number] = end
+    died = tuple(end for end in ends if isinstance(end, MachineError))
+    return [end for end in ends if isinstance(end, MotorResult)], died
 
 
-def _executor(workers: int) -> Executor:
-    if workers == 1:
-        return ThreadPoolExecutor(1)
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+def _order(finding: Finding) -> tuple[str, str, str, tuple[int, int]]:
+    return finding.file, finding.severity, finding.code, finding.rows or (-1, -1)
 
 
-def _publish(
-    settings: RunSettings, results: Sequence[MotorResult], findings: Sequence[Finding]
-) -> None:
-    """Writes what belongs to the batch, then takes away what an earlier run left behind."""
-    output = Path(settings.output)
-    document = {"schema": "findings/1", "findings": [f.document() for f in findings]}
-    write_whole(output / "findings.json", canonical_json(document))
-    files = ["findings.json", *(name for result in results for name in result.files)]
-    if settings.report:
-        from pipeline.report.fleet_page import render_fleet
-
-        files.append("report/index.html")
-        page = render_fleet(_datasheets(results), tuple(findings))
-        write_whole(output / "report/index.html", page.encode())
-    _sweep(output, files)
-
-
-def _sweep(output: Path, files: Sequence[str]) -> None:
-    """Removes the files that the last run listed and this one did not write."""
-    manifest = output / MANIFEST
-    before = json.loads(manifest.read_bytes())["files"] if manifest.is_file() else []
-    for name in sorted(set(before) - set(files)):
-        stale = output / name
-        if stale.resolve().is_relative_to(output.resolve()):
-            stale.unlink(missing_ok=True)
-    write_whole(manifest, canonical_json({"schema": "outputs/1", "files": sorted(files)}))
-
-
-def _datasheets(results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
-    return tuple(r.datasheet for r in results if r.datasheet is not None)
-
-
-def _outcome(
-    settings: RunSettings,
-    results: Sequence[MotorResult],
-    findings: Sequence[Finding],
-    found: Survey,
-    watch: Stopwatch,
-) -> Outcome:
-    datasheets = _datasheets(results)
-    statuses = [{check.status for check in sheet.checks} for sheet in datasheets]
-    code = first_that_applies(
-        1 if any("fail" in seen for seen in statuses) else 0,
-        3 if any(finding.severity == "refused" for finding in findings) else 0,
-        4 if not datasheets or any(seen == {"not_evaluated"} for seen in statuses) else 0,
-    )
-    lines = tuple(finding.line() for finding in findings)
-    if not found.entries:
-        nothing = f"undecided: no usable capture in {settings.input}; `inspect FILE` says why"
-        lines = (*lines, nothing)
-    if found.note:
-        lines = (*lines, f"note: {found.note}")
-    text = summary(datasheets, findings, settings.output, report=settings.report)
-    return Outcome(code, text, lines, watch.table())
+def _size(settings: RunSettings, job: MotorJob) -> tuple[int, int]:
+    """Captures and bytes of a job."""
+    folder = Path(settings.input)
+    return len(job.entries), sum(size_bytes(folder / entry.path) for entry in job.entries)

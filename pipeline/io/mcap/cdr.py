@@ -8,6 +8,7 @@ Reference: OMG DDSI-RTPS 2.5, 10 (encapsulation); OMG DDS-XTypes 1.3, 7.4 (plain
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from pipeline.records.errors import CaptureError
 _ENCAPSULATION = 4
 _PADDING = 8
 _SLICES_FROM = 32
-_MAX_ELEMENTS = 100_000
+_MAX_ELEMENTS = 4096
 _KINDS = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 """Representation identifier: byte order, and the largest alignment (CDR1 8, CDR2 4)."""
 
@@ -40,15 +41,18 @@ class CdrDecoder:
 
     def __init__(self, layout: tuple[Field, ...]) -> None:
         self.layout = layout
+        self._trail: _Trail | None = None
 
     def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
         """Numeric fields by dotted name; a string[] field gives the places of its strings."""
         raw: Bytes = np.frombuffer(batch.buffer, np.uint8)
         if batch.start.size == 0:
             return {}
+        if self._trail is not None and (known := self._trail.follow(batch)) is not None:
+            return known
         if np.any(batch.length < _ENCAPSULATION):
             raise _bad("is shorter than its encapsulation")
-        heads = view_at_every_byte(raw, ">u2")[batch.start]
+        heads = batch.at(0, ">u2") if batch.stride else view_at_every_byte(raw, ">u2")[batch.start]
         if np.any(heads != heads[0]) or int(heads[0]) not in _KINDS:
             raise _bad("has an encapsulation other than plain CDR")
         order, align = _KINDS[int(heads[0])]
@@ -58,7 +62,41 @@ class CdrDecoder:
         left = body.size - body.at
         if np.any(left < 0) or np.any(left >= _PADDING):
             raise _bad("has another length than its schema gives")
+        self._trail = body.trail
         return body.collected()
+
+
+@dataclass(slots=True)
+class _Trail:
+    """Where the fields lay in evenly spaced messages, and what must hold to find them there again.
+
+    `checks` are positions with the count that every message has there; `fields` are names with
+    position, type and count (None: a single value). All positions are after the encapsulation.
+    """
+
+    length: int
+    head: int
+    order: str
+    checks: list[tuple[int, int]] = field(default_factory=list)
+    fields: list[tuple[str, int, str, int | None]] = field(default_factory=list)
+
+    def follow(self, batch: Batch) -> dict[str, Leaf] | None:
+        """The leaves of a further batch, or None where it must be gone through anew."""
+        if not batch.stride or int(batch.length[0]) != self.length:
+            return None
+        if (batch.at(0, ">u2") != self.head).any():
+            return None
+        for at, count in self.checks:
+            if (batch.at(_ENCAPSULATION + at, self.order + "u4") != count).any():
+                return None
+        found: dict[str, Leaf] = {}
+        for name, at, dtype, each in self.fields:
+            if each is None:
+                found[name] = Leaf(batch.at(_ENCAPSULATION + at, dtype))
+            else:
+                counts = np.full(batch.start.size, each, np.int64)
+                found[name] = Leaf(batch.table(_ENCAPSULATION + at, dtype, each), counts)
+        return found
 
 
 class _Pass:
@@ -68,6 +106,7 @@ class _Pass:
     """
 
     def __init__(self, batch: Batch, raw: Bytes, order: str, align: int, wanted: Wanted) -> None:
+        self.batch = batch
         self.buffer = batch.buffer
         self.raw = raw
         self.order = order
@@ -75,8 +114,14 @@ class _Pass:
         self.wanted = wanted
         self.origin = batch.start + _ENCAPSULATION
         self.size = batch.length - _ENCAPSULATION
+        self.shortest = int(self.size.min())
         self.at: Any = 0
+        self.counted_at: Any = 0
         self.whole: dict[str, Leaf] = {}
+        self.trail: _Trail | None = None
+        if batch.stride:
+            head = int(batch.at(0, ">u2")[0])
+            self.trail = _Trail(int(batch.length[0]), head, order)
         self.arrays: dict[str, list[tuple[Integers, NDArray[Any]]]] = {}
 
     def collected(self) -> dict[str, Leaf]:
@@ -92,7 +137,7 @@ class _Pass:
                 order = np.argsort(owner, kind="stable")
                 owner, values = owner[order], values[order]
             counts = np.bincount(owner, minlength=self.origin.size).astype(np.int64)
-            found[name] = Leaf(values, counts)
+            found[name] = Leaf(values, counts, values.ndim == 2)
         return found
 
     def field(self, part: Field, prefix: str, rows: Integers | None) -> None:
@@ -112,20 +157,43 @@ class _Pass:
             length = self.count(rows)
             start = self.places(rows)
             self.move(length, rows)
+            self.note_count(length, rows)
             if self.wanted(prefix + part.name):
+                self.trail = None
                 text = np.stack([start, length], axis=-1)
                 self.keep(prefix + part.name, text, rows)
         else:
-            self.align(np.dtype(part.dtype).itemsize, rows)
-            start = self.places(rows)
-            self.move(np.dtype(part.dtype).itemsize, rows)
+            width = np.dtype(part.dtype).itemsize
+            self.align(width, rows)
+            self.move(width, rows)
             if self.wanted(prefix + part.name):
-                values = view_at_every_byte(self.raw, self.order + part.dtype)[start]
+                if self.trail is not None and self.evenly(rows):
+                    place = (prefix + part.name, self.at - width, self.order + part.dtype, None)
+                    self.trail.fields.append(place)
+                values = self.values(self.order + part.dtype, width, rows)
                 self.keep(prefix + part.name, values, rows)
+
+    def note_count(self, counts: Integers, rows: Integers | None) -> None:
+        """Notes the count that was just read, or that no trail leads through such messages."""
+        even = rows is None and counts.size > 0 and bool((counts == counts[0]).all())
+        if self.trail is not None and even and isinstance(self.counted_at, int):
+            self.trail.checks.append((self.counted_at, int(counts[0])))
+        else:
+            self.trail = None
+
+    def evenly(self, rows: Integers | None) -> bool:
+        """Whether the position is the same in all of evenly spaced messages."""
+        return rows is None and self.batch.stride > 0 and isinstance(self.at, int)
+
+    def values(self, dtype: str, width: int, rows: Integers | None) -> NDArray[Any]:
+        """The numbers that the positions were just moved past: a view where evenly spaced."""
+        if self.evenly(rows):
+            return self.batch.at(_ENCAPSULATION + self.at - width, dtype)
+        return view_at_every_byte(self.raw, dtype)[self.places(rows) - width]
 
     def keep(self, name: str, values: NDArray[Any], rows: Integers | None) -> None:
         if rows is None:
-            self.whole[name] = Leaf(values)
+            self.whole[name] = Leaf(values, None, values.ndim == 2)
         else:
             self.arrays.setdefault(name, []).append((rows, values))
 
@@ -139,11 +207,22 @@ class _Pass:
         if np.any(count > self.size[whose] // width + 1):
             raise _bad("has an array that is longer than the message")
         self.align(width, rows, count > 0)
-        start = self.places(rows)
+        if part.array == 0:
+            self.note_count(count, rows)
+        even = self.evenly(rows) and bool(np.all(count == count[0]))
+        first = self.at
+        start = count if even else self.places(rows)
         self.move(count * width, rows)
         if not self.wanted(prefix + part.name):
             return
         dtype = self.order + str(part.dtype)
+        if even:
+            each = int(count[0])
+            if self.trail is not None:
+                self.trail.fields.append((prefix + part.name, first, dtype, each))
+            values = self.batch.table(_ENCAPSULATION + first, dtype, each)
+            self.whole[prefix + part.name] = Leaf(values, count)
+            return
         if count.sum() >= _SLICES_FROM * max(count.size, 1):
             values = np.concatenate(
                 [
@@ -158,6 +237,7 @@ class _Pass:
 
     def elements(self, part: Field, prefix: str, rows: Integers | None) -> None:
         """An array of messages or strings, element by element over all messages at once."""
+        self.trail = None
         whose = np.arange(self.origin.size) if rows is None else rows
         if rows is not None and any(map(self.wanted, part.names(prefix))):
             raise _bad(f"has the array {prefix + part.name!r} inside an array")
@@ -170,6 +250,8 @@ class _Pass:
             self.arrays.setdefault(name, [])
         for number in range(int(count.max(initial=0))):
             self.single(element, prefix, whose[count > number])
+        if rows is None and self.at.size and bool(np.all(self.at == self.at[0])):
+            self.at = int(self.at[0])
 
     def places(self, rows: Integers | None) -> Integers:
         """Byte positions in the buffer of the messages `rows`."""
@@ -195,7 +277,9 @@ class _Pass:
         if rows is None:
             same = np.ndim(by) == 1 and by.size and bool(np.all(by == by[0]))
             self.at = self.at + (int(by[0]) if same else by)
-            over = np.any(self.at > self.size)
+            over = (
+                self.at > self.shortest if isinstance(self.at, int) else np.any(self.at > self.size)
+            )
         else:
             self.at[rows] += by
             over = np.any(self.at[rows] > self.size[rows])
@@ -205,7 +289,6 @@ class _Pass:
     def count(self, rows: Integers | None) -> Integers:
         """The 32-bit length before a string or sequence."""
         self.align(4, rows)
-        start = self.places(rows)
+        self.counted_at = self.at
         self.move(4, rows)
-        counts: Integers = view_at_every_byte(self.raw, self.order + "u4")[start].astype(np.int64)
-        return counts
+        return self.values(self.order + "u4", 4, rows).astype(np.int64)

@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.io.mcap import records as rec
+from pipeline.io.mcap.limits import MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO
 from pipeline.io.mcap.walk import HEAD_BYTES, Integers, RecordSpans, walk
-from pipeline.io.mcap.wire import Fields, corrupt, truncated
+from pipeline.io.mcap.wire import Fields, corrupt, too_large, truncated
 from pipeline.records.errors import CaptureError
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -78,6 +79,10 @@ class Layout:
     loose_start: Integers = field(default_factory=lambda: np.empty(0, np.int64))
     loose_length: Integers = field(default_factory=lambda: np.empty(0, np.int64))
     data_crc_holds: bool = False
+    cut: CaptureError | None = None
+    """Why the file is known to be cut off, where its good part is used all the same."""
+    kept_bytes: int = 0
+    """Bytes of a cut file up to the end of its last whole record."""
 
     @property
     def messages_seen(self) -> int:
@@ -95,8 +100,11 @@ class Layout:
         return merged
 
 
-def scan(data: bytes) -> Layout:
-    """The layout of a whole MCAP file, or a CaptureError with what is wrong with it."""
+def scan(data: bytes, *, recover: bool = False) -> Layout:
+    """The layout of a whole MCAP file, or a CaptureError with what is wrong with it.
+
+    `recover` takes the whole records of a file that lacks its end; `Layout.cut` then says so.
+    """
     if not data.startswith(MAGIC):
         raise CaptureError(
             "not_mcap",
@@ -108,10 +116,31 @@ def scan(data: bytes) -> Layout:
     spans = walk(data, len(MAGIC), len(data) - len(MAGIC) if whole else len(data))
     end = _data_section(layout, spans)
     if not whole or spans.fault is not None or end is None:
-        raise _cut(layout, spans.fault)
+        cut = _cut(layout, spans.fault)
+        if whole or not recover:
+            raise cut
+        return _good_part(layout, spans, end, cut)
     _data_end(layout, spans, end)
     _summary(layout, spans, end)
     _check_index(layout)
+    return layout
+
+
+def _good_part(layout: Layout, spans: RecordSpans, end: int | None, cut: CaptureError) -> Layout:
+    """The layout of the whole records of a file that lacks its end; nothing proves it complete.
+
+    The summary is not believed, and the last chunk is walked, for its index may be cut off too.
+    """
+    if spans.opcode.size == 0:
+        raise cut
+    if end is not None:
+        _data_end(layout, spans, end)
+        layout.data_crc_holds = False
+    if layout.chunks:
+        layout.message_indexes[layout.chunks[-1].offset] = []
+    _check_size(layout)
+    layout.cut = cut
+    layout.kept_bytes = int(spans.start[-1] + spans.length[-1])
     return layout
 
 
@@ -246,6 +275,7 @@ def _check_index(layout: Layout) -> None:
     """The summary's index must name each chunk, attachment and metadata record exactly once."""
     if not layout.chunks:
         check_definitions(layout)
+    _check_size(layout)
     if layout.chunk_indexes:
         actual = [_index_of(layout, chunk) for chunk in layout.chunks]
         _match("chunk", layout.chunk_indexes, actual)
@@ -253,6 +283,13 @@ def _check_index(layout: Layout) -> None:
         _match("attachment", layout.attachment_indexes, layout.attachments)
     if layout.metadata_indexes:
         _match("metadata", layout.metadata_indexes, layout.metadata_places)
+
+
+def _check_size(layout: Layout) -> None:
+    """Each chunk may be modest and a thousand of them a bomb."""
+    plain = sum(chunk.size for chunk in layout.chunks)
+    if plain > max(MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO * len(layout.data)):
+        raise too_large(f"its {len(layout.data)} bytes claim to unpack to {plain}")
 
 
 def check_definitions(layout: Layout) -> None:
@@ -283,5 +320,5 @@ def _match(what: str, stated: Iterable[object], actual: Iterable[object]) -> Non
     left, right = list(stated), list(actual)
     if len(left) != len(right):
         raise corrupt(f"the index names {len(left)} {what} records, the file holds {len(right)}")
-    if any(item not in right for item in left) or any(item not in left for item in right):
+    if set(left) != set(right):
         raise corrupt(f"the index contradicts the file on a {what} record")

@@ -34,7 +34,7 @@ def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict
         first = np.cumsum(leaf.counts) - leaf.counts
         values = np.full(counts.size, np.nan)
         there = leaf.counts > 0
-        values[there] = leaf.values[(first + at)[there]]
+        values[there] = leaf.values.reshape(-1)[(first + at)[there]]
         found[quantity] = Leaf(values)
     return found
 

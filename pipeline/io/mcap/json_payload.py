@@ -152,13 +152,15 @@ def _collect(series: Any, name: str, wanted: Wanted, found: dict[str, Leaf]) -> 
 def _one_by_one(payloads: list[bytes], wanted: Wanted) -> dict[str, Leaf]:
     """The leaves by reading each message on its own."""
     rows: list[dict[str, Any]] = []
+    seen: dict[str, None] = {}
     for row, payload in enumerate(payloads):
         flat: dict[str, Any] = {}
         _flatten(_object(payload, row), "", flat, row, 0)
         rows.append(flat)
-    names = list(dict.fromkeys(name for flat in rows for name in flat if wanted(name)))
-    if len(names) > MAX_FIELDS:
-        raise _bad(f"stream has more than {MAX_FIELDS} fields")
+        seen.update(dict.fromkeys(flat))
+        if len(seen) > MAX_FIELDS:
+            raise _bad(f"stream has more than {MAX_FIELDS} fields", row)
+    names = [name for name in seen if wanted(name)]
     return {name: _leaf(name, [flat.get(name) for flat in rows]) for name in names}
 
 

@@ -18,10 +18,15 @@ Wanted = Callable[[str], bool]
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """Values of one field in message order; `counts` [messages] for arrays, None for scalars."""
+    """Values of one field in message order; `counts` [messages] for arrays, None for scalars.
+
+    `values` may be a view of the batch's buffer, and [messages, count] where all counts are equal.
+    `places` marks texts, whose values are [n, 2]: where each begins and how long it is.
+    """
 
     values: NDArray[Any]
     counts: Integers | None = None
+    places: bool = False
 
 
 class Decoder(Protocol):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +16,56 @@ from pipeline.io.mcap.walk import HEAD_BYTES, Integers, view_at_every_byte, walk
 from pipeline.io.mcap.wire import Fields, corrupt
 
 _BATCH_BYTES = 8 * 2**20
+_ALONE_BYTES = 2**18
+"""Chunks of this size are batches of their own; smaller ones are put together."""
+
+
+_HEADS = np.dtype(
+    {
+        "names": ["opcode", "length", "channel", "log_time"],
+        "formats": ["u1", "<u8", "<u2", "<u8"],
+        "offsets": [0, 1, HEAD_BYTES, HEAD_BYTES + 6],
+        "itemsize": HEAD_BYTES + rec.MESSAGE_HEAD_BYTES,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Messages [n] in one buffer: payload start and length, channel, log time [ns]."""
+    """Messages [n] in one buffer: payload start and length, channel, log time [ns].
+
+    `stride` is the distance between payloads where all have one length and one channel, else 0.
+    """
 
     buffer: bytes
     start: Integers
     length: Integers
     channel: NDArray[np.uint16]
     log_time: NDArray[np.uint64]
+    stride: int = 0
+
+    def at(self, offset: int, dtype: str) -> NDArray[Any]:
+        """Values [n] at one offset of every payload, where there is a stride: a view."""
+        first = int(self.start[0]) + offset
+        return np.ndarray((self.start.size,), dtype, self.buffer, first, (self.stride,))
+
+    def table(self, offset: int, dtype: str, count: int) -> NDArray[Any]:
+        """Arrays [n, count] at one offset of every payload, where there is a stride: a view."""
+        first = int(self.start[0]) + offset
+        strides = (self.stride, np.dtype(dtype).itemsize)
+        return np.ndarray((self.start.size, count), dtype, self.buffer, first, strides)
+
+    def counts(self) -> dict[int, int]:
+        """How many messages each channel has."""
+        if self.stride:
+            return {int(self.channel[0]): self.start.size}
+        channels, counts = np.unique(self.channel, return_counts=True)
+        return dict(zip(channels.tolist(), counts.tolist(), strict=True))
 
     def of(self, channels: list[int]) -> Batch:
         """The messages of some channels, in file order."""
+        if self.stride and int(self.channel[0]) in channels:
+            return self
         keep = np.isin(self.channel, channels)
         if keep.all():
             return self
@@ -50,6 +87,11 @@ def batches(layout: Layout) -> Iterator[Batch]:
     ledger.close(layout)
 
 
+def count_messages(layout: Layout) -> int:
+    """How many messages a file holds, each unpacked and checked as when it is decoded."""
+    return sum(int(batch.start.size) for batch in batches(layout))
+
+
 def _all(layout: Layout) -> Iterator[Batch]:
     if layout.loose_start.size:
         yield _batch(layout.data, layout.loose_start, layout.loose_length)
@@ -59,16 +101,59 @@ def _all(layout: Layout) -> Iterator[Batch]:
     first = int(layout.loose_start.size)
     for chunk in layout.chunks:
         buffer = unpack(layout.data, chunk, first)
+        alone = len(buffer) >= _ALONE_BYTES
+        if pending and (alone or held >= _BATCH_BYTES):
+            yield _join(pending, spans)
+            pending, spans, held = [], [], 0
+        if alone:
+            batch = _regular(layout, chunk, buffer) or _batch(
+                buffer, *_in_chunk(layout, chunk, buffer)
+            )
+            first += batch.start.size
+            yield batch
+            continue
         start, length = _in_chunk(layout, chunk, buffer)
         first += start.size
         pending.append(buffer)
         spans.append((start + held, length))
         held += len(buffer)
-        if held >= _BATCH_BYTES:
-            yield _join(pending, spans)
-            pending, spans, held = [], [], 0
     if pending:
         yield _join(pending, spans)
+
+
+def _regular(layout: Layout, chunk: rec.Chunk, buffer: bytes) -> Batch | None:
+    """The messages of a chunk of one channel, evenly spaced and of one length; None otherwise.
+
+    The index is proved against every message as in `_indexed`, by views with a stride.
+    """
+    indexes = layout.message_indexes[chunk.offset]
+    if len(indexes) != 1 or indexes[0].count < 2:
+        return None
+    count, number = indexes[0].count, indexes[0].channel_id
+    table = np.frombuffer(layout.data, "<u8", 2 * count, indexes[0].begin).reshape(-1, 2)
+    first, stride = int(table[0, 1]), int(table[1, 1]) - int(table[0, 1])
+    head = HEAD_BYTES + rec.MESSAGE_HEAD_BYTES
+    if stride < head or first + count * stride > len(buffer):
+        return None
+    rows = np.ndarray((count,), _HEADS, buffer, first, (stride,))
+    times = table[:, 0]
+    if (
+        np.any(table[:, 1] != np.arange(first, first + count * stride, stride, dtype=np.uint64))
+        or np.any(rows["opcode"] != rec.MESSAGE)
+        or np.any(rows["length"] != stride - HEAD_BYTES)
+        or np.any(rows["channel"] != number)
+        or np.any(rows["log_time"] != times)
+        or times.min() < chunk.start_time
+        or times.max() > chunk.end_time
+    ):
+        return None  # what is wrong with it, if anything, is said by the general way
+    definitions, stop = layout.definitions, first + count * stride
+    _walked(definitions, buffer, 0, first, allow_messages=False)
+    _walked(definitions, buffer, stop, len(buffer), allow_messages=False)
+    start = np.arange(first + head, stop + head, stride, dtype=np.int64)
+    length = np.full(count, stride - head, np.int64)
+    channel = np.full(count, number, np.uint16)
+    return Batch(buffer, start, length, channel, times.astype(np.uint64), stride)
 
 
 def _join(pending: list[bytes], spans: list[tuple[Integers, Integers]]) -> Batch:
@@ -179,8 +264,7 @@ class _Ledger:
         """Count one batch; a message of an undefined channel is corrupt."""
         if batch.start.size == 0:
             return
-        channels, counts = np.unique(batch.channel, return_counts=True)
-        for channel, count in zip(channels.tolist(), counts.tolist(), strict=True):
+        for channel, count in batch.counts().items():
             self.definitions.channel(channel)
             self.counts[channel] = self.counts.get(channel, 0) + count
         low, high = int(batch.log_time.min()), int(batch.log_time.max())

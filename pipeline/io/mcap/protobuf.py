@@ -22,7 +22,7 @@ from pipeline.io.mcap.protobuf_plan import (
     Message,
     Scalar,
 )
-from pipeline.io.mcap.protobuf_rows import shaped_rows
+from pipeline.io.mcap.protobuf_rows import even_shape, shaped_rows
 from pipeline.io.mcap.walk import Bytes, Integers, view_at_every_byte
 from pipeline.records.errors import CaptureError
 
@@ -63,10 +63,38 @@ class ProtobufDecoder:
 
     def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
         """Numeric fields by dotted name; omitted zeros are zero, absent optionals NaN."""
+        if batch.stride and (found := self._evenly(batch, wanted)) is not None:
+            return found
         pass_ = _Pass(batch.buffer, wanted)
         owner = np.arange(batch.start.size, dtype=np.int64)
         pass_.message(self.plan, "", batch.start, batch.start + batch.length, owner, owner.size)
         return pass_.found
+
+    def _evenly(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf] | None:
+        """The leaves of evenly spaced messages of one shape, copied by stride."""
+        shape = even_shape(batch, self.plan)
+        if shape is None:
+            return None
+        values = dict(shape.values)
+        packed = {number: place for number, *place in shape.packed}
+        rows = batch.start.size
+        found: dict[str, Leaf] = {}
+        for number, part in self.plan.fields.items():
+            if not any(map(wanted, _names(part, ""))):
+                continue
+            if isinstance(part, Message):
+                return None
+            if number in values:
+                found[part.name] = Leaf(batch.at(values[number], part.dtype))
+            elif number in packed:
+                at, count = packed[number]
+                table = batch.table(at, part.dtype, count)
+                found[part.name] = Leaf(table, np.full(rows, count, np.int64))
+            elif part.repeated:
+                found[part.name] = Leaf(np.empty(0, _storage(part.dtype)), np.zeros(rows, np.int64))
+            else:
+                found[part.name] = Leaf(_absent(part, rows))
+        return found
 
 
 class _Pass:
@@ -343,6 +371,13 @@ class _Pass:
         if part.wire == VARINT:
             return _as_type(extent, part.dtype)
         return view_at_every_byte(self.raw, part.dtype)[start]
+
+
+def _absent(part: Scalar, rows: int) -> NDArray[Any]:
+    """Values [rows] of a scalar field that no message holds."""
+    if part.zero_when_absent:
+        return np.zeros(rows, np.dtype(_storage(part.dtype)))
+    return np.full(rows, np.nan)
 
 
 def _names(part: Scalar | Message, prefix: str) -> list[str]:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.io.mcap.protobuf_plan import FIXED32, FIXED64, Message, Scalar
+from pipeline.io.mcap.messages import Batch
+from pipeline.io.mcap.protobuf_plan import FIXED32, FIXED64, LENGTH, Message, Scalar
 from pipeline.io.mcap.walk import Bytes, Integers
 
 _WIDTH = {FIXED64: 8, FIXED32: 4}
@@ -22,36 +23,58 @@ _MAX_SHAPES = 64
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Where a message's tags and values are: offset and byte of each tag, value offset by field."""
+    """Where a message's tags and values are: offset and byte of each tag, value offset by field.
+
+    Lengths of packed arrays count as tags; `packed` are field, offset and count of each array.
+    """
 
     tags: tuple[tuple[int, int], ...]
     values: tuple[tuple[int, int], ...]
+    packed: tuple[tuple[int, int, int], ...] = ()
+
+
+def _varint(payload: bytes, at: int, most_bytes: int) -> tuple[int, int] | None:
+    """A number and where it ends; None where it is longer than that or cut off."""
+    value = 0
+    for n, byte in enumerate(payload[at : at + most_bytes]):
+        value |= (byte & 0x7F) << (7 * n)
+        if byte < 0x80:
+            return value, at + n + 1
+    return None
 
 
 def shape_of(payload: bytes, plan: Message) -> Shape | None:
-    """The shape of a message of fixed-width scalars, each once; None for any other message."""
-    tags: list[tuple[int, int]] = []
+    """The shape of a message of fixed-width scalars, single or packed, each once; else None."""
+    marks: list[tuple[int, int]] = []
     values: dict[int, int] = {}
+    packed: dict[int, tuple[int, int]] = {}
     at = 0
     while at < len(payload):
-        number, wire, begin = 0, 0, at
-        while True:
-            if at >= len(payload) or at - begin > 1:
-                return None
-            byte = payload[at]
-            number |= (byte & 0x7F) << (7 * (at - begin))
-            tags.append((at, byte))
-            at += 1
-            if byte < 0x80:
-                break
-        number, wire = number >> 3, number & 7
-        part = plan.fields.get(number)
-        fits = isinstance(part, Scalar) and not part.repeated and part.wire == wire
-        if not fits or wire not in _WIDTH or number in values:
+        begin, tag = at, _varint(payload, at, 2)
+        if tag is None:
             return None
-        values[number] = at
-        at += _WIDTH[wire]
-    return Shape(tuple(tags), tuple(values.items())) if at == len(payload) else None
+        number, wire, at = tag[0] >> 3, tag[0] & 7, tag[1]
+        part = plan.fields.get(number)
+        if not isinstance(part, Scalar) or part.wire not in _WIDTH:
+            return None
+        if number in values or number in packed:
+            return None
+        if wire == part.wire and not part.repeated:
+            values[number] = at
+            end = at + _WIDTH[wire]
+        elif wire == LENGTH and part.repeated:
+            size = _varint(payload, at, 4)
+            if size is None or size[0] % _WIDTH[part.wire]:
+                return None
+            at = size[1]
+            packed[number] = at, size[0] // _WIDTH[part.wire]
+            end = at + size[0]
+        else:
+            return None
+        marks += enumerate(payload[begin:at], begin)
+        at = end
+    arrays = tuple((number, *place) for number, place in packed.items())
+    return Shape(tuple(marks), tuple(values.items()), arrays) if at == len(payload) else None
 
 
 def shaped_rows(
@@ -70,7 +93,7 @@ def shaped_rows(
         while members.size >= _MIN_MESSAGES and shapes < _MAX_SHAPES:
             first = int(start[members[0]])
             shape = shape_of(raw[first : first + size].tobytes(), plan)
-            if shape is None:
+            if shape is None or shape.packed:
                 break
             shapes += 1
             begin = start[members]
@@ -83,3 +106,12 @@ def shaped_rows(
             left[rows] = False
             members = members[~same]
     return found, left
+
+
+def even_shape(batch: Batch, plan: Message) -> Shape | None:
+    """The shape of evenly spaced messages that all have the first one's; None for any others."""
+    first = int(batch.start[0])
+    shape = shape_of(batch.buffer[first : first + int(batch.length[0])], plan)
+    if shape is None or any((batch.at(at, "u1") != byte).any() for at, byte in shape.tags):
+        return None
+    return shape

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.io.mcap.cdr import CdrDecoder
 from pipeline.io.mcap.container import Definitions, Layout
+from pipeline.io.mcap.gather import Gathered
 from pipeline.io.mcap.joint import JOINT_STATE, QUANTITIES, pick_joint
 from pipeline.io.mcap.json_payload import JsonDecoder
 from pipeline.io.mcap.leaf import Decoder, Leaf
@@ -35,7 +36,10 @@ class _Stream:
     schema: Schema | None
     decoder: Decoder | None
     channels: list[int] = field(default_factory=list)
-    parts: list[tuple[dict[str, Leaf], NDArray[np.uint64]]] = field(default_factory=list)
+    gathered: Gathered = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.gathered = Gathered(self.topic)
 
     @property
     def joint_state(self) -> bool:
@@ -68,11 +72,11 @@ def read_tables(layout: Layout, wanted: WantedIn, joint: str | None = None) -> l
             continue
         low = int(batch.log_time.min())
         first = low if first is None else min(first, low)
-        for number in np.unique(batch.channel).tolist():
+        for number in batch.counts():
             if number not in known:
                 known[number] = _stream(streams, layout.definitions, number)
         for stream in streams.values():
-            _decode(stream, batch.of(stream.channels), wanted, joint)
+            _decode(stream, batch.of(stream.channels), wanted, joint, len(layout.chunks))
     tables = (_table(stream, first or 0) for stream in streams.values())
     return [table for table in tables if table is not None]
 
@@ -93,62 +97,39 @@ def _stream(
     return streams[key]
 
 
-def _decode(stream: _Stream, batch: Batch, wanted: WantedIn, joint: str | None) -> None:
+def _decode(
+    stream: _Stream, batch: Batch, wanted: WantedIn, joint: str | None, batches_in_all: int
+) -> None:
     if stream.decoder is None or batch.start.size == 0:
         return
     extra = ("name", *QUANTITIES) if stream.joint_state else ()
     leaves = stream.decoder.decode(batch, lambda name: name in extra or wanted(stream.topic, name))
     if stream.joint_state:
         leaves = pick_joint(batch, leaves, joint)
-    leaves = {name: leaf for name, leaf in leaves.items() if leaf.values.ndim == 1}
-    stream.parts.append((leaves, batch.log_time))
+    leaves = {name: leaf for name, leaf in leaves.items() if not leaf.places}
+    stream.gathered.add(leaves, batch.log_time, max(batches_in_all, 1))
 
 
 def _table(stream: _Stream, first: int) -> RawTable | None:
-    names = list(dict.fromkeys(name for leaves, _ in stream.parts for name in leaves))
-    if not names:
+    leaves = stream.gathered.leaves()
+    if not leaves:
         return None
-    messages = sum(times.size for _, times in stream.parts)
-    leaves = {name: _whole(stream, name) for name in names}
-    counts, blocks = _counts(stream.topic, leaves, messages)
-    log_time = np.concatenate([times for _, times in stream.parts]) - np.uint64(first)
+    counts, blocks = _counts(stream.topic, leaves, stream.gathered.messages)
+    log_time = stream.gathered.log_time()
+    log_time -= np.uint64(first)
     fields: dict[str, NDArray[Any]] = {}
     for name, leaf in leaves.items():
         if counts is not None and leaf.counts is None:
             fields[name] = np.repeat(leaf.values, counts)
         elif leaf.counts is None or leaf.counts.any():
             fields[name] = leaf.values
-    if counts is not None:
-        log_time = np.repeat(log_time, counts)
     if np.any(log_time[1:] < log_time[:-1]):
+        if counts is not None:
+            log_time, counts = np.repeat(log_time, counts), None
         order = np.argsort(log_time, kind="stable")
         log_time = log_time[order]
         fields = {name: values[order] for name, values in fields.items()}
-    return RawTable(stream.topic, fields, log_time, blocks, stream.joint_state)
-
-
-def _whole(stream: _Stream, name: str) -> Leaf:
-    """One field over all batches; NaN, or no items, where a batch does not hold it."""
-    parts = [(leaves.get(name), times.size) for leaves, times in stream.parts]
-    arrays = {leaf.counts is not None for leaf, _ in parts if leaf is not None}
-    if len(arrays) > 1:
-        raise CaptureError(
-            "bad_message",
-            f"the field {name!r} of {stream.topic} is a number here and an array there",
-            "write one sample, or one block, in every message",
-        )
-    is_array = arrays == {True}
-    values: list[NDArray[Any]] = []
-    counts: list[NDArray[np.int64]] = []
-    for leaf, size in parts:
-        if leaf is None:
-            values.append(np.empty(0) if is_array else np.full(size, np.nan))
-            counts.append(np.zeros(size, np.int64))
-        else:
-            values.append(leaf.values)
-            if leaf.counts is not None:
-                counts.append(leaf.counts)
-    return Leaf(np.concatenate(values), np.concatenate(counts) if is_array else None)
+    return RawTable(stream.topic, fields, log_time, blocks, stream.joint_state, rows_each=counts)
 
 
 def _counts(

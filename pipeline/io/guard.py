@@ -1,0 +1,141 @@
+"""Limits around the reading of one untrusted file, and a trace of it for whoever outlives this.
+
+A file that drives a parser out of memory or into an endless loop must cost that one file. Memory
+is bounded by the kernel (RLIMIT_DATA, Linux), time by a thread of C that needs no interpreter lock
+and ends the process. What the process was reading stands in its crumb, a file that the driver
+reads when the process is gone.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.records.errors import CaptureError
+
+_MB = 2**20
+_TIMEOUT = b"Timeout"
+
+
+@dataclass(frozen=True, slots=True)
+class ReadLimits:
+    """What reading one file may take: `seconds` plus one a MB, `memory_mb` plus 16 times its size.
+
+    A capture of numbers unpacks to some four times its packed size, and is held about three times
+    while it is decoded.
+    """
+
+    seconds: float = 60.0
+    memory_mb: int = 1024
+
+    def time_s(self, size_bytes: int) -> float:
+        """Longest time for a file of that size [s]."""
+        return self.seconds + size_bytes / _MB
+
+    def memory_bytes(self, size_bytes: int) -> int:
+        """Most memory for a file of that size [bytes]."""
+        return self.memory_mb * _MB + 16 * size_bytes
+
+
+@dataclass(slots=True)
+class _Crumb:
+    """The file into which this process says what it is reading; None outside the fleet."""
+
+    descriptor: int | None = None
+
+
+_CRUMB = _Crumb()
+
+
+@contextmanager
+def crumbs(path: Path | None) -> Iterator[None]:
+    """Says in a file what is being read inside the block; the file is gone after a normal end."""
+    if path is None:
+        yield
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _CRUMB.descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    try:
+        yield
+    finally:
+        os.close(_CRUMB.descriptor)
+        _CRUMB.descriptor = None
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
+    """Bounds the memory and, where a crumb is laid, the time of the block.
+
+    Raises CaptureError where Python itself runs out of memory; beyond that the process ends.
+    """
+    crumb = _CRUMB.descriptor
+    if crumb is not None:
+        os.pwrite(crumb, path.encode("utf-8", "surrogatepass") + b"\n", 0)
+        os.lseek(crumb, 0, os.SEEK_END)
+        faulthandler.dump_traceback_later(limits.time_s(size_bytes), exit=True, file=crumb)
+    try:
+        with _memory(limits.memory_bytes(size_bytes)):
+            yield
+    except MemoryError:
+        most = limits.memory_bytes(size_bytes) // _MB
+        raise CaptureError(
+            "limit",
+            f"reading it takes more than {most} MB of memory",
+            "split the recording, or raise read_memory_mb",
+        ) from None
+    finally:
+        if crumb is not None:
+            faulthandler.cancel_dump_traceback_later()
+            os.ftruncate(crumb, 0)
+            os.lseek(crumb, 0, os.SEEK_SET)
+
+
+@contextmanager
+def _memory(most_bytes: int) -> Iterator[None]:
+    """At most so many bytes of private memory beyond what the process holds already (Linux)."""
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    pages = int(Path("/proc/self/statm").read_bytes().split()[5])
+    wanted = pages * resource.getpagesize() + most_bytes
+    for stated in (soft, hard):
+        wanted = wanted if stated == resource.RLIM_INFINITY else min(wanted, stated)
+    resource.setrlimit(resource.RLIMIT_DATA, (wanted, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+
+
+@dataclass(frozen=True, slots=True)
+class LastWords:
+    """What a dead process had under way: the file it was reading, and if its time was up.
+
+    `path` is None where it was reading none; `begun` False where it had not begun at all.
+    """
+
+    begun: bool
+    path: str | None = None
+    timed_out: bool = False
+
+
+def last_words(path: Path) -> LastWords:
+    """Reads the crumb of a dead process, and takes it away."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return LastWords(begun=False)
+    path.unlink(missing_ok=True)
+    name, _, rest = content.partition(b"\n")
+    if not name:
+        return LastWords(begun=True)
+    return LastWords(True, name.decode("utf-8", "surrogatepass"), rest.startswith(_TIMEOUT))

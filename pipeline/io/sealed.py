@@ -1,0 +1,43 @@
+"""Notes that the project keeps for itself between runs: believed only where their digest holds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from pipeline.io.publish import canonical_json, write_whole
+from pipeline.records.errors import PipelineError
+
+_MAX_BYTES = 2**28
+
+
+def write_sealed(path: Path, document: Any) -> None:
+    """Writes a document under its sha256, whole or not at all; raises MachineError."""
+    body = canonical_json(document)
+    write_whole(path, hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
+
+
+def read_sealed(path: Path) -> Any:
+    """The document, or None where there is none that is whole."""
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            return None
+        digest, _, body = path.read_bytes().partition(b"\n")
+    except OSError:
+        return None
+    if hashlib.sha256(body).hexdigest().encode() != digest:
+        return None
+    try:
+        return json.loads(body)
+    except (ValueError, RecursionError):
+        return None
+
+
+def keep_sealed(path: Path, document: Any) -> None:
+    """Writes a document that only saves time: a place that cannot be written is no failure."""
+    try:
+        write_sealed(path, document)
+    except PipelineError:
+        return

@@ -1,0 +1,367 @@
+"""Which files of a folder are captures, and what is said of each: looked at once, not decoded.
+
+What is asked of one file (`Question`) and what is found (`Answer`) are plain data, so that a
+stranger's bytes can be parsed in another process than the one that puts the batch together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Literal
+
+from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, split_comments
+from pipeline.io.files import list_files, read_head, read_whole
+from pipeline.io.foreign import find_reader
+from pipeline.io.mcap.container import MAGIC, Layout, scan
+from pipeline.io.mcap.messages import count_messages
+from pipeline.io.metadata import (
+    MANIFEST,
+    MAX_MANIFEST_BYTES,
+    MAX_SIDECAR_BYTES,
+    SIDECAR_SUFFIX,
+    manifest,
+    merge,
+    sidecar,
+)
+from pipeline.io.source_map import SourceMap, find_map
+from pipeline.physics.glossary import METADATA
+from pipeline.records.errors import CaptureError, UsageError
+from pipeline.records.finding import Finding
+
+Form = Literal["mcap", "csv", "foreign"]
+METADATA_RECORD = "capture"
+_MCAP_SUFFIX = ".mcap"
+_TEXT_SUFFIXES = frozenset({".csv", ".txt", ".tsv", ".log", ".dat", ".asc"})
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A file that is a capture: where it is, what it is, and all that is said of it.
+
+    `source` is None for the contract's own form. `path` is relative with forward slashes.
+    `recovered` is a file that is cut off, of which the good part is to be used.
+    """
+
+    path: str
+    sha256: str
+    form: Form
+    source: SourceMap | None
+    metadata: tuple[tuple[str, str], ...]
+    recovered: bool = False
+
+    @property
+    def said(self) -> dict[str, str]:
+        """The merged metadata as texts."""
+        return dict(self.metadata)
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """Captures sorted by path, what was found wrong, and the files that are no captures."""
+
+    entries: tuple[Entry, ...]
+    findings: tuple[Finding, ...]
+    others: tuple[str, ...]
+
+    @property
+    def note(self) -> str:
+        """One line that counts and names the files that are no captures, or an empty text."""
+        if not self.others:
+            return ""
+        shown = ", ".join(self.others[:5]) + (", ..." if len(self.others) > 5 else "")
+        return f"{len(self.others)} files are no captures and were left alone: {shown}"
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One file to look at: its path, the sidecar beside it if any, and its manifest row."""
+
+    path: str
+    sidecar: str | None
+    listed: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What was found: an entry, or None for a file that is no capture; `findings` may refuse it.
+
+    `sha256` is None where the file was not read to its end.
+    """
+
+    path: str
+    sha256: str | None
+    entry: Entry | None
+    findings: tuple[Finding, ...] = ()
+
+
+Ask = Callable[[Sequence[Question]], Sequence[Answer]]
+
+
+def survey(
+    folder: Path,
+    sources: Mapping[str, SourceMap],
+    ask: Ask | None = None,
+    *,
+    recover: bool = False,
+) -> Survey:
+    """Every file of a folder looked at once, in the order of its path.
+
+    `ask` answers the questions, in their order; without it they are answered here. `recover` takes
+    the good part of an MCAP file that is cut off. Raises UsageError where the folder is not there;
+    a bad file becomes a finding.
+    """
+    listing = list_files(folder)
+    findings = list(listing.findings)
+    manifests = _manifests(folder, listing.paths, findings)
+    there = frozenset(listing.paths)
+    questions = [
+        Question(path, _sidecar(path, there), tuple(manifests.get(path, {}).items()))
+        for path in listing.paths
+        if PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
+    ]
+    if ask is None:
+        answers: Sequence[Answer] = [look(folder, q, sources, recover=recover) for q in questions]
+    else:
+        answers = ask(questions)
+    entries: dict[str, Entry] = {}
+    others: list[str] = []
+    for answer in answers:
+        findings += answer.findings
+        entry = answer.entry
+        if any(finding.severity == "refused" for finding in answer.findings):
+            continue
+        if entry is None:
+            others.append(answer.path)
+        elif entry.sha256 in entries:
+            findings.append(_duplicate(answer.path, entries[entry.sha256].path))
+        else:
+            entries[entry.sha256] = entry
+    findings += [_absent(path) for path in sorted(set(manifests) - there)]
+    return Survey(tuple(entries.values()), tuple(sorted(findings, key=_order)), tuple(others))
+
+
+def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) -> Answer | None:
+    """The answer where name and first bytes say that a file is no capture, else None."""
+    if question.sidecar is not None or question.listed:
+        return None
+    try:
+        if _may_be_capture(folder, question.path, {}, {}, sources):
+            return None
+    except CaptureError as fault:
+        return Answer(question.path, None, None, (Finding.refusal(question.path, fault),))
+    return Answer(question.path, None, None)
+
+
+def look(
+    folder: Path, question: Question, sources: Mapping[str, SourceMap], *, recover: bool = False
+) -> Answer:
+    """Looks at one file without decoding its samples; what is wrong with it is in the answer."""
+    findings: list[Finding] = []
+    digest: str | None = None
+    entry: Entry | None = None
+    try:
+        listed = dict(question.listed)
+        beside = {}
+        if question.sidecar is not None:
+            beside = sidecar(read_whole(folder / question.sidecar, MAX_SIDECAR_BYTES))
+        if _may_be_capture(folder, question.path, listed, beside, sources):
+            data = read_whole(folder / question.path)
+            digest = hashlib.sha256(data).hexdigest()
+            entry = _entry(
+                question.path, data, digest, listed, beside, sources, findings, recover=recover
+            )
+    except CaptureError as fault:
+        findings.append(Finding.refusal(question.path, fault))
+        entry = None
+    return Answer(question.path, digest, entry, tuple(findings))
+
+
+def _may_be_capture(
+    folder: Path,
+    path: str,
+    listed: Mapping[str, str],
+    beside: Mapping[str, str],
+    sources: Mapping[str, SourceMap],
+) -> bool:
+    """Whether the name, the first bytes or what is said of a file make it worth reading."""
+    return (
+        path.lower().endswith(_MCAP_SUFFIX)
+        or _is_text(path, listed, beside, sources)
+        or read_head(folder / path, len(MAGIC)) == MAGIC
+    )
+
+
+def _order(finding: Finding) -> tuple[str, str, str]:
+    return finding.file, finding.code, finding.message
+
+
+def _duplicate(path: str, first: str) -> Finding:
+    return Finding(
+        path,
+        "warning",
+        "duplicate_content",
+        f"it holds the same bytes as {first} and is used once",
+        "remove one of the two",
+    )
+
+
+def _absent(path: str) -> Finding:
+    return Finding(
+        path,
+        "warning",
+        "manifest_missing_file",
+        f"the {MANIFEST} names it, but it is not there",
+        f"add the file or remove its row from the {MANIFEST}",
+    )
+
+
+def _manifests(
+    folder: Path, paths: Iterable[str], findings: list[Finding]
+) -> dict[str, dict[str, str]]:
+    """What all manifests say, by path; a manifest that cannot be read is a finding."""
+    said: dict[str, dict[str, str]] = {}
+    for path in paths:
+        if PurePosixPath(path).name == MANIFEST:
+            try:
+                home = PurePosixPath(path).parent.as_posix()
+                data = read_whole(folder / path, MAX_MANIFEST_BYTES + 1)
+                found = manifest(data, "" if home == "." else home)
+            except CaptureError as fault:
+                findings.append(Finding.refusal(path, fault))
+                continue
+            for file, values in found.items():
+                said[file] = values | said.get(file, {})
+    return said
+
+
+def _entry(
+    path: str,
+    data: bytes,
+    digest: str,
+    listed: Mapping[str, str],
+    beside: Mapping[str, str],
+    sources: Mapping[str, SourceMap],
+    findings: list[Finding],
+    *,
+    recover: bool,
+) -> Entry | None:
+    """What a file is, or None where it is no capture."""
+    recovered = False
+    if data.startswith(MAGIC) or path.lower().endswith(_MCAP_SUFFIX):
+        form: Form = "mcap"
+        layout = scan(data, recover=recover)
+        own, head, topics = layout.metadata_named(METADATA_RECORD), None, _topics(layout)
+        if layout.cut is not None:
+            recovered = True
+            findings.append(_recovered(path, layout))
+    else:
+        form, topics = "csv", []
+        own, head = _text_head(data, bool(listed or beside))
+    source, known = _source(path, own, beside, listed, head, topics, sources)
+    if not known:
+        return None
+    if source is not None and source.reader is not None:
+        form, own = "foreign", dict(find_reader(source.reader).metadata(data))
+    fixed = {} if source is None else source.metadata_for(path)
+    if source is not None:
+        own = {key: value for key, value in own.items() if key in METADATA}
+    statements = [
+        ("the file", own),
+        (f"NAME{SIDECAR_SUFFIX}", beside),
+        (MANIFEST, listed),
+    ]
+    said, contradictions = merge(path, statements)
+    findings += contradictions
+    said = fixed | said
+    return Entry(path, digest, form, source, tuple(sorted(said.items())), recovered)
+
+
+def _recovered(path: str, layout: Layout) -> Finding:
+    """The mark on a file of which the good part is used; raises its CaptureError if it is empty."""
+    count, kept = count_messages(layout), layout.kept_bytes
+    if layout.cut is not None and not count:
+        raise layout.cut
+    reason = "" if layout.cut is None else layout.cut.message.split(";")[0]
+    return Finding(
+        path,
+        "warning",
+        "recovered",
+        f"it is cut off ({reason}); the {count} messages in its first {kept} of "
+        f"{len(layout.data)} bytes are used, without proof that they are all",
+        "copy the file again or record the test again; recover=false refuses such files",
+        (0, count - 1),
+    )
+
+
+def _topics(layout: Layout) -> list[str]:
+    channels = layout.definitions.channels | layout.summary_definitions.channels
+    return [channel.topic for channel in channels.values()]
+
+
+def _is_text(
+    path: str,
+    listed: Mapping[str, str],
+    beside: Mapping[str, str],
+    sources: Mapping[str, SourceMap],
+) -> bool:
+    """Whether a file's name, or what is said of it, makes it worth reading as text."""
+    suffix = PurePosixPath(path).suffix.lower()
+    named = any(source.files and source.recognises_name(path) for source in sources.values())
+    return suffix in _TEXT_SUFFIXES or bool(listed) or bool(beside) or named
+
+
+def _text_head(data: bytes, named: bool) -> tuple[dict[str, str], str]:
+    """A text file's own metadata, and its beginning; unreadable text counts only if it is meant.
+
+    A file is meant as a capture if the manifest or a sidecar says so, or its bytes hold the key.
+    """
+    try:
+        check_text(data)
+        own, _ = split_comments(data)
+    except CaptureError:
+        if named or b"contract" in data[:MAX_HEAD_BYTES].replace(b"\0", b""):
+            raise
+        return {}, ""
+    return own, data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
+
+
+def _sidecar(path: str, there: frozenset[str]) -> str | None:
+    """The file beside that speaks of a file: NAME.meta.yaml for NAME.csv, or NAME.csv.meta.yaml."""
+    stem = PurePosixPath(path).with_suffix("").as_posix()
+    return next((c for c in (path + SIDECAR_SUFFIX, stem + SIDECAR_SUFFIX) if c in there), None)
+
+
+def _source(
+    path: str,
+    own: Mapping[str, str],
+    beside: Mapping[str, str],
+    listed: Mapping[str, str],
+    head: str | None,
+    topics: list[str],
+    sources: Mapping[str, SourceMap],
+) -> tuple[SourceMap | None, bool]:
+    """The source map to read a file with (None: the contract's own form), and if it is a capture.
+
+    A map named by `source` counts first, then the file's own `contract`, then what recognises it.
+    """
+    named = beside.get("source") or listed.get("source") or own.get("source")
+    if named:
+        try:
+            return find_map(sources, named), True
+        except UsageError as fault:
+            raise CaptureError("unknown_source", fault.message, fault.remedy) from None
+    if "contract" in own:
+        return None, True
+    matches = [s for s in sources.values() if s.recognises(path, head, topics)]
+    if len(matches) > 1:
+        raise CaptureError(
+            "ambiguous_source",
+            f"the source maps {', '.join(s.name for s in matches)} all recognise it",
+            f"state `source` in NAME{SIDECAR_SUFFIX} or {MANIFEST}",
+        )
+    if matches:
+        return matches[0], True
+    return None, "contract" in beside or "contract" in listed

@@ -1,0 +1,1 @@
+"""Many files and motors over several workers: who works, what survives, what is remembered."""

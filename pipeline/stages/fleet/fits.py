@@ -1,0 +1,166 @@
+"""Fits of one motor that need not be done again while nothing that they were made from changes.
+
+A fit hangs on the estimator's own source and all that it imports, on its options, on the captures
+as they were read and judged, and on the constants that the estimator declares to use. So a changed
+estimator is fitted again with those that use what it gives, if that has changed, and no other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.fit.protocol import Estimator, Fit
+from pipeline.io.code_version import closure_digest, rooms_digest
+from pipeline.io.publish import write_whole
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.errors import PipelineError
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.naming import file_stem
+from pipeline.records.uncertainty import Contribution
+from pipeline.stages.fleet.keeping import FOLDER, digest_of, libraries_version
+
+READING = ("io", "contracts", "records", "physics", "numerics")
+_MAX_BYTES = 2**30
+
+
+class FitMemory:
+    """The fits of one motor, kept in one file."""
+
+    def __init__(self, output: Path, campaign: Campaign, gates: Mapping[str, Any]) -> None:
+        self._path = output / FOLDER / "fits" / f"{file_stem(campaign.motor_id)}.fits"
+        self._kept = _load(self._path)
+        self._used: dict[str, tuple[str, bytes, bytes]] = {}
+        inputs = [
+            [c.path, c.sha256, c.integrity, asdict(c.meta), [m.dropped for m in c.masks]]
+            for c in campaign.captures
+        ]
+        self._campaign = digest_of(libraries_version(), rooms_digest(READING), gates, inputs)
+
+    def __call__(
+        self,
+        estimator: Estimator,
+        known: Constants,
+        options: Mapping[str, float],
+        fit: Callable[[], Fit],
+    ) -> Fit:
+        """The fit that is kept, or a new one."""
+        uses = [repr(estimate) for estimate in known.estimates]
+        code = closure_digest(estimator.fit.__module__)
+        key = digest_of(self._campaign, code, dict(options), uses)
+        kept = self._kept.get(estimator.name)
+        if kept is not None and kept[0] == key:
+            self._used[estimator.name] = kept
+            return _decoded(kept[1], kept[2])
+        found = fit()
+        self._used[estimator.name] = (key, *_encoded(found))
+        return found
+
+    def save(self) -> None:
+        """Keeps the fits of this campaign; a place that cannot be written is no failure."""
+        if self._used == self._kept:
+            return
+        with suppress(PipelineError):
+            write_whole(self._path, _sealed(self._used))
+
+
+def _sealed(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
+    head = [[name, key, len(text), len(data)] for name, (key, text, data) in sorted(fits.items())]
+    parts = [json.dumps(head).encode() + b"\n"]
+    for _, (_, text, data) in sorted(fits.items()):
+        parts += [text, data]
+    body = b"".join(parts)
+    return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
+
+
+def _load(path: Path) -> dict[str, tuple[str, bytes, bytes]]:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            return {}
+        digest, _, body = path.read_bytes().partition(b"\n")
+    except OSError:
+        return {}
+    if hashlib.sha256(body).hexdigest().encode() != digest:
+        return {}
+    head, _, rest = body.partition(b"\n")
+    found, at = {}, 0
+    for name, key, text, data in json.loads(head):
+        found[name] = (key, rest[at : at + text], rest[at + text : at + text + data])
+        at += text + data
+    return found
+
+
+def _encoded(fit: Fit) -> tuple[bytes, bytes]:
+    """A fit as JSON, and the bytes of its arrays, which the JSON counts."""
+    arrays: list[bytes] = []
+
+    def array(values: NDArray[Any]) -> list[Any]:
+        arrays.append(np.ascontiguousarray(values).tobytes())
+        return [values.dtype.str, list(values.shape)]
+
+    document = {
+        "estimates": [asdict(estimate) for estimate in fit.estimates],
+        "evidence": [
+            {f.name: getattr(e, f.name) for f in fields(e) if f.name != "series"}
+            | {
+                "series": [
+                    [s.label, array(s.x), array(s.measured), array(s.fitted)] for s in e.series
+                ]
+            }
+            for e in fit.evidence
+        ],
+    }
+    return json.dumps(document, default=_plain).encode(), b"".join(arrays)
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy as one of Python's; raises TypeError for anything else."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def _decoded(text: bytes, data: bytes) -> Fit:
+    document = json.loads(text)
+    at = 0
+
+    def array(said: Sequence[Any]) -> NDArray[Any]:
+        nonlocal at
+        dtype, shape = np.dtype(said[0]), tuple(said[1])
+        values = np.frombuffer(data, dtype, int(np.prod(shape)), at).reshape(shape).copy()
+        at += values.nbytes
+        return values
+
+    estimates = tuple(_estimate(said) for said in document["estimates"])
+    evidence = tuple(
+        Evidence(
+            **said
+            | {
+                "series": tuple(
+                    Series(label, array(x), array(measured), array(fitted))
+                    for label, x, measured, fitted in said["series"]
+                )
+            }
+        )
+        for said in document["evidence"]
+    )
+    return Fit(estimates, evidence)
+
+
+def _estimate(said: Mapping[str, Any]) -> Estimate:
+    bounds = said["bounds"]
+    values: dict[str, Any] = dict(said)
+    values["budget"] = tuple(Contribution(**part) for part in said["budget"])
+    values["captures"] = tuple(said["captures"])
+    values["bounds"] = None if bounds is None else (bounds[0], bounds[1])
+    return Estimate(**values)

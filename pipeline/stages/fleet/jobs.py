@@ -1,0 +1,56 @@
+"""One motor's work and what comes back of it: plain data, light to import for the driver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from pipeline.io.guard import ReadLimits
+from pipeline.io.survey import Entry
+from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
+from pipeline.stages.fleet.keeping import Finished
+
+
+@dataclass(frozen=True, slots=True)
+class MotorJob:
+    """Everything a worker needs for one motor; plain data, so that it crosses a process.
+
+    `key` is the digest of the work, None where it is not to be noted as done; `refused` are files
+    that must not be read, with the reason.
+    """
+
+    motor_id: str
+    entries: tuple[Entry, ...]
+    input: str
+    output: str
+    config_sha256: str
+    required: tuple[str, ...]
+    release: str
+    report: bool
+    recordings: bool
+    gates: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    fit: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    crosscheck: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    limits: ReadLimits = field(default_factory=ReadLimits)
+    key: str | None = None
+    refused: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"motor {printable(self.motor_id)}"
+
+    def without(self, path: str, reason: str) -> MotorJob:
+        """The job with a file refused for a reason."""
+        return replace(self, refused=(*self.refused, (path, reason)))
+
+
+@dataclass(frozen=True, slots=True)
+class MotorResult:
+    """What comes back: findings, files (none if no capture was usable) and the times taken [s]."""
+
+    motor_id: str
+    finished: Finished
+    seconds: Mapping[str, float]

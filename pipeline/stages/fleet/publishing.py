@@ -1,0 +1,129 @@
+"""What belongs to a whole batch: its findings, its page, its list of files, its outcome."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from pipeline.io.datasheets import read_datasheet
+from pipeline.io.publish import canonical_json, partial_owner, write_whole
+from pipeline.io.survey import Survey
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.finding import Finding
+from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.report.console import summary
+from pipeline.settings import RunSettings
+from pipeline.stages.fleet.jobs import MotorResult
+from pipeline.stages.fleet.keeping import Files
+
+MANIFEST = "outputs.json"
+INPUT, OUTPUT = "\ue000", "\ue001"
+"""Stand for the names of the folders; no file may bear such a name."""
+ROOMS = ("datasheets", "report", "recordings", ".cache")
+
+
+def datasheets_of(output: Path, results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
+    """The datasheets of a batch, read back from where they were written."""
+    names = [name for result in results for name, _ in result.finished.files]
+    return tuple(read_datasheet(output / n) for n in names if n.startswith("datasheets/"))
+
+
+def publish(
+    settings: RunSettings,
+    results: Sequence[MotorResult],
+    datasheets: Sequence[Datasheet],
+    findings: Sequence[Finding],
+) -> Files:
+    """Writes what belongs to the batch, then takes away what an earlier run left behind.
+
+    Returns every file of the batch.
+    """
+    output = Path(settings.output)
+    files: list[tuple[str, str]] = []
+
+    def write(name: str, content: bytes) -> None:
+        write_whole(output / name, content)
+        files.append((name, hashlib.sha256(content).hexdigest()))
+
+    document = {"schema": "findings/1", "findings": [f.document() for f in findings]}
+    write("findings.json", canonical_json(document))
+    files += [file for result in results for file in result.finished.files]
+    if settings.report:
+        from pipeline.report.fleet_page import render_fleet
+
+        write("report/index.html", render_fleet(datasheets, tuple(findings)).encode())
+    names = sorted(name for name, _ in files)
+    _sweep(output, names)
+    write(MANIFEST, canonical_json({"schema": "outputs/1", "files": names}))
+    return tuple(sorted(files))
+
+
+def _sweep(output: Path, files: Sequence[str]) -> None:
+    """Removes the files that the last run listed and this one did not write, and torn ones."""
+    for name in sorted(_listed(output / MANIFEST) - set(files)):
+        stale = output / name
+        if stale.resolve().is_relative_to(output.resolve()):
+            with suppress(IsADirectoryError, NotADirectoryError):
+                stale.unlink(missing_ok=True)
+    for room in ROOMS:
+        for torn in (output / room).rglob(".*.partial"):
+            if not _alive(partial_owner(torn)):
+                torn.unlink(missing_ok=True)
+
+
+def _listed(manifest: Path) -> set[str]:
+    """The files that a manifest names; none where it is none of ours."""
+    try:
+        files = json.loads(manifest.read_bytes())["files"]
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return set()
+    return {name for name in files if isinstance(name, str)} if isinstance(files, list) else set()
+
+
+def _alive(process: int | None) -> bool:
+    """Whether a process that may still be writing runs on this machine."""
+    if process is None or process == os.getpid():
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def outcome_of(
+    datasheets: Sequence[Datasheet],
+    findings: Sequence[Finding],
+    found: Survey,
+    *,
+    report: bool,
+) -> Outcome:
+    """What the command says, with its exit code; `placed` names the folders in it."""
+    statuses = [{check.status for check in sheet.checks} for sheet in datasheets]
+    code = first_that_applies(
+        1 if any("fail" in seen for seen in statuses) else 0,
+        3 if any(finding.severity == "refused" for finding in findings) else 0,
+        4 if not datasheets or any(seen == {"not_evaluated"} for seen in statuses) else 0,
+    )
+    lines = tuple(finding.line() for finding in findings)
+    if not found.entries:
+        nothing = f"undecided: no usable capture in {INPUT}; `inspect FILE` says why"
+        lines = (*lines, nothing)
+    if found.note:
+        lines = (*lines, f"note: {found.note}")
+    return Outcome(code, summary(datasheets, findings, OUTPUT, report=report), lines)
+
+
+def placed(outcome: Outcome, settings: RunSettings) -> Outcome:
+    """The outcome with the names of the folders, which are no part of what is kept."""
+
+    def name(text: str) -> str:
+        return text.replace(INPUT, settings.input).replace(OUTPUT, settings.output)
+
+    return Outcome(outcome.exit_code, name(outcome.text), tuple(map(name, outcome.errors)))

@@ -1,0 +1,78 @@
+"""What happens in a worker: one task under a crumb, its log lines brought back with its result."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any, NoReturn
+
+from pipeline.io.guard import crumbs
+from pipeline.records.errors import PipelineError
+
+LOGGER = "pipeline"
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What came of a task: its value or its error, and (level, text) of what was logged."""
+
+    value: Any
+    error: Exception | None
+    logged: tuple[tuple[int, str], ...]
+
+
+def perform(function: Callable[[Any], Any], task: Any, crumb: str | None) -> Report:
+    """Runs `function(task)` with its warnings and log lines collected.
+
+    An error is part of the report, not raised, so that its log lines are not lost.
+    """
+    logged: list[tuple[int, str]] = []
+    value: Any = None
+    error: Exception | None = None
+    with _collected(logged), crumbs(None if crumb is None else Path(crumb)):
+        try:
+            value = function(task)
+        except PipelineError as fault:
+            error = fault
+        except Exception as fault:  # noqa: BLE001 (the driver tells it, with the motor's name)
+            error = RuntimeError(f"{type(fault).__name__}: {fault}"[:500])
+    return Report(value, error, tuple(logged))
+
+
+@contextmanager
+def _collected(logged: list[tuple[int, str]]) -> Iterator[None]:
+    """Warnings and the records of every logger, as (level, text), instead of on standard error."""
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            logged.append((record.levelno, record.getMessage()))
+
+    root, collector = logging.getLogger(), Collector(logging.WARNING)
+    root.addHandler(collector)
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            yield
+        logged += [(logging.WARNING, f"{w.category.__name__}: {w.message}") for w in caught]
+    finally:
+        root.removeHandler(collector)
+
+
+def begin_worker() -> None:
+    """Ends this worker as soon as the driver is gone, however it went."""
+    driver = parent_process()
+    if driver is None:
+        return
+
+    def follow() -> NoReturn:
+        wait([driver.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True, name="follows its driver").start()
