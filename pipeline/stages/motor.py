@@ -149,14 +149,32 @@ def _write(
             page = render_motor(datasheet, evidence, findings, terms)
             write_whole(output / files[-1], page.encode())
     if job.recordings:
-        from pipeline.io.recording import write_recording
-
         with watch.stage("recordings"):
-            for capture in campaign.captures:
-                files.append(f"recordings/{stem}/{_place(capture.path)}.rrd")
-                own = tuple(f for f in findings if f.file == capture.path)
-                write_recording(capture, evidence, output / files[-1], datasheet, own)
+            files += _record(output, stem, campaign, datasheet, evidence, findings)
     return tuple(files)
+
+
+def _record(
+    output: Path,
+    stem: str,
+    campaign: Campaign,
+    datasheet: Datasheet,
+    evidence: tuple[Evidence, ...],
+    findings: tuple[Finding, ...],
+) -> list[str]:
+    """A recording a capture, with its seal; what the datasheet says of the capture comes first."""
+    from pipeline.io.recordings.capture import write_recording
+    from pipeline.io.recordings.seal import SEAL
+    from pipeline.stages.replay import replay
+
+    files = []
+    for capture in campaign.captures:
+        name = f"recordings/{stem}/{_place(capture.path)}.rrd"
+        own = tuple(f for f in findings if f.file == capture.path)
+        shown = (*replay(capture, datasheet), *evidence)
+        write_recording(capture, shown, output / name, datasheet, own)
+        files += [name, name + SEAL]
+    return files
 
 
 def _place(path: str) -> str:
