@@ -162,19 +162,21 @@ def _record(
     evidence: tuple[Evidence, ...],
     findings: tuple[Finding, ...],
 ) -> list[str]:
-    """A recording a capture, with its seal; what the datasheet says of the capture comes first."""
+    """A recording a capture and one of the motor; what the datasheet says of a capture is first."""
     from pipeline.io.recordings.capture import write_recording
+    from pipeline.io.recordings.motor import write_motor_recording
     from pipeline.io.recordings.seal import SEAL
     from pipeline.stages.replay import replay
 
-    files = []
+    names = [f"recordings/motor-{stem}.rrd"]
+    shown = [*(one for capture in campaign.captures for one in replay(capture, datasheet))]
+    shown += evidence
+    write_motor_recording(campaign, datasheet, shown, findings, output / names[0])
     for capture in campaign.captures:
-        name = f"recordings/{stem}/{_place(capture.path)}.rrd"
+        names.append(f"recordings/{stem}/{_place(capture.path)}.rrd")
         own = tuple(f for f in findings if f.file == capture.path)
-        shown = (*replay(capture, datasheet), *evidence)
-        write_recording(capture, shown, output / name, datasheet, own)
-        files += [name, name + SEAL]
-    return files
+        write_recording(capture, shown, output / names[-1], datasheet, own)
+    return [file for name in names for file in (name, name + SEAL)]
 
 
 def _place(path: str) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 
-from pipeline.physics.notation import reading
+from pipeline.physics.notation import quantity, reading
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 
+_MARKS = {"fail": "✗ fail", "marginal": "⚠ marginal", "not_evaluated": "–", "pass": "✓ pass"}
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&])")
 
 
@@ -22,12 +23,33 @@ def sheet_markdown(datasheet: Datasheet, path: str) -> str:
         lines += ["", "## Constants from this capture", "", *_table(datasheet, own)]
     if rest:
         lines += ["", "## Other constants", "", *_table(datasheet, rest)]
-    lines += ["", "## Checks", "", "| check | result | meaning |", "| --- | --- | --- |"]
-    for check in datasheet.checks:
-        suspect = f"; suspect: {check.suspect}" if check.suspect else ""
-        meaning = plain(check.meaning + suspect)
-        lines.append(f"| {plain(check.name)} | {plain(check.status)} | {meaning} |")
+    lines += ["", "## Checks", "", *_checks(datasheet)]
     return "\n".join([*lines, "", f"version {datasheet.version}", ""])
+
+
+def checks_markdown(datasheet: Datasheet) -> str:
+    """Every check with its value and limit, and the captures that the datasheet rests on."""
+    lines = [f"# {plain(datasheet.motor_id)}: checks", "", *_checks(datasheet), ""]
+    lines += ["## Captures", "", "| capture | test | integrity |", "| --- | --- | --- |"]
+    lines += [
+        f"| {plain(one.path)} | {plain(one.test)} | {plain(one.integrity)} |"
+        for one in datasheet.captures
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _checks(datasheet: Datasheet) -> list[str]:
+    """The failed ones first."""
+    lines = ["| | check | value | limit | meaning |", "| --- | --- | --- | --- | --- |"]
+    for check in sorted(datasheet.checks, key=lambda c: (list(_MARKS).index(c.status), c.name)):
+        suspect = f"; suspect: {check.suspect}" if check.suspect else ""
+        value = "" if check.value is None else quantity(check.value, check.unit)
+        limit = "" if check.limit is None else quantity(check.limit, check.unit)
+        lines.append(
+            f"| {_MARKS[check.status]} | {plain(check.name)} | {value} | {limit} "
+            f"| {plain(check.meaning + suspect)} |"
+        )
+    return lines
 
 
 def _table(datasheet: Datasheet, names: list[str]) -> list[str]:

@@ -53,18 +53,23 @@ class Recording:
 
 
 @contextmanager
-def recording(name: str, identity: Sequence[str], layout: Blueprint | None) -> Iterator[Recording]:
+def recording(
+    name: str,
+    identity: Sequence[str],
+    layout: Blueprint | None,
+    ids: tuple[str, str] | None = None,
+) -> Iterator[Recording]:
     """A recording called `name` with an id made of `identity`: equal work, equal id.
 
-    Made in memory, since a stream onto a full disk may wait for its dead writer for ever.
+    `ids` are application and recording where they mean something by themselves. Made in memory,
+    since a stream onto a full disk may wait for its dead writer for ever.
     """
     import rerun as rr
 
     rr.set_strict_mode(True)
     shown = drawable(name)
-    stream = rr.RecordingStream(
-        application(shown), recording_id=digest(identity), send_properties=False
-    )
+    home, own = ids or (application(shown), digest(identity))
+    stream = rr.RecordingStream(home, recording_id=own, send_properties=False)
     memory = stream.memory_recording()
     if layout is not None:
         stream.send_blueprint(layout, make_active=False, make_default=True)
