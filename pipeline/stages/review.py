@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.io.recordings.readback import recording_property, signals_of_recordings
+from pipeline.io.recordings.readback import recording_property
 from pipeline.io.recordings.seal import verify
 from pipeline.io.recordings.viewer import (
     catalogue,
@@ -66,7 +66,7 @@ def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
         sources = [str(path) for path in chosen.files]
         addresses = [proxy_address(data)] if sources else []
         if chosen.table:
-            served = catalogue(chosen.table, signals_of_recordings(chosen.table), table)
+            served = catalogue(chosen.table, table)
             addresses.append(stack.enter_context(served))
         text = _said(settings, chosen, (page, data, table), addresses)
         kept = stack.pop_all()

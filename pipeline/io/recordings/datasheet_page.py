@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from pipeline.physics.notation import quantity, reading
 from pipeline.records.datasheet import Datasheet
@@ -12,15 +13,21 @@ _MARKS = {"fail": "✗ fail", "marginal": "⚠ marginal", "not_evaluated": "–"
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&])")
 
 
-def sheet_markdown(datasheet: Datasheet, path: str) -> str:
-    """Status, checks and constants of a motor; those that rest on the capture `path` come first."""
+def sheet_markdown(datasheet: Datasheet, path: str, first: Sequence[str] = ()) -> str:
+    """Status, checks and constants of a motor.
+
+    Those that rest on the capture `path` come first, or those of `first`.
+    """
     names = sorted(datasheet.constants)
     own = [name for name in names if path in datasheet.constants[name].captures]
+    heading = "Constants from this capture"
+    if first:
+        own, heading = [name for name in first if name in names], "Key constants"
     rest = [name for name in names if name not in own]
     lines = [f"# {plain(datasheet.motor_id)}: {datasheet.status}", ""]
     lines += [f"- {plain(reason)}" for reason in datasheet.why]
     if own:
-        lines += ["", "## Constants from this capture", "", *_table(datasheet, own)]
+        lines += ["", f"## {heading}", "", *_table(datasheet, own)]
     if rest:
         lines += ["", "## Other constants", "", *_table(datasheet, rest)]
     lines += ["", "## Checks", "", *_checks(datasheet)]

@@ -4,13 +4,14 @@ A recording holds the entities
 
     /sheet                the datasheet as a markdown page, /checks its checks
     /constants            every constant on the timeline `row`, in the datasheet's numbers
-    /overview/SIGNAL      residuals of every capture in a row [% of the signal's reach] on `t`
-    /overview_lane        which capture that is
-    /preview              the same as one curve, red where the datasheet is refused
+    /overview/SIGNAL      residuals of all captures [% of the signal's reach], 1000 steps each, on
+                          the timeline `capture`; /overview_lane which capture that is
     /cogging/wave, orders zero-current torque over one turn [mN·m], and by order
-    /findings             one text log line a finding on `row`
+    /preview/residual     all residuals as one curve, red where the datasheet is refused
+    /preview/cogging      four periods of the zero-current torque
+    /findings             one text log line a finding at its capture, on `capture`
 
-and the properties `motor`, `constants` (as the datasheet) and `shown` (in the table's units).
+and the properties `motor` and `shown` (key constants in the table's units).
 Two motors differ in what they hold, never in where, so that one layout fits a whole fleet.
 """
 
@@ -33,14 +34,12 @@ from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.seal import write_sealed
 from pipeline.io.recordings.stream import (
     ROW,
-    TIME,
-    nanoseconds,
+    Trace,
     recording,
     send_bars,
     send_page,
     send_property,
     send_trace,
-    timed,
 )
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import Datasheet
@@ -54,9 +53,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POINTS_A_SERIES = 400
-GAP_SHARE = 0.02
-WAVE_CELLS = 180
-HIGHEST_ORDER = 60
+CAPTURE, STEPS_A_CAPTURE = "capture", 1000
+WAVE_CELLS, PREVIEW_PERIODS = 720, 4
+HIGHEST_ORDER = 120
 APPLICATION = "fleet"
 ORDER = ("refused", "provisional", "released")
 
@@ -81,15 +80,16 @@ SHOWN = (
     Shown("j_rotor_kgm2", "j_rotor_gcm2", "J [g·cm²]", 1e7),
     Shown("torque_coulomb_nm", "torque_coulomb_mnm", "friction [mN·m]", 1e3),
 )
+KEY_CONSTANTS = tuple(one.constant for one in SHOWN)
 
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """One series in the overview: residual [% of the signal's reach] of one capture, on `t_s`."""
+    """One series in the overview: residual [% of the signal's reach] at `places` of `CAPTURE`."""
 
     capture: str
     signal: str
-    t_s: Array
+    places: NDArray[np.int64]
     percent: Array
 
 
@@ -117,15 +117,19 @@ def motor_bytes(
     with recording(
         datasheet.motor_id,
         (),
-        motor_layout(signals_of(strips)),
+        motor_layout(signals_of(strips), len({strip.capture for strip in strips})),
         (APPLICATION, segment_id(datasheet)),
     ) as made:
-        send_page(made.stream, "/sheet", sheet_markdown(datasheet, ""))
+        send_page(
+            made.stream,
+            "/sheet",
+            sheet_markdown(datasheet, "", KEY_CONSTANTS),
+        )
         send_page(made.stream, "/checks", checks_markdown(datasheet))
         _send_constants(made.stream, datasheet)
         _send_overview(made.stream, strips, refused=datasheet.status == "refused")
         _send_cogging(made.stream, evidence)
-        _send_findings(made.stream, findings)
+        _send_findings(made.stream, strips, findings)
         _send_properties(made.stream, datasheet, strips)
     return made.content
 
@@ -136,21 +140,31 @@ def segment_id(datasheet: Datasheet) -> str:
 
 
 def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip]:
-    """What every capture leaves over, one capture after the other on a common time [s]."""
-    begin = 0.0
-    for capture in campaign.captures:
-        told = first_of_each(own_evidence(capture, evidence))
-        if not told:
-            continue
-        last = max(float(one.series[0].x[-1]) for one in told)
-        first = min(float(one.series[0].x[0]) for one in told)
-        for one in told:
+    """What every capture leaves over, all equally wide, against the signal's reach on this motor.
+
+    Against each capture's own reach, a torque of nothing but cogging would seem all wrong.
+    """
+    found = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
+    told = [(number, *one) for number, one in enumerate(one for one in found if one[1])]
+    reach: dict[str, float] = {}
+    for _, _, own in told:
+        for one in own:
+            here = signal_floor(one.series[0].measured) / FULL_COLOUR_SHARE
+            reach[one.y_name] = max(here, reach.get(one.y_name, 0.0))
+    for number, path, own in told:
+        for one in own:
             series = one.series[0]
-            reach = signal_floor(series.measured) / FULL_COLOUR_SHARE
-            percent = 100.0 * (series.measured - series.fitted) / reach
+            percent = 100.0 * (series.measured - series.fitted) / reach[one.y_name]
             kept = extremes(percent, POINTS_A_SERIES)
-            yield Strip(capture.path, one.y_name, begin + series.x[kept] - first, percent[kept])
-        begin += (last - first) * (1.0 + GAP_SHARE)
+            span = float(series.x[-1] - series.x[0]) or 1.0
+            share = (series.x[kept] - series.x[0]) / span
+            places = np.rint((number + share * 0.98) * STEPS_A_CAPTURE).astype(np.int64)
+            yield Strip(path, one.y_name, *_ended(places, percent[kept]))
+
+
+def _ended(places: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
+    """With a gap after the last value, so that no line is drawn to the next capture."""
+    return np.append(places, places[-1] + 1), np.append(values, np.nan)
 
 
 def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
@@ -204,22 +218,30 @@ def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused:
 
     for strip in strips:
         frame = pl.DataFrame({"percent": strip.percent.astype(np.float32)})
-        send_trace(stream, timed(f"/overview/{strip.signal}", strip.t_s, frame))
+        index = pl.Series(CAPTURE, strip.places)
+        whole = Trace(f"/overview/{strip.signal}", CAPTURE, frame.insert_column(0, index))
+        send_trace(stream, whole)
     if not strips:
         return
-    t_s = np.concatenate([strip.t_s for strip in strips])
-    order = np.argsort(t_s, kind="stable")
+    places = np.concatenate([strip.places for strip in strips])
+    order = np.argsort(places, kind="stable")
     percent = np.concatenate([strip.percent for strip in strips])[order]
-    style = rr.SeriesLines(colors=RESIDUAL if refused else MEASURED, names="residual [%]")
-    stream.log("/preview", style, static=True)
-    index = rr.TimeColumn(TIME, duration=nanoseconds(t_s[order]).astype("timedelta64[ns]"))
-    columns = rr.Scalars.columns(scalars=percent)
-    rr.send_columns("/preview", indexes=[index], columns=columns, recording=stream)
-    starts = {strip.capture: strip.t_s[0] for strip in reversed(strips)}
-    places = nanoseconds(np.array([starts[name] for name in starts]))
+    style = rr.SeriesLines(
+        colors=RESIDUAL if refused else MEASURED,
+        names="residual [%]",
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+    stream.log("/preview/residual", style, static=True)
+    rr.send_columns(
+        "/preview/residual",
+        indexes=[rr.TimeColumn(CAPTURE, sequence=places[order])],
+        columns=rr.Scalars.columns(scalars=percent),
+        recording=stream,
+    )
+    starts = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
     rr.send_columns(
         "/overview_lane",
-        indexes=[rr.TimeColumn(TIME, duration=places.astype("timedelta64[ns]"))],
+        indexes=[rr.TimeColumn(CAPTURE, sequence=list(starts.values()))],
         columns=rr.StateChange.columns(state=[drawable(_stem(name)) for name in starts]),
         recording=stream,
     )
@@ -229,18 +251,21 @@ def _send_cogging(stream: RecordingStream, evidence: Sequence[Evidence]) -> None
     """Torque over one turn, both directions averaged so that friction drops out; its orders."""
     from pipeline.io.recordings.views import MODEL, RESIDUAL
 
-    for one in evidence:
-        if one.estimator != "cogging":
-            continue
+    own = [one for one in evidence if one.estimator == "cogging"]
+    for one in own:
         if one.kind == "bars":
             series = one.series[0]
             low = series.x <= HIGHEST_ORDER
-            values, left = 1e3 * series.measured[low], series.x[low] - 0.4
-            if values.size:
+            if low.any():
+                values, left = 1e3 * series.measured[low], series.x[low] - 0.4
                 send_bars(stream, "/cogging/orders", values, left, 0.8, MODEL)
         else:
             wave, left = _wave(one)
-            send_bars(stream, "/cogging/wave", wave, left, 360.0 / WAVE_CELLS, RESIDUAL)
+            width = 360.0 / WAVE_CELLS
+            send_bars(stream, "/cogging/wave", wave, left, width, RESIDUAL)
+            order = 1 + int(np.argmax(np.abs(np.fft.rfft(wave))[1:]))
+            few = max(WAVE_CELLS * PREVIEW_PERIODS // order, 2)
+            send_bars(stream, "/preview/cogging", wave[:few], left[:few], width, RESIDUAL)
 
 
 def _wave(one: Evidence) -> tuple[Array, Array]:
@@ -257,15 +282,19 @@ def _wave(one: Evidence) -> tuple[Array, Array]:
     return mean, np.arange(WAVE_CELLS) * 360.0 / WAVE_CELLS
 
 
-def _send_findings(stream: RecordingStream, findings: Sequence[Finding]) -> None:
+def _send_findings(
+    stream: RecordingStream, strips: Sequence[Strip], findings: Sequence[Finding]
+) -> None:
     import rerun as rr
 
+    order = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
     told = sorted(findings)
     lines = [drawable(f"{_stem(f.file)}: {f.message}; {f.remedy} [{f.code}]") for f in told]
     levels = ["ERROR" if f.severity == "refused" else "WARN" for f in told]
+    places = [order.get(f.file, 0) for f in told]
     rr.send_columns(
         "/findings",
-        indexes=[rr.TimeColumn(ROW, sequence=list(range(len(told) or 1)))],
+        indexes=[rr.TimeColumn(CAPTURE, sequence=places or [0])],
         columns=rr.TextLog.columns(
             text=lines or ["no capture was refused or warned of"], level=levels or ["INFO"]
         ),
@@ -278,7 +307,6 @@ def _send_properties(
 ) -> None:
     known = {name: e.number for name, e in sorted(datasheet.constants.items()) if e.known}
     failed = [check.name for check in datasheet.checks if check.status == "fail"]
-    marginal = [check.name for check in datasheet.checks if check.status == "marginal"]
     worst = max((float(np.nanmax(np.abs(s.percent))) for s in strips), default=None)
     motor: dict[str, Any] = {
         "id": datasheet.motor_id,
@@ -287,14 +315,10 @@ def _send_properties(
         "lot": datasheet.lot or "",
         "type": datasheet.motor_type or "",
         "failed": ", ".join(failed) or "none",
-        "marginal": ", ".join(marginal) or "none",
-        "why": list(datasheet.why),
-        "captures": len(datasheet.captures),
-        "version": datasheet.version,
+        "captures": len({strip.capture for strip in strips}),
         "largest_residual_percent": None if worst is None else _round(worst),
     }
     send_property(stream, "motor", motor)
-    send_property(stream, "constants", known)
     shown = {s.key: _round(s.factor * known[s.constant]) for s in SHOWN if s.constant in known}
     send_property(stream, "shown", shown)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,17 @@ def entities(path: Path) -> tuple[str, ...]:
     return tuple(sorted(name for name in found if not name.startswith("/__properties")))
 
 
-def signals_of_recordings(motors: Sequence[Path]) -> tuple[str, ...]:
-    """Quantities that the overview of any of these motors shows."""
+@dataclass(frozen=True, slots=True)
+class FleetShape:
+    """What a layout for many motors must have room for."""
+
+    signals: tuple[str, ...]
+    captures: int
+
+
+def fleet_shape(motors: Sequence[Path]) -> FleetShape:
+    """Quantities that the overview of any of these motors shows, and the most captures of one."""
     told = {name for path in motors for name in entities(path) if name.startswith(_OVERVIEW)}
-    return tuple(sorted(name.removeprefix(_OVERVIEW) for name in told))
+    counts = [recording_property(path, "motor", "captures") for path in motors]
+    signals = tuple(sorted(name.removeprefix(_OVERVIEW) for name in told))
+    return FleetShape(signals, max((int(count[0]) for count in counts if count), default=1))

@@ -15,6 +15,7 @@ from urllib.parse import quote
 
 from pipeline.io.recordings.fleet import write_layouts
 from pipeline.io.recordings.motor import APPLICATION
+from pipeline.io.recordings.readback import fleet_shape
 from pipeline.records.errors import MachineError
 
 HERE = "127.0.0.1"
@@ -78,7 +79,7 @@ def proxy_address(data_port: int) -> str:
 
 
 @contextmanager
-def catalogue(motors: Sequence[Path], signals: Sequence[str], port: int) -> Iterator[str]:
+def catalogue(motors: Sequence[Path], port: int) -> Iterator[str]:
     """Serves recordings of motors as a table, a row each; gives the address of the table.
 
     The layouts are handed over through a folder that lasts as long as the server.
@@ -88,7 +89,8 @@ def catalogue(motors: Sequence[Path], signals: Sequence[str], port: int) -> Iter
     from rerun_bindings import CatalogClientInternal
 
     with TemporaryDirectory() as folder:
-        table, motor = write_layouts(Path(folder), signals)
+        shape = fleet_shape(motors)
+        table, motor = write_layouts(Path(folder), shape.signals, shape.captures)
         with Server(host=HERE, port=port, datasets={APPLICATION: list(motors)}) as server:
             # The public constructor asks for datafusion, of which nothing here makes use.
             inner = CatalogClientInternal(server.url(), None, None)

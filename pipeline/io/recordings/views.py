@@ -51,7 +51,7 @@ class ViewPlan:
     """One time series view; `reach` locks its y axis to -reach..reach, `share` is its height.
 
     `around_s` makes it a loupe that shows so much time on each side of the cursor; `span` is the
-    y axis to begin with.
+    y axis to begin with. Over `rows` of a sequence instead of time the x axis is 0..rows.
     """
 
     name: str
@@ -60,6 +60,7 @@ class ViewPlan:
     reach: float | None = None
     around_s: float | None = None
     span: tuple[float, float] | None = None
+    rows: int | None = None
 
 
 def time_view(plan: ViewPlan) -> TimeSeriesView:
@@ -71,6 +72,8 @@ def time_view(plan: ViewPlan) -> TimeSeriesView:
     ranges: Any = None
     if plan.around_s is not None:
         axis_x, ranges = _loupe(plan.around_s)
+    if plan.rows is not None:
+        axis_x = rows_axis(plan.rows)
     axis_y = None
     if plan.reach is not None:
         axis_y = rrb.archetypes.ScalarAxis(range=(-plan.reach, plan.reach), zoom_lock=True)
@@ -89,6 +92,15 @@ def time_view(plan: ViewPlan) -> TimeSeriesView:
         time_ranges=ranges,
         overrides=overrides,
     )
+
+
+def rows_axis(rows: int) -> Any:
+    """An x axis over all rows of a sequence; by itself the viewer shows those at the cursor."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    first, last = (rr.TimeRangeBoundary.absolute(seq=place) for place in (0, max(rows, 1)))
+    return rrb.archetypes.TimeAxis(view_range=rr.TimeRange(first, last))
 
 
 def _loupe(around_s: float) -> tuple[Any, Any]:
