@@ -28,6 +28,7 @@ TIME, ROW = "t", "row"
 FLUSH_S = 300.0
 FAINT = (140, 140, 140, 60)
 Colour = tuple[int, int, int]
+Tinted = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.io.recordings.font import drawable
-from pipeline.io.recordings.stream import TIME, Colour
+from pipeline.io.recordings.stream import TIME, Colour, Tinted
 from pipeline.physics.glossary import suffix_of
 from pipeline.physics.notation import unit_text
 from pipeline.physics.units import SUFFIX_UNITS
@@ -42,7 +42,7 @@ class Line:
     entity: str
     component: str
     name: str
-    colour: Colour
+    colour: Colour | Tinted
     width: float = NARROW
 
 
