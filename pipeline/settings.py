@@ -141,7 +141,7 @@ class ReviewSettings(Settings):
     motor: str | None = key(None, "motor_id: its captures, ladder and comparison; else the fleet")
     lot: str | None = key(None, "lot: its motors, and the regressions it took part in")
     web: bool = key(False, "serve a browser instead of opening a window; on this machine only")
-    port: int = key(0, "port of the web page, the data on the next; 0 takes free ones")
+    port: int = key(0, "port of the web page, the fleet's table on the next; 0 takes free ones")
 
 
 @dataclass(kw_only=True)

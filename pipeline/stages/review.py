@@ -18,11 +18,10 @@ from pipeline.io.recordings.viewer import (
     free_port,
     has_screen,
     page_address,
-    proxy_address,
     silence,
-    web_page,
     window,
 )
+from pipeline.io.recordings.web import page_server, recording_address
 from pipeline.records.errors import MachineError, RecordingError, UsageError
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -60,23 +59,25 @@ def main(settings: ReviewSettings) -> Outcome:
 
 
 def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
-    """The table is being served once its address is told; window or page follow the telling."""
-    page, data, table = _ports(settings.port)
+    """Servers run once their addresses are told; the window or the page follows the telling."""
+    page, table = _ports(settings.port)
     with ExitStack() as stack:
-        sources = [str(path) for path in chosen.files]
-        addresses = [proxy_address(data)] if sources else []
+        catalogues = []
         if chosen.table:
-            served = catalogue(chosen.table, table)
-            addresses.append(stack.enter_context(served))
-        text = _said(settings, chosen, (page, data, table), addresses)
+            catalogues.append(stack.enter_context(catalogue(chosen.table, table)))
+        server = None
+        if settings.web:
+            origin = f"http://127.0.0.1:{table}"
+            server = stack.enter_context(page_server(chosen.files, page, [origin]))
+        text = _said(settings, chosen, (page, table), catalogues)
         kept = stack.pop_all()
 
     def then() -> tuple[int, tuple[str, ...]]:
         with kept:
-            more = addresses[-1:] if chosen.table else []
-            code = (
-                web_page(sources, page, data) if settings.web else window([*sources, *more], data)
-            )
+            if server is not None:
+                server.serve_forever()
+                return 0, ()
+            code = window([*map(str, chosen.files), *catalogues], free_port())
         if code != 0:
             return 5, (f"error: the viewer ended with code {code}; {NO_SCREEN}",)
         return 0, ()
@@ -143,33 +144,31 @@ def _refused(paths: Sequence[Path], output: Path) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _ports(first: int) -> tuple[int, int, int]:
-    """Ports of the page, of the data and of the table."""
-    if first:
-        return first, first + 1, first + 2
-    return free_port(), free_port(), free_port()
+def _ports(first: int) -> tuple[int, int]:
+    """Ports of the page and of the table."""
+    return (first, first + 1) if first else (free_port(), free_port())
 
 
 def _said(
     settings: ReviewSettings,
     chosen: Opened,
-    ports: tuple[int, int, int],
-    addresses: Sequence[str],
+    ports: tuple[int, int],
+    catalogues: Sequence[str],
 ) -> str:
     """What is opened, where, and how to see it from another machine."""
-    page, data, table = ports
+    page, table = ports
     count = len(chosen.all)
     lines = [f"{count} recording{'s' if count != 1 else ''} verified; analytics off, loopback only"]
     here = f"{getpass.getuser()}@{socket.gethostname()}"
-    used = [*([page] if settings.web else []), *([data] if chosen.files and settings.web else [])]
-    used += [table] if chosen.table else []
+    used = ([page] if settings.web else []) + ([table] if chosen.table else [])
     tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in used)
     if settings.web:
-        lines.append(f"open {page_address(page, addresses)}")
+        files = [recording_address(page, n, path) for n, path in enumerate(chosen.files)]
+        lines.append(f"open {page_address(page, [*files, *catalogues])}")
         lines.append(f"on another machine: ssh -N {tunnel} {here}, then the same address there")
         lines.append("Ctrl-C ends it")
     elif chosen.table:
-        lines.append(f"on another machine: ssh -N {tunnel} {here}, then rerun {addresses[-1]}")
+        lines.append(f"on another machine: ssh -N {tunnel} {here}, then rerun {catalogues[-1]}")
     if not settings.web and chosen.files:
         folder = shlex.quote(f"{here}:{chosen.files[-1].parent.resolve()}")
         lines.append(f"on another machine: scp -r {folder} review, then rerun review/*.rrd")

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,7 +102,7 @@ def recording_bytes(
     traces, fits = list(capture_traces(capture)), list(fit_traces(own))
     told = (residual_maps(capture, one) for one in first_of_each(own))
     maps = tuple(islice((one for one in told if one is not None), MOST_MAPS))
-    name = f"{capture.meta.motor_id} {capture.path.rsplit('/', 1)[-1]}"
+    name = f"{capture.meta.motor_id} {PurePosixPath(capture.path).stem}"
     shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None)
     with recording(name, identity(capture, datasheet), capture_layout(shown)) as made:
         for trace in (*traces, *(fit.trace for fit in fits)):

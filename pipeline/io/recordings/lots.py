@@ -138,9 +138,10 @@ def drift(one: ConstantResult) -> pl.DataFrame | None:
             "ewma": change(lot.ewma),
             "ewma_low": change(lot.ewma_low),
             "ewma_high": change(lot.ewma_high),
-            "candidate": change(lot.mean) if lot.side == "candidate" else np.nan,
+            # from the last lot before on, so that even a single one is a line
+            "candidate": change(lot.mean) if place >= len(before) - 1 else np.nan,
         }
-        for lot in one.lots
+        for place, lot in enumerate(one.lots)
     ]
     return pl.DataFrame(rows, schema=dict.fromkeys(rows[0], pl.Float64))
 

@@ -65,15 +65,16 @@ def drift_plan(one: ConstantResult) -> ViewPlan:
     """Lot means with ±U, the candidate's in its own colour, and the chart's control limits."""
     entity = f"/drift/{one.name}"
     lines = (
-        Line(entity, "low", "mean − U", (*BASELINE, 90)),
-        Line(entity, "high", "mean + U", (*BASELINE, 90)),
+        Line(entity, "low", "mean ± U", (*BASELINE, 110)),
+        Line(entity, "high", "mean ± U", (*BASELINE, 110)),
         Line(entity, "mean", "lot mean", BASELINE, WIDE),
         Line(entity, "candidate", "candidate", CANDIDATE, 4.0),
         Line(entity, "ewma", "EWMA", MEASURED),
         Line(entity, "ewma_low", "limit", (*RESIDUAL, 160)),
         Line(entity, "ewma_high", "limit", (*RESIDUAL, 160)),
     )
-    return ViewPlan(f"{stem_of(one.name)}: change from the baseline [%]", lines, 1.0)
+    words = f"{stem_of(one.name)}: change from the baseline [%] by lot number"
+    return ViewPlan(words, lines, 1.0, rows=len(one.lots))
 
 
 def cogging_plan(result: LotRegression) -> ViewPlan | None:
@@ -81,11 +82,10 @@ def cogging_plan(result: LotRegression) -> ViewPlan | None:
     lines: list[Line] = []
     for band in result.cogging:
         entity, colour = f"/cogging/{band.side}", COLOURS[band.side]
-        faint = (*colour, FILL_ALPHA)
-        lines += [Line(entity, f"fill_{n}", "", faint, FILL_WIDTH) for n in range(1, FILL)]
-        lines += [Line(entity, edge, "", (*colour, 110)) for edge in ("low", "high")]
-        words = f"{band.side}: mean ± sd of {band.motors} motors"
+        words, faint = f"{band.side}: mean ± sd of {band.motors} motors", (*colour, FILL_ALPHA)
         lines.append(Line(entity, "mean", words, colour, WIDE))
+        lines += [Line(entity, f"fill_{n}", words, faint, FILL_WIDTH) for n in range(1, FILL)]
+        lines += [Line(entity, edge, words, (*colour, 110)) for edge in ("low", "high")]
     if not lines:
         return None
     return ViewPlan("cogging torque [mN·m] over mechanical angle [°]", tuple(lines), 1.0)

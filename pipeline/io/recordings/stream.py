@@ -82,8 +82,12 @@ def recording(
 
 
 def application(name: str) -> str:
-    """The application id of a workspace; the viewer takes none with a point in it."""
-    return drawable(name).replace(".", "-")
+    """The application id of a workspace, which the viewer takes as it stands.
+
+    It would replace what is no ASCII letter, digit, space, `-` or `_`, and two names could meet.
+    """
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in " -_") else "-" for c in name)
+    return kept if kept == name else f"{kept} {digest((name,))[:6]}"
 
 
 def digest(parts: Sequence[str]) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
@@ -19,7 +19,6 @@ from pipeline.io.recordings.readback import fleet_shape
 from pipeline.records.errors import MachineError
 
 HERE = "127.0.0.1"
-MEMORY = "75%"
 _SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -32,15 +31,18 @@ def free_port() -> int:
 
 
 def viewer_command(*words: str) -> list[str]:
-    """The viewer that was installed with this interpreter, else the one on the path.
+    """The viewer's own program; the `rerun` on the path would outlive its end as a child.
 
-    Raises MachineError where there is none.
+    Raises MachineError where it is not installed.
     """
-    beside = Path(sys.executable).parent
-    found = shutil.which("rerun", path=f"{beside}{os.pathsep}{os.environ.get('PATH', os.defpath)}")
-    if found is None:
-        raise MachineError("the Rerun viewer is not installed", "install rerun-sdk anew")
-    return [found, *words]
+    package = find_spec("rerun_cli")
+    places = [] if package is None else list(package.submodule_search_locations or ())
+    for place in places:
+        for name in ("Rerun.app/Contents/MacOS/Rerun", "rerun", "rerun.exe"):
+            program = Path(place) / name
+            if program.is_file():
+                return [str(program), *words]
+    raise MachineError("the Rerun viewer is not installed", "install rerun-sdk anew")
 
 
 def silence() -> None:
@@ -60,22 +62,10 @@ def window(sources: Sequence[str], port: int) -> int:
     return _wait(viewer_command(*words))
 
 
-def web_page(sources: Sequence[str], page_port: int, data_port: int) -> int:
-    """Serves the web viewer, and files to it, until it is interrupted; its exit code."""
-    words = ["--serve-web", "--bind", HERE, "--port", str(data_port), "--hide-welcome-screen"]
-    words += ["--web-viewer-port", str(page_port), "--server-memory-limit", MEMORY, *sources]
-    return _wait(viewer_command(*words))
-
-
 def page_address(page_port: int, sources: Sequence[str]) -> str:
     """What to open in a browser."""
     words = "&".join(f"url={quote(source, safe='')}" for source in sources)
     return f"http://{HERE}:{page_port}/?{words}"
-
-
-def proxy_address(data_port: int) -> str:
-    """Where a viewer finds the files that are being served."""
-    return f"rerun+http://{HERE}:{data_port}/proxy"
 
 
 @contextmanager
