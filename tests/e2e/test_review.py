@@ -93,9 +93,9 @@ def drawn(told: dict[str, Any]) -> Iterator[str]:
 @pytest.mark.parametrize(
     "name",
     [
-        f"{HEALTHY}/torque_map_slow.mcap.rrd",
-        f"{FAULTY}/current_step_d_0.mcap.rrd",
-        f"{FAULTY}/lcr.csv.rrd",
+        f"{HEALTHY}/{HEALTHY}/torque_map_slow.mcap.rrd",
+        f"{FAULTY}/{FAULTY}/current_step_d_0.mcap.rrd",
+        f"{FAULTY}/{FAULTY}/lcr.csv.rrd",
         f"motor-{FAULTY}.rrd",
         f"ladder-{FAULTY}.rrd",
         lots_name(make_regression()),
@@ -118,7 +118,7 @@ def test_a_workspace_opens_without_a_complaint_and_every_view_has_data(
 
 
 def test_traces_are_drawn_in_their_colours(output: Path, viewer: Viewer) -> None:
-    viewer.show(output / "recordings" / HEALTHY / "drive_0.mcap.rrd")
+    viewer.show(output / "recordings" / HEALTHY / HEALTHY / "drive_0.mcap.rrd")
     picture = pixels(viewer.picture())
     for colour in (MODEL, RESIDUAL):
         assert count(picture, colour) > 200
@@ -182,18 +182,14 @@ def test_values_read_back_are_the_datasheets(output: Path) -> None:
 
 def texts(path: Path) -> Iterator[str]:
     """Every text in a recording."""
+    import pyarrow as pa
     from rerun.chunk import RrdReader
 
     for chunk in RrdReader(str(path)).stream():
         yield str(chunk.entity_path)
-        for column in chunk.to_record_batch().to_pydict().values():
-            waiting = list(column)
-            while waiting:
-                value = waiting.pop()
-                if isinstance(value, str):
-                    yield value
-                elif isinstance(value, list):
-                    waiting += value
+        for column in chunk.to_record_batch().columns:
+            if pa.types.is_list(column.type) and pa.types.is_string(column.type.value_type):
+                yield from (text for row in column.to_pylist() if row for text in row if text)
 
 
 def test_no_text_has_a_character_that_the_font_lacks(output: Path) -> None:
@@ -249,7 +245,7 @@ def test_a_recording_that_cannot_be_verified_is_refused_with_one_line(
 ) -> None:
     """Reaction: exit code 3 and one line that names the file; nothing is opened."""
     place = copied(output, tmp_path)
-    victim = place / "recordings" / FAULTY / "drive_0.mcap.rrd"
+    victim = place / "recordings" / FAULTY / FAULTY / "drive_0.mcap.rrd"
     whole = victim.read_bytes()
     if fault == "truncated":
         victim.write_bytes(whole[:-1000])
@@ -261,12 +257,12 @@ def test_a_recording_that_cannot_be_verified_is_refused_with_one_line(
     elif fault == "no seal":
         seal_of(victim).unlink()
     else:
-        shutil.copy(place / "recordings" / HEALTHY / "drive_0.mcap.rrd", victim)
+        shutil.copy(place / "recordings" / HEALTHY / HEALTHY / "drive_0.mcap.rrd", victim)
     assert review(f"output={place}", f"motor={FAULTY}", "web=true") == 3
     seen = capsys.readouterr()
     assert seen.out == ""
     (line,) = seen.err.splitlines()
-    assert line.startswith(f"refused: recordings/{FAULTY}/drive_0.mcap.rrd: ")
+    assert line.startswith(f"refused: recordings/{FAULTY}/{FAULTY}/drive_0.mcap.rrd: ")
     assert words in line
     assert line.endswith("[recording_unverified]")
 

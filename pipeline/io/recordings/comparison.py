@@ -40,12 +40,14 @@ from pipeline.io.recordings.views import (
     stacked,
     workspace,
 )
+from pipeline.numerics.thinning import line_points
 from pipeline.physics.notation import quantity, significant
 from pipeline.records.comparison import Comparison, Trace
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
 
+MOST_POINTS = 4000
 _KINDS = {"equation": "from the measured state", "free_run": "on its own"}
 
 
@@ -78,14 +80,18 @@ def entity_of(trace: Trace) -> str:
 
 
 def table_of(trace: Trace) -> Table:
-    """A trace as columns of float32."""
+    """A trace as columns of float32; of a long one the rows that a screen could tell apart.
+
+    Every stretch keeps the extremes of what was measured, of the model and of the residual.
+    """
     columns = {
         "measured": trace.measured,
         "model": trace.model,
         "residual": trace.measured - trace.model,
     }
-    frame = pl.DataFrame({name: column.astype(np.float32) for name, column in columns.items()})
-    return timed(entity_of(trace), trace.t_s, frame)
+    kept = np.unique(np.concatenate([line_points(c, MOST_POINTS) for c in columns.values()]))
+    frame = pl.DataFrame({name: c[kept].astype(np.float32) for name, c in columns.items()})
+    return timed(entity_of(trace), trace.t_s[kept], frame)
 
 
 def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +40,7 @@ from pipeline.io.recordings.stream import (
     send_property,
     send_trace,
 )
+from pipeline.numerics.thinning import line_points
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.evidence import Evidence
@@ -155,7 +155,7 @@ def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip
         for one in own:
             series = one.series[0]
             percent = 100.0 * (series.measured - series.fitted) / reach[one.y_name]
-            kept = extremes(percent, POINTS_A_SERIES)
+            kept = line_points(percent, POINTS_A_SERIES)
             span = float(series.x[-1] - series.x[0]) or 1.0
             share = (series.x[kept] - series.x[0]) / span
             places = np.rint((number + share * 0.98) * STEPS_A_CAPTURE).astype(np.int64)
@@ -170,20 +170,6 @@ def _ended(places: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64],
 def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
     """The quantities of an overview, in the order in which they first come."""
     return tuple(dict.fromkeys(strip.signal for strip in strips))
-
-
-def extremes(values: Array, most: int) -> NDArray[np.int64]:
-    """Places of the lowest and highest value of each of `most`/2 stretches: no spike is lost."""
-    if values.size <= most:
-        return np.arange(values.size)
-    edges = np.linspace(0, values.size, most // 2 + 1).astype(np.int64)
-    clean = np.nan_to_num(values)
-    kept = {
-        int(start + pick(clean[start:stop]))
-        for start, stop in pairwise(edges)
-        for pick in (np.argmin, np.argmax)
-    }
-    return np.array(sorted(kept), dtype=np.int64)
 
 
 def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
