@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pipeline.__main__ import main as pipeline
@@ -116,7 +116,8 @@ def _settled(browser: Browser, address: str) -> bytes:
     session = browser.page(address)
     deadline, seen = time.monotonic() + LIGHT_PATIENCE_S, [b"", b"x", b"y"]
     while time.monotonic() < deadline:
-        seen = [*seen[1:], browser.picture(session)]
+        with suppress(RuntimeError):  # the page is being loaded
+            seen = [*seen[1:], browser.picture(session)]
         if len(set(seen)) == 1 and len(seen[-1]) > 80_000:
             return seen[-1]
         time.sleep(2)

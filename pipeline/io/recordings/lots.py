@@ -4,13 +4,13 @@ A recording holds the entities
 
     /verdict              the sentence, its reasons and a table of constants, as a markdown page
     /hist/NAME/SIDE       motors per bin of a constant, both sides over each other
-    /cogging/SIDE         `mean`, `low`, `high` of the zero-current torque [mN·m] over the angle
+    /cogging/SIDE         `mean`, `low`, `high` of the zero-current torque [mN·m] over 0.1°
     /orders/SIDE          its mean amplitude by order [mN·m]
     /drift/NAME           lot means as change from the baseline's [%], with ±U and control limits
     /motors               one row a motor: lot, side, the value of each constant
 
-on one sequence timeline `place`: degrees, lots and motors all count from 0, and one timeline serves
-every view at once.
+on one sequence timeline `place`: tenths of degrees, lots and motors all count from 0, and one
+timeline serves every view at once.
 """
 
 from __future__ import annotations
@@ -147,16 +147,21 @@ def drift(one: ConstantResult) -> pl.DataFrame | None:
 
 
 def band_trace(band: CoggingBand) -> Trace:
-    """A band of cogging torque [mN·m] over degrees, with lines between its edges that fill it."""
+    """A band of cogging torque [mN·m] over 0.1°, with lines between its edges that fill it."""
     low, high = 1e3 * np.array(band.low_nm), 1e3 * np.array(band.high_nm)
     columns = {"mean": 1e3 * np.array(band.mean_nm), "low": low, "high": high}
     for number in range(1, FILL):
         columns[f"fill_{number}"] = low + (high - low) * number / FILL
     frame = pl.DataFrame({name: v.astype(np.float32) for name, v in columns.items()})
-    degrees = np.rint(np.degrees(np.array(band.theta_mech_rad))).astype(np.int64)
-    first = np.unique(degrees, return_index=True)[1]
-    index = pl.Series(PLACE, degrees[first])
+    tenths = np.rint(10.0 * np.degrees(np.array(band.theta_mech_rad))).astype(np.int64)
+    first = np.unique(tenths, return_index=True)[1]
+    index = pl.Series(PLACE, tenths[first])
     return Trace(f"/cogging/{band.side}", PLACE, frame[first.tolist()].insert_column(0, index))
+
+
+def leading_order(result: LotRegression) -> int:
+    """The order of the largest mean amplitude on either side; 1 where none is told."""
+    return max(result.orders, key=lambda level: level.mean).order if result.orders else 1
 
 
 def _send_histograms(stream: RecordingStream, one: ConstantResult) -> None:
@@ -175,12 +180,13 @@ def _send_drift(stream: RecordingStream, one: ConstantResult) -> None:
 
 
 def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
-    for side, shift in zip(SIDES, (-0.4, 0.0), strict=True):
+    width = max([0.4, *(level.order / 60.0 for level in result.orders)])
+    for side, shift in zip(SIDES, (-width, 0.0), strict=True):
         own = [level for level in result.orders if level.side == side]
         if own:
             values = 1e3 * np.array([level.mean for level in own])
             left = np.array([float(level.order) for level in own]) + shift
-            send_bars(stream, f"/orders/{side}", values, left, 0.4, COLOURS[side])
+            send_bars(stream, f"/orders/{side}", values, left, width, COLOURS[side])
 
 
 def _send_motors(stream: RecordingStream, result: LotRegression) -> None:

@@ -13,6 +13,7 @@ from pipeline.io.recordings.lots import (
     compared,
     constant_scale,
     drift,
+    leading_order,
 )
 from pipeline.io.recordings.views import (
     BASELINE,
@@ -34,7 +35,7 @@ from pipeline.records.lot_regression import LotRegression
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
 
-MOST_SHOWN, GRID = 2, 3
+MOST_SHOWN, GRID, PERIODS = 2, 3, 6
 FILL_ALPHA, FILL_WIDTH = 40, 3.0
 
 
@@ -88,7 +89,11 @@ def cogging_plan(result: LotRegression) -> ViewPlan | None:
         lines += [Line(entity, edge, words, (*colour, 110)) for edge in ("low", "high")]
     if not lines:
         return None
-    return ViewPlan("cogging torque [mN·m] over mechanical angle [°]", tuple(lines), 1.0)
+    order = leading_order(result)
+    words = (
+        f"cogging torque [mN·m] over mechanical angle [0.1°], {PERIODS} periods of order {order}"
+    )
+    return ViewPlan(words, tuple(lines), 1.0, rows=-(-3600 * PERIODS // order))
 
 
 def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
@@ -113,7 +118,7 @@ def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
         sides = dict.fromkeys(level.side for level in result.orders)
         lower.append(bar_view(orders, *(f"/orders/{side}" for side in sides), legend=True))
     if lower:
-        right.append(rrb.Horizontal(*lower, column_shares=[2.4, 1.0][: len(lower)]))
+        right.append(rrb.Horizontal(*lower, column_shares=[1.8, 1.0][: len(lower)]))
     columns = [rrb.Vertical(*left, row_shares=shares)]
     columns += [rrb.Vertical(*right)] if right else []
     return rrb.Horizontal(*columns, column_shares=[1.0, 1.5][: len(columns)], name="1 · Lots")

@@ -61,11 +61,11 @@ def test_every_motor_is_in_one_bin_of_its_side() -> None:
         assert edges[-1] >= max(shown)
 
 
-def test_cogging_bands_come_back_in_millinewtonmetres_by_degree(lots: Path) -> None:
+def test_cogging_bands_come_back_in_millinewtonmetres_by_tenths_of_degrees(lots: Path) -> None:
     for band in make_regression().cogging:
         back = read_back(lots, f"/cogging/{band.side}")
         np.testing.assert_allclose(back["mean"], 1e3 * np.array(band.mean_nm), rtol=1e-6)
-        assert back["place"].to_list() == list(range(361))
+        assert back["place"].to_list() == list(range(0, 3601, 10))
         peak = 1e3 * COGGING_NM[band.side]
         inner = back["fill_4"].to_numpy()
         assert back["mean"].max() == pytest.approx(peak, rel=0.01)
@@ -106,4 +106,4 @@ def test_the_page_leads_with_the_verdict_and_marks_what_failed() -> None:
     assert "| ✗ | **cogging_amplitude_nm** | 8.0" in text
     assert "**+75.00 %**" in text
     assert "- 3: 2026-W14" in text
-    assert "M3: r_phase_ohm 4 sd (M3/r)" in text
+    assert "M3: r_phase_ohm 4 sd (M3/r.mcap)" in text
