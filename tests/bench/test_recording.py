@@ -1,8 +1,7 @@
 """How fast and how small a capture becomes a recording, beside zstd Parquet of the same frame.
 
 Ratios hold on any machine. Limits: the file at most 6 bytes a sample and channel, and writing at
-most so many times slower than Parquet that 2 million rows a second were kept where they were
-measured; `test_two_million_rows_a_second` says the rate itself on an idle core.
+most half as dear again as Parquet, which was measured at 1.0 times its CPU time.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ NAMES = (
     *("torque_shaft_nm", "temp_winding_degc", "temp_magnet_degc", "temp_case_degc"),
     "temp_ambient_degc",
 )
-SLOWEST = 3.0
+SLOWEST = 1.5
 MOST_BYTES = 6.0
 MOST_MEMORY = 2 << 30
 
@@ -83,15 +82,6 @@ def test_a_recording_costs_little_more_than_parquet() -> None:
     samples = capture.tables[0].height * CHANNELS
     size = len(written(capture)) / samples
     assert size <= MOST_BYTES, f"{size:.2f} bytes, Parquet {len(parquet(capture)) / samples:.2f}"
-
-
-@pytest.mark.slow
-def test_two_million_rows_a_second() -> None:
-    """The whole recording of a 20-channel capture: samples, layout, lanes, maps, findings."""
-    capture = make_capture(30.0)
-    recording_bytes(make_capture(0.1), ())
-    spent = seconds_of(written, capture)
-    assert capture.tables[0].height / spent >= 2e6, f"{capture.tables[0].height / spent:.3g} rows/s"
 
 
 @pytest.mark.slow
