@@ -7,17 +7,13 @@ Every file may hold more than its schema names; numbers are finite or null, neve
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import is_dataclass
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, get_args
 
 from pipeline.physics.glossary import CONSTANTS, TESTS, Term
 from pipeline.records.capture import Integrity
 from pipeline.records.datasheet import CheckStatus, DatasheetStatus
 from pipeline.records.estimate import Status
 from pipeline.records.finding import Severity
-from pipeline.records.lot_regression import LotRegression
-from pipeline.records.plain_form import hints_of
 from pipeline.records.uncertainty import Kind
 
 Schema = dict[str, Any]
@@ -302,28 +298,6 @@ def outputs_schema() -> Schema:
     return _document("outputs/1", "Files of the last run", _object({"files": _list(NAME)}))
 
 
-def lot_regression_schema() -> Schema:
-    """`regression/report.json`, from the kinds of its record's fields."""
-    return _document(
-        "lot-regression/1", "A lot, or a version of the code, against another", _kind(LotRegression)
-    )
-
-
-def _kind(kind: Any) -> Schema:
-    """The schema of a field of a record: a record, a tuple, a literal, a scalar or nothing."""
-    origin, inner = get_origin(kind), get_args(kind)
-    if is_dataclass(kind) and isinstance(kind, type):
-        return _object({name: _kind(hint) for name, hint in hints_of(kind).items()})
-    if origin in (Union, UnionType):
-        (one,) = (part for part in inner if part is not type(None))
-        return _or_null(_kind(one))
-    if origin is tuple:
-        return _list(_kind(inner[0]))
-    if origin is Literal:
-        return _one_of(kind)
-    return {float: NUMBER, int: WHOLE, str: TEXT, bool: {"type": "boolean"}}[kind]
-
-
 SCHEMAS: dict[str, Callable[[], Schema]] = {
     "motor-datasheet": datasheet_schema,
     "findings": findings_schema,
@@ -331,7 +305,6 @@ SCHEMAS: dict[str, Callable[[], Schema]] = {
     "model-diagnosis": diagnosis_schema,
     "motor-truth": truth_schema,
     "outputs": outputs_schema,
-    "lot-regression": lot_regression_schema,
 }
 
 
