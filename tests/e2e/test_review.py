@@ -51,7 +51,6 @@ FILES = (
     "resistance_ab.mcap",
     "resistance_bc.mcap",
     "resistance_ca.mcap",
-    "torque_map_slow.mcap",
 )
 COLD, WARM, NEUTRAL = (33, 102, 172), (178, 24, 43), (247, 247, 247)
 
@@ -95,7 +94,7 @@ def drawn(told: dict[str, Any]) -> Iterator[str]:
 @pytest.mark.parametrize(
     "name",
     [
-        f"{HEALTHY}/{HEALTHY}/torque_map_slow.mcap.rrd",
+        f"{HEALTHY}/{HEALTHY}/cogging_cw.mcap.rrd",
         f"{FAULTY}/{FAULTY}/current_step_d_0.mcap.rrd",
         f"{FAULTY}/{FAULTY}/lcr.csv.rrd",
         f"motor-{FAULTY}.rrd",
@@ -125,6 +124,7 @@ def test_traces_are_drawn_in_their_colours(output: Path, viewer: Viewer) -> None
     for colour in (MODEL, RESIDUAL):
         assert count(picture, colour) > 200
     assert count(picture, MEASURED, 30) > 200
+    assert viewer.reports() == []
 
 
 def test_the_ladders_map_has_colour_below_and_none_at_the_top(output: Path, viewer: Viewer) -> None:
