@@ -61,7 +61,7 @@ def _dark(output: Path, into: Path) -> None:
     places = _workspaces(output)
     with Viewer(size=f"{SIZE[0]}x{SIZE[1]}") as viewer:
         viewer.show(places["capture"])
-        viewer.client.set_time("t", duration=1.2)
+        viewer.client.set_time("t", duration=0.4325)
         _keep(into, "capture", viewer.picture())
         viewer.tab(1)
         _keep(into, "maps", viewer.picture())

@@ -23,7 +23,7 @@ NAME = "datasheet"
 TITLE = "Against the datasheet"
 WINDOW_S, LEAST_SAMPLES, LEAST_WINDOWS = 1e-3, 8, 16
 MOST_WINDOWS = 20_000
-GAP = 1.5
+GAP, JUMP_SHARE = 1.5, 0.01
 _VOLTAGE = ("r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "pole_pairs")
 _TORQUE = ("kt_peak_nm_a", "kt_from_ke_nm_a")
 _ZERO_CURRENT = ("cogging",)
@@ -93,7 +93,10 @@ def _voltages(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, .
 
 
 def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...]:
-    """The shaft's torque: what the currents make, less friction and what accelerates the rotor."""
+    """The shaft's torque: what the currents make, less friction and what accelerates the rotor.
+
+    Where the acceleration jumps between windows nothing is said: it is not known within them.
+    """
     currents = () if capture.meta.test in _ZERO_CURRENT else ("iq_a",)
     record = _record(capture, ("torque_shaft_nm", *currents))
     kt_nm_a = next((known[name] for name in _TORQUE if name in known), None)
@@ -117,8 +120,21 @@ def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...
     drag = known.get("torque_coulomb_nm", 0.0) * np.sign(omega)
     drag += known.get("b_visc_nm_s_rad", 0.0) * omega
     fitted = made - drag - known.get("j_rotor_kgm2", 0.0) * rising
+    fitted[_jumps(cut, speed, known.get("j_rotor_kgm2", 0.0), record)] = np.nan
     series = Series("", t_s, record["torque_shaft_nm"], fitted)
     return (_evidence(capture, "torque_shaft_nm", series, "every sample"),)
+
+
+def _jumps(
+    cut: _Windows, speed: Array, j_kgm2: float, record: Mapping[str, Array]
+) -> NDArray[np.bool_]:
+    """Samples [n] by windows whose accelerating torque differs by 1 % of the largest torque."""
+    torque = j_kgm2 * np.gradient(speed, cut.middle_s)
+    step = np.abs(np.diff(torque, prepend=torque[:1], append=torque[-1:]))
+    most = float(np.abs(record["torque_shaft_nm"]).max())
+    jumping = np.maximum(step[1:], step[:-1]) > JUMP_SHARE * most
+    near: NDArray[np.bool_] = np.interp(record["t_s"], cut.middle_s, jumping) > 0.0
+    return near
 
 
 def _evidence(capture: Capture, name: str, series: Series, caption: str) -> Evidence:

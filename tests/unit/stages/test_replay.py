@@ -102,6 +102,22 @@ def test_what_the_datasheet_does_not_know_is_not_replayed() -> None:
     ]
 
 
+def test_where_the_load_jumps_the_torque_is_left_open_and_nothing_is_left_over() -> None:
+    """A step of load accelerates the rotor within a window, where the windows cannot follow."""
+    drive = make_drive()
+    t = np.arange(ROWS) * PERIOD_S
+    late = np.maximum(t - 0.5, 0.0)
+    rows = drive.tables[0].with_columns(
+        pl.col("theta_mech_rad") + 250.0 * late**2,
+        pl.col("torque_shaft_nm") - np.where(late > 0, 0.05 + 1e-5 * 500.0 * late, 0.0),
+    )
+    told = replay(replace(drive, tables=(rows,)), make_sheet())[0].series[0]
+    left = told.measured - told.fitted
+    open_s = told.x[np.isnan(left)]
+    assert 0.49 < open_s.min() < open_s.max() < 0.51
+    assert np.nanmax(np.abs(left[100:-100])) < 1e-3
+
+
 def test_a_gap_in_the_record_leaves_no_window_across_it() -> None:
     whole = make_drive()
     rows = whole.tables[0]
