@@ -62,6 +62,7 @@ def recording(
 ) -> Iterator[Recording]:
     """A recording called `name` with an id made of `identity`: equal work, equal id.
 
+    The layout is made active at once, since the web viewer lays out what comes first by itself.
     `ids` are application and recording where they mean something by themselves. Made in memory,
     since a stream onto a full disk may wait for its dead writer for ever.
     """
@@ -73,7 +74,7 @@ def recording(
     stream = rr.RecordingStream(home, recording_id=own, send_properties=False)
     memory = stream.memory_recording()
     if layout is not None:
-        stream.send_blueprint(layout, make_active=False, make_default=True)
+        stream.send_blueprint(layout, make_active=True, make_default=True)
     stream.send_recording_name(shown)
     made = Recording(stream)
     yield made
