@@ -12,7 +12,7 @@ help:
 	@echo "make test-slow the long sweeps as well"
 	@echo "make lint      style, types, import direction"
 	@echo "make demo-data simulate data/demo anew"
-	@echo "make screenshots  docs/images from the demo's report (needs chromium)"
+	@echo "make screenshots  docs/images from the demo's report and recordings (needs chromium, lavapipe)"
 	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md; goes on after a stop"
 	@echo "make stories   figures of docs/real-recordings.md, from ../shared/data/real"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
@@ -32,6 +32,7 @@ screenshots: demo
 	  --screenshot=docs/images/report.png file://$(CURDIR)/reports/demo/report/G52-0601.html
 	$(SHOT) --user-data-dir=$$(mktemp -d) --window-size=1500,1250 \
 	  --screenshot=docs/images/fleet.png file://$(CURDIR)/reports/demo/report/index.html
+	$(PY) -m tests.screenshots
 
 demo-data: $(READY)
 	rm -rf data/demo/*/

@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TextIO
 
 from pipeline.commands import COMMANDS, Command, overview, usage
 from pipeline.configuration import load_settings
 from pipeline.records.errors import PipelineError
-from pipeline.records.outcome import Outcome
+from pipeline.records.outcome import Outcome, first_that_applies
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -49,7 +51,7 @@ def _perform(command: Command, words: list[str]) -> Outcome:
     settings = load_settings(command, words)
     stage = importlib.import_module(f"pipeline.stages.{command.stage}")
     outcome: Outcome = stage.main(settings)
-    return outcome if settings.timings else Outcome(outcome.exit_code, outcome.text, outcome.errors)
+    return outcome if settings.timings else replace(outcome, timings=())
 
 
 def _show(outcome: Outcome) -> int:
@@ -60,7 +62,20 @@ def _show(outcome: Outcome) -> int:
     if outcome.timings:
         rows = [f"  {name:<12} {seconds:8.3f} s" for name, seconds in outcome.timings]
         _print("\n".join(["timings", *rows]), sys.stdout)
-    return outcome.exit_code
+    if outcome.then is None:
+        return outcome.exit_code
+    return _show(_continued(outcome.exit_code, outcome.then))
+
+
+def _continued(code: int, then: Callable[[], tuple[int, tuple[str, ...]]]) -> Outcome:
+    """What a command that stays comes to; an interrupt is how a user ends it, no failure."""
+    try:
+        further, lines = then()
+    except PipelineError as error:
+        further, lines = error.exit_code, (f"error: {error}",)
+    except KeyboardInterrupt:
+        further, lines = 0, ()
+    return Outcome(first_that_applies(code, further), errors=lines)
 
 
 def _print(text: str, stream: TextIO) -> None:

@@ -76,6 +76,12 @@ COMMANDS = _index(
         "every datasheet version: list, show, diff, at, verify, approve, revoke, tag",
         positional=("action", "motor"),
     ),
+    Command(
+        "review",
+        "review",
+        s.ReviewSettings,
+        "recordings in the Rerun viewer: fleet, motor, ladder, lot against lot",
+    ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
     Command(
         "benchmark",

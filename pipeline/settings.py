@@ -188,6 +188,17 @@ class DiagnoseSettings(CompareSettings):
 
 
 @dataclass(kw_only=True)
+class ReviewSettings(Settings):
+    """`review`: what a run and its diagnoses recorded, in the Rerun viewer."""
+
+    output: str = key("reports/demo", "output folder of a run")
+    motor: str | None = key(None, "motor_id: its captures, ladder and comparison; else the fleet")
+    lot: str | None = key(None, "lot: its motors, and the regressions it took part in")
+    web: bool = key(False, "serve a browser instead of opening a window; on this machine only")
+    port: int = key(0, "port of the web page, the fleet's table on the next; 0 takes free ones")
+
+
+@dataclass(kw_only=True)
 class BenchmarkSettings(Settings):
     """`benchmark`: sealed simulated campaigns, diagnosed blind, with a table of marks."""
 

@@ -52,6 +52,12 @@ class CaptureError(PipelineError):
         return type(self), (self.code, self.message, self.remedy, self.rows)
 
 
+class RecordingError(PipelineError):
+    """A recording for the viewer cannot be verified; it is refused as a capture would be."""
+
+    exit_code = 3
+
+
 def merged(faults: Sequence[CaptureError]) -> CaptureError:
     """One error that says every fault and every remedy; code and rows are the first one's."""
     first, rest = faults[0], faults[1:]

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """`text` goes to standard output, `errors` line by line to standard error."""
+    """`text` goes to standard output, `errors` line by line to standard error.
+
+    `then` is what a command goes on with once that is printed, such as a window or a server that
+    stays; it returns lines for standard error and a further exit code.
+    """
 
     exit_code: int = 0
     text: str = ""
     errors: tuple[str, ...] = ()
     timings: tuple[tuple[str, float], ...] = ()
+    then: Callable[[], tuple[int, tuple[str, ...]]] | None = None
 
 
 PRECEDENCE = (5, 2, 1, 3, 4, 0)

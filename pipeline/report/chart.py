@@ -15,11 +15,11 @@ from pathlib import PurePosixPath
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.thinning import cloud_points, line_points
 from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.axis import Axis, axis_for, padded, symmetric_axis, unit_of
 from pipeline.report.residual import ResidualScale, residual_of, residual_scale
-from pipeline.report.thinning import cloud_points, line_points
 
 Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0

@@ -29,7 +29,7 @@ def _judge(
     stem = file_stem(campaign.motor_id)
     write_whole(output / "comparison" / f"{stem}.json", canonical_json(result.document()))
     if result.traces:
-        from pipeline.io.recording_comparison import write_comparison_recording
+        from pipeline.io.recordings.comparison import write_comparison_recording
 
         with watch.stage("recording"):
             path = output / "recordings" / f"comparison-{stem}.rrd"

@@ -41,7 +41,7 @@ def _judge(
         page = render_ladder(result)
         write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
     if result.ladder:
-        from pipeline.io.recording_ladder import write_ladder_recording
+        from pipeline.io.recordings.ladder import write_ladder_recording
 
         with watch.stage("recording"):
             write_ladder_recording(result, output / "recordings" / f"ladder-{stem}.rrd")

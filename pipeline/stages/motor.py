@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -147,14 +148,36 @@ def _write(
             page = render_motor(datasheet, evidence, findings, terms)
             write(f"report/{stem}.html", page.encode())
     if job.recordings:
-        from pipeline.io.recording import recording_bytes
+        from pipeline.io.recordings.seal import SEAL, seal_line
 
         with watch.stage("recordings"):
-            for capture in campaign.captures:
-                own = tuple(f for f in findings if f.file == capture.path)
-                content = recording_bytes(capture, evidence, datasheet, own)
-                write(f"recordings/{stem}/{_place(capture.path)}.rrd", content)
+            for name, content in _recordings(stem, campaign, datasheet, evidence, findings):
+                write(name, content)
+                write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], content))
     return tuple(files)
+
+
+def _recordings(
+    stem: str,
+    campaign: Campaign,
+    datasheet: Datasheet,
+    evidence: tuple[Evidence, ...],
+    findings: tuple[Finding, ...],
+) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the motor's recording and of one a capture; what the datasheet says of a
+    capture comes first in it.
+    """
+    from pipeline.io.recordings.capture import recording_bytes
+    from pipeline.io.recordings.motor import motor_bytes
+    from pipeline.stages.replay import replay
+
+    shown = [*(one for capture in campaign.captures for one in replay(capture, datasheet))]
+    shown += evidence
+    yield f"recordings/motor-{stem}.rrd", motor_bytes(campaign, datasheet, shown, findings)
+    for capture in campaign.captures:
+        own = tuple(f for f in findings if f.file == capture.path)
+        content = recording_bytes(capture, shown, datasheet, own)
+        yield f"recordings/{stem}/{_place(capture.path)}.rrd", content
 
 
 def _place(path: str) -> str:

@@ -11,20 +11,20 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recording_comparison import (
+from pipeline.io.recordings.comparison import (
     entity_of,
     planned,
     table_of,
     write_comparison_recording,
 )
-from pipeline.io.recording_ladder import (
+from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
+from pipeline.io.recordings.ladder import (
     common_reach,
     error_scale,
     shown_signals,
     write_ladder_recording,
 )
-from pipeline.io.recording_ladder_sheet import added, rung_markdown
-from pipeline.io.recording_map import CELL, diverging, map_labels, map_picture
+from pipeline.io.recordings.ladder_page import added, rung_markdown
 from pipeline.records.comparison import Comparison, SignalError, Trace
 from tests.unit.ladders import make_diagnosis, make_map
 

@@ -7,19 +7,29 @@ its sides; the numbers themselves go beside it as a tensor.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.io.recordings.font import drawable
+from pipeline.io.recordings.stream import tensor
 from pipeline.physics.notation import scale_for
 from pipeline.records.error_map import Bins, ErrorMap
 
-CELL, BAR_GAP, BAR_WIDTH = 24, 36, 24
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+    from rerun.blueprint import Spatial2DView
+
+CELL = 8
+BAR_GAP, BAR_WIDTH = 1.5 * CELL, CELL
 TICKS = 4
 _COLD = np.array([33.0, 102.0, 172.0])
 _WARM = np.array([178.0, 24.0, 43.0])
 _NEUTRAL = 247.0
 _HATCH = ((74, 74, 74), (58, 58, 58))
+_GREY = (140, 140, 140)
+PARTS = ("picture", "bar", "axes", "frame")
 Image = NDArray[np.uint8]
 
 
@@ -66,14 +76,15 @@ def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
     width, height = CELL * one.x.count, CELL * one.y.count
     bar = width + BAR_GAP + BAR_WIDTH / 2
     scale = scale_for(reach, one.unit)
-    places = [(CELL * place, height + 16.0) for place, _ in _ticks(one.x)]
+    places = [(CELL * place, height + 0.7 * CELL) for place, _ in _ticks(one.x)]
     texts = [text for _, text in _ticks(one.x)]
-    places += [(-26.0, height - CELL * place) for place, _ in _ticks(one.y)]
+    places += [(-1.1 * CELL, height - CELL * place) for place, _ in _ticks(one.y)]
     texts += [text for _, text in _ticks(one.y)]
-    places += [(width / 2, height + 46.0), (0.0, -18.0), (bar, -18.0)]
+    places += [(width / 2, height + 1.9 * CELL), (0.0, -0.75 * CELL), (bar, -0.75 * CELL)]
     texts += [words[0], words[1], scale.unit or "1"]
     full = f"{scale.shown(reach):.3g}"
-    places += [(bar + 42.0, 8.0), (bar + 42.0, height / 2), (bar + 42.0, height - 8.0)]
+    beside = bar + 1.75 * CELL
+    places += [(beside, CELL / 3), (beside, height / 2), (beside, height - CELL / 3)]
     texts += [f"+{full}", "0", f"-{full}"]
     return Labels(np.array(places), tuple(texts))
 
@@ -87,3 +98,67 @@ def _ticks(bins: Bins) -> list[tuple[float, str]]:
     numbers = np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
     each = (high - low) / bins.count
     return [((n - low) / each, f"{n:.6g}" if abs(n) > 1e-9 * step else "0") for n in numbers]
+
+
+def send_map(
+    stream: RecordingStream,
+    entity: str,
+    one: ErrorMap,
+    reach: float,
+    at: tuple[str, int] | None = None,
+) -> None:
+    """The picture of a map and its values [unit]; `at` is a timeline and a place on it."""
+    import rerun as rr
+
+    picture = map_picture(one, reach)
+    if at is None:
+        stream.log(f"{entity}/picture", rr.Image(picture), static=True)
+        stream.log(f"{entity}/values", rr.Tensor(one.mean), static=True)
+        return
+    index = [rr.TimeColumn(at[0], sequence=[at[1]])]
+    shape = rr.encodings.ImageFormat(
+        width=picture.shape[1], height=picture.shape[0], color_model="RGB", channel_datatype="U8"
+    )
+    columns = rr.Image.columns(buffer=[picture.tobytes()], format=[shape])
+    rr.send_columns(f"{entity}/picture", indexes=index, columns=columns, recording=stream)
+    values = rr.Tensor.columns(data=tensor(one.mean))
+    rr.send_columns(f"{entity}/values", indexes=index, columns=values, recording=stream)
+
+
+def send_frame(
+    stream: RecordingStream, entity: str, one: ErrorMap, reach: float, words: tuple[str, str]
+) -> None:
+    """Ticks, words, colour bar and border of a map; they stand at every time."""
+    import rerun as rr
+
+    labels = map_labels(one, reach, words)
+    points = rr.Points2D(
+        labels.places,
+        labels=[drawable(text) for text in labels.texts],
+        show_labels=True,
+        radii=0.01,
+        colors=_GREY,
+    )
+    stream.log(f"{entity}/axes", points, static=True)
+    rows, columns = one.mean.shape
+    border = np.array([[0, 0], [columns, 0], [columns, rows], [0, rows], [0, 0]]) * CELL
+    stream.log(f"{entity}/frame", rr.LineStrips2D([border], colors=_GREY, radii=0.17), static=True)
+    place = rr.Transform3D(translation=[columns * CELL + BAR_GAP, 0.0, 0.0])
+    stream.log(f"{entity}/bar", place, rr.Image(bar_picture(rows)), static=True)
+
+
+def map_view(entity: str, one: ErrorMap, name: str) -> Spatial2DView:
+    """The view of a map with room for its labels."""
+    import rerun.blueprint as rrb
+
+    rows, columns = one.mean.shape
+    bounds: Any = rrb.VisualBounds2D(
+        x_range=(-3.0 * CELL, CELL * columns + BAR_GAP + BAR_WIDTH + 3.8 * CELL),
+        y_range=(-1.9 * CELL, CELL * rows + 2.9 * CELL),
+    )
+    return rrb.Spatial2DView(
+        origin=entity,
+        contents=[f"{entity}/{part}" for part in PARTS],
+        name=drawable(name),
+        visual_bounds=bounds,
+    )

@@ -5,62 +5,72 @@ A recording holds, on the timeline `t` (duration), for every capture that was si
     /CAPTURE/equation/SIGNAL  `measured`, `model`, `residual`: the model from the measured state
     /CAPTURE/free_run/SIGNAL  the same of the model on its own, from each window's start
     /sheet                    every error beside its noise floor, as a markdown page
-
-Two files of equal input differ in the ids that Rerun draws, so compare their content.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import polars as pl
 
-from pipeline.io.publish import canonical_json, write_whole
-from pipeline.io.recording import APPLICATION, FLUSH_S, TIME, send_trace, timed
-from pipeline.io.recording import Trace as Table
-from pipeline.io.recording_layout import AIR, MEASURED, MODEL, RESIDUAL, Line, ViewPlan, named
-from pipeline.io.recording_sheet import plain
+from pipeline.io.publish import canonical_json
+from pipeline.io.recordings.datasheet_page import plain
+from pipeline.io.recordings.seal import write_sealed
+from pipeline.io.recordings.stream import (
+    TIME,
+    recording,
+    send_page,
+    send_property,
+    send_trace,
+    timed,
+)
+from pipeline.io.recordings.stream import Trace as Table
+from pipeline.io.recordings.views import (
+    AIR,
+    MEASURED,
+    MODEL,
+    RESIDUAL,
+    WIDE,
+    Line,
+    ViewPlan,
+    named,
+    page_view,
+    stacked,
+    workspace,
+)
+from pipeline.numerics.thinning import line_points
 from pipeline.physics.notation import quantity, significant
 from pipeline.records.comparison import Comparison, Trace
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
 
+MOST_POINTS = 4000
 _KINDS = {"equation": "from the measured state", "free_run": "on its own"}
 
 
 def write_comparison_recording(result: Comparison, path: Path) -> None:
     """Writes one motor's comparison as .rrd; MachineError where the disk refuses."""
-    write_whole(path, comparison_bytes(result))
+    write_sealed(path, comparison_bytes(result))
 
 
 def comparison_bytes(result: Comparison) -> bytes:
     """The .rrd of one comparison, made in memory."""
-    import rerun as rr
-
-    rr.set_strict_mode(True)
-    digest = hashlib.sha256(canonical_json(result.document())).hexdigest()[:32]
-    stream = rr.RecordingStream(APPLICATION, recording_id=digest, send_properties=False)
-    memory = stream.memory_recording()
-    stream.send_blueprint(_layout(result), make_active=False, make_default=True)
-    for trace in result.traces:
-        send_trace(stream, table_of(trace))
-    page = rr.TextDocument(_sheet(result), media_type=rr.MediaType.MARKDOWN)
-    stream.log("/sheet", page, static=True)
-    stated: dict[str, Any] = {
-        "motor_id": result.motor_id,
-        "model": result.name,
-        "effects": list(result.effects),
-        "held_out": result.held_out,
-    }
-    stream.send_property("comparison", rr.AnyValues(**stated))
-    stream.flush(timeout_sec=FLUSH_S)
-    content: bytes = memory.drain_as_bytes()
-    return content
+    identity = canonical_json(result.document()).decode()
+    with recording(f"{result.motor_id} comparison", (identity,), _layout(result)) as made:
+        for trace in result.traces:
+            send_trace(made.stream, table_of(trace))
+        send_page(made.stream, "/sheet", _sheet(result))
+        stated = {
+            "motor_id": result.motor_id,
+            "model": result.name,
+            "effects": list(result.effects),
+            "held_out": result.held_out,
+        }
+        send_property(made.stream, "comparison", stated)
+    return made.content
 
 
 def entity_of(trace: Trace) -> str:
@@ -70,14 +80,18 @@ def entity_of(trace: Trace) -> str:
 
 
 def table_of(trace: Trace) -> Table:
-    """A trace as columns of float32."""
+    """A trace as columns of float32; of a long one the rows that a screen could tell apart.
+
+    Every stretch keeps the extremes of what was measured, of the model and of the residual.
+    """
     columns = {
         "measured": trace.measured,
         "model": trace.model,
         "residual": trace.measured - trace.model,
     }
-    frame = pl.DataFrame({name: column.astype(np.float32) for name, column in columns.items()})
-    return timed(entity_of(trace), trace.t_s, frame)
+    kept = np.unique(np.concatenate([line_points(c, MOST_POINTS) for c in columns.values()]))
+    frame = pl.DataFrame({name: c[kept].astype(np.float32) for name, c in columns.items()})
+    return timed(entity_of(trace), trace.t_s[kept], frame)
 
 
 def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
@@ -89,7 +103,7 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         entity = entity_of(trace)
         words = f"{named(trace.signal)}, model {_KINDS[trace.kind]}"
         lines = (
-            Line(entity, "measured", "measured", MEASURED),
+            Line(entity, "measured", "measured", MEASURED, WIDE),
             Line(entity, "model", "model", MODEL),
         )
         plans.append(ViewPlan(words, lines, 2.0))
@@ -104,8 +118,6 @@ def _layout(result: Comparison) -> Blueprint:
     """A tab a capture, equations at the left, free runs at the right; errors in the last tab."""
     import rerun.blueprint as rrb
 
-    from pipeline.io.recording_layout import time_view
-
     tabs: list[Any] = []
     for capture in dict.fromkeys(trace.capture for trace in result.traces):
         plans = planned(result, capture)
@@ -113,17 +125,10 @@ def _layout(result: Comparison) -> Blueprint:
         for kind in _KINDS:
             mine = [p for p in plans if f"/{kind}/" in p.lines[0].entity]
             if mine:
-                shares: Sequence[float] = [p.share for p in mine]
-                sides.append(rrb.Vertical(*map(time_view, mine), row_shares=list(shares)))
+                sides.append(stacked(mine))
         tabs.append(rrb.Horizontal(*sides, name=capture.rsplit("/", 1)[-1]))
-    tabs.append(rrb.TextDocumentView(origin="/sheet", name="All errors"))
-    return rrb.Blueprint(
-        rrb.Tabs(*tabs, active_tab=0),
-        rrb.TimePanel(state="collapsed", timeline=TIME),
-        auto_views=False,
-        auto_layout=False,
-        collapse_panels=True,
-    )
+    tabs.append(page_view("/sheet", "All errors"))
+    return workspace(*tabs, timeline=TIME)
 
 
 def _sheet(result: Comparison) -> str:

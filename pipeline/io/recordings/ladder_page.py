@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.io.recording_sheet import plain
+from pipeline.io.recordings.datasheet_page import plain
 from pipeline.physics.notation import MINUS, quantity, reading
 from pipeline.records.diagnosis import Diagnosis
 

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import socket
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recording import capture_traces, fit_traces, recording_id, write_recording
-from pipeline.io.recording_layout import planned_views
-from pipeline.io.recording_sheet import sheet_markdown
+from pipeline.io.recordings.capture import (
+    capture_traces,
+    fit_traces,
+    own_evidence,
+    recording_id,
+    write_recording,
+)
+from pipeline.io.recordings.capture_views import further_views, loupe_views, main_views
+from pipeline.io.recordings.datasheet_page import sheet_markdown
+from pipeline.io.recordings.seal import seal_of, verify
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.datasheet import Check, Datasheet
 from pipeline.records.errors import MachineError
@@ -117,19 +117,24 @@ def test_residual_is_measured_less_fitted_and_only_this_captures_fits_are_there(
         back["residual"].to_numpy(), (series.measured - series.fitted).astype(np.float32)
     )
     np.testing.assert_array_equal(back["fitted"].to_numpy(), series.fitted.astype(np.float32))
-    entities = {
-        trace.trace.entity for trace in fit_traces(make_capture(), make_evidence(make_capture()))
-    }
-    assert entities == {"/model/step/0_0"}
+    own = own_evidence(make_capture(), make_evidence(make_capture()))
+    assert {trace.trace.entity for trace in fit_traces(own)} == {"/model/step/0_0"}
 
 
 def test_findings_stand_at_their_first_row_and_no_wall_clock_is_written(recording: Path) -> None:
     from rerun.chunk import RrdReader
 
     back = read_back(recording, "/findings")
-    assert back["t"].to_physical().to_list() == [250_000_000, 270_000_000]
-    assert back["TextLog:level"].to_list() == ["ERROR", "WARN"]
-    assert back["TextLog:text"][1].startswith("rows 400-412: 12 samples are missing")
+    told = dict(zip(back["TextLog:level"], back["t"].to_physical(), strict=True))
+    assert {level: told[level] for level in ("ERROR", "WARN")} == {
+        "ERROR": 250_000_000,
+        "WARN": 270_000_000,
+    }
+    (gap,) = [text for text in back["TextLog:text"] if "missing" in text]
+    assert gap.startswith("rows 400–412: 12 samples are missing")
+    series = make_evidence(make_capture())[0].series[0]
+    worst = int(np.argmax(np.abs(series.measured - series.fitted)))
+    assert told["INFO"] == round(float(series.x[worst]) * 1e9)
     names = {
         name
         for chunk in RrdReader(str(recording)).stream()
@@ -153,16 +158,21 @@ def test_equal_work_has_an_equal_id_and_equal_content(recording: Path, tmp_path:
 
 def test_every_planned_curve_exists_in_the_data_and_every_column_is_planned() -> None:
     capture = make_capture()
-    traces, fits = list(capture_traces(capture)), list(fit_traces(capture, make_evidence(capture)))
+    traces = list(capture_traces(capture))
+    fits = list(fit_traces(own_evidence(capture, make_evidence(capture))))
     held = {(t.entity, name) for t in [*traces, *(f.trace for f in fits)] for name in t.columns}
-    views = planned_views(traces, fits)
-    drawn = {(line.entity, line.component) for view in views for line in view.lines}
+    main, further = main_views(traces, fits), further_views(traces, fits)
+    drawn = {(line.entity, line.component) for view in (*main, *further) for line in view.lines}
     assert drawn <= held
     assert held - drawn == {("/model/step/0_0", "measured")}
-    assert [line.name for line in views[0].lines] == ["measured", "model"]
+    assert [line.name for line in main[0].lines] == ["measured", "model"]
     residual = fits[0].trace.frame["residual"].to_numpy()
-    assert views[1].reach is not None
-    assert views[1].reach > np.abs(residual).max()
+    assert main[1].reach is not None
+    assert main[1].reach > np.abs(residual).max()
+    assert main[1].reach >= 0.01 * np.abs(capture.tables[0]["ia_a"].to_numpy()).max()
+    both, left = loupe_views(fits)
+    assert both.around_s == left.around_s == pytest.approx(0.005)
+    assert {(line.entity, line.component) for line in (*both.lines, *left.lines)} <= held
 
 
 def test_a_table_without_time_goes_by_row(tmp_path: Path) -> None:
@@ -180,6 +190,7 @@ def test_an_empty_capture_still_makes_a_recording(tmp_path: Path) -> None:
     capture = Capture("e.csv", "ef" * 32, "verified", CaptureMeta("m", "drive"), ())
     write_recording(capture, (), tmp_path / "e.rrd", make_sheet(), FINDINGS)
     assert read_back(tmp_path / "e.rrd", "/findings").height == 2
+    verify(tmp_path / "e.rrd")
 
 
 def test_a_refusing_disk_is_a_machine_error_and_leaves_nothing(tmp_path: Path) -> None:
@@ -204,72 +215,14 @@ def test_a_disk_that_fills_up_is_a_machine_error_and_leaves_nothing(tmp_path: Pa
 
 
 def test_no_temporary_file_is_left(recording: Path) -> None:
-    assert [p.name for p in recording.parent.iterdir()] == ["step.rrd"]
+    assert sorted(p.name for p in recording.parent.iterdir()) == ["step.rrd", "step.rrd.sha256"]
+    assert seal_of(recording).read_text().endswith("  step.rrd\n")
 
 
 def test_the_sheet_escapes_what_markdown_would_read() -> None:
     text = sheet_markdown(make_sheet(), PATH)
     assert text.startswith("# a\\|b \\*x\\*: provisional\n")
-    assert "| kt\\_vs\\_ke | fail | x \\| y; suspect: 2/sqrt\\(3\\) |" in text
+    row = "| ✗ fail | kt\\_vs\\_ke | 1.150 | 0.01000 | x \\| y; suspect: 2/sqrt\\(3\\) |"
+    assert row in text
     assert "| r\\_phase\\_ohm | 310.00 ± 0.80 mΩ | step |" in text
     assert text.index("Constants from this capture") < text.index("## Checks")
-
-
-VULKAN = Path("/usr/share/vulkan/icd.d")
-
-
-@pytest.fixture
-def viewer(recording: Path, tmp_path: Path) -> Iterator[str]:
-    """A headless viewer on the recording; its address."""
-    command = shutil.which("rerun", path=f"{Path(sys.executable).parent}{os.pathsep}{os.defpath}")
-    if command is None or not VULKAN.is_dir() or not any(VULKAN.glob("lvp*")):
-        pytest.skip("the viewer needs a software Vulkan driver (mesa-vulkan-drivers)")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    home = {**os.environ, "HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path)}
-    subprocess.run([command, "analytics", "disable"], env=home, check=False, capture_output=True)
-    place = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000"]
-    process = subprocess.Popen(
-        [command, *place, str(recording)],
-        env=home,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    try:
-        yield f"rerun+http://127.0.0.1:{port}/proxy"
-    finally:
-        os.killpg(process.pid, 15)
-        process.wait(timeout=10)
-
-
-@pytest.mark.slow
-def test_the_viewer_draws_the_recording_without_a_complaint(viewer: str) -> None:
-    from rerun.experimental import ViewerClient
-
-    deadline = time.monotonic() + 40
-    client, frames = None, [b"", b"x"]
-    while time.monotonic() < deadline and frames[-1] != frames[-2]:
-        try:
-            client = client or ViewerClient.connect(viewer)
-            if client.get_state().views:
-                frames.append(client.take_screenshot())
-        except (RuntimeError, ConnectionError):
-            client = None
-        time.sleep(0.5)
-    assert client is not None
-    state = client.get_state()
-    assert [report for view in state.views for report in view.reports] == []
-    assert {view.name for view in state.views} >= {"Step: ia [A]", "ia [A], measured − model"}
-    assert _has_colour(frames[-1], (255, 143, 0))
-    assert _has_colour(frames[-1], (229, 57, 53))
-
-
-def _has_colour(png: bytes, colour: tuple[int, int, int]) -> bool:
-    import io
-
-    pillow = pytest.importorskip("PIL.Image")
-    pixels = np.asarray(pillow.open(io.BytesIO(png)).convert("RGB")).astype(int)
-    near = np.abs(pixels - np.array(colour)).max(axis=2) < 12
-    return int(near.sum()) > 200

@@ -1,0 +1,230 @@
+"""One capture as a Rerun recording: its traces, what a model makes of them, what was found wrong.
+
+A recording holds the entities
+
+    /measured, /measured_1  every table of the capture, one component a column, float32
+    /model/ESTIMATOR/N      `measured`, `fitted`, `residual` of each series fitted to this capture
+    /maps/SIGNAL            residual over speed and current: `picture`, `values`; `axes`, `bar`
+    /angle/SIGNAL           residual over one turn; /orders/SIGNAL its amplitudes by order
+    /lanes/regime, rows     what the machine did; rows that a gate set aside
+    /findings               one text log line a finding, rows set aside, residual; at its row
+    /datasheet              the motor's constants as a markdown page
+
+on the timeline `t` (duration) or, for a table without `t_s`, `row`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from pipeline.io.recordings.capture_lanes import lines_of, send_lanes, send_lines
+from pipeline.io.recordings.capture_maps import (
+    ResidualMaps,
+    angle_of,
+    residual_maps,
+    signal_floor,
+)
+from pipeline.io.recordings.datasheet_page import sheet_markdown
+from pipeline.io.recordings.error_map import send_frame, send_map
+from pipeline.io.recordings.seal import write_sealed
+from pipeline.io.recordings.stream import (
+    ROW,
+    Trace,
+    digest,
+    recording,
+    send_axis_ends,
+    send_bars,
+    send_page,
+    send_property,
+    send_trace,
+    timed,
+)
+from pipeline.physics.notation import scale_for
+from pipeline.records.capture import Capture
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.evidence import Evidence
+from pipeline.records.finding import Finding
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
+MOST_MAPS = 2
+MAP_WORDS = ("speed [rad/s]", "iq [A]")
+
+
+@dataclass(frozen=True, slots=True)
+class FitTrace:
+    """One fitted series: the quantity `y_name`, and its trace of measured, fitted, residual.
+
+    `reach` is the largest residual, `floor` 1 % of the largest measured value [unit].
+    """
+
+    title: str
+    label: str
+    y_name: str
+    trace: Trace
+    reach: float
+    floor: float
+
+
+def write_recording(
+    capture: Capture,
+    evidence: Sequence[Evidence],
+    path: Path,
+    datasheet: Datasheet | None = None,
+    findings: Sequence[Finding] = (),
+) -> None:
+    """Writes one capture's .rrd, whole or not at all, with the layout that shows it.
+
+    `evidence` may be of the whole campaign; what was fitted to other captures is left out.
+    Raises MachineError where the disk refuses.
+    """
+    write_sealed(path, recording_bytes(capture, evidence, datasheet, findings))
+
+
+def recording_bytes(
+    capture: Capture,
+    evidence: Sequence[Evidence],
+    datasheet: Datasheet | None = None,
+    findings: Sequence[Finding] = (),
+) -> bytes:
+    """One capture's .rrd, footer included."""
+    from pipeline.io.recordings.capture_views import Shown, capture_layout
+
+    own = own_evidence(capture, evidence)
+    traces, fits = list(capture_traces(capture)), list(fit_traces(own))
+    told = (residual_maps(capture, one) for one in first_of_each(own))
+    maps = tuple(islice((one for one in told if one is not None), MOST_MAPS))
+    name = f"{capture.meta.motor_id} {PurePosixPath(capture.path).stem}"
+    shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None)
+    with recording(name, identity(capture, datasheet), capture_layout(shown)) as made:
+        for trace in (*traces, *(fit.trace for fit in fits)):
+            send_trace(made.stream, trace)
+        for one in maps:
+            _send_maps(made.stream, one)
+        send_lanes(made.stream, capture)
+        send_lines(made.stream, capture, lines_of(capture, own, findings))
+        _send_properties(made.stream, capture)
+        if datasheet is not None:
+            send_page(made.stream, "/datasheet", sheet_markdown(datasheet, capture.path))
+            motor = {"status": datasheet.status, "why": list(datasheet.why)}
+            send_property(made.stream, "motor", motor)
+    return made.content
+
+
+def identity(capture: Capture, datasheet: Datasheet | None) -> tuple[str, str, str]:
+    """What makes the id of a recording: the same work, the same id."""
+    return capture.path, capture.sha256, "" if datasheet is None else datasheet.version
+
+
+def recording_id(capture: Capture, datasheet: Datasheet | None) -> str:
+    """The id of a capture's recording."""
+    return digest(identity(capture, datasheet))
+
+
+def has_lanes(capture: Capture) -> tuple[str, ...]:
+    """Entities of the lanes that this capture has."""
+    from pipeline.io.recordings.capture_lanes import ASIDE, REGIME, capture_regimes, rows_aside
+
+    told = ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture)))
+    return tuple(entity for entity, stretches in told if stretches)
+
+
+def capture_traces(capture: Capture) -> Iterator[Trace]:
+    """Every table of a capture that has rows and columns to show."""
+    for number, table in enumerate(capture.tables):
+        entity = "/measured" if number == 0 else f"/measured_{number}"
+        values = table.drop("t_s", strict=False).select(pl.all().cast(pl.Float32).fill_null(np.nan))
+        if table.height == 0 or values.width == 0:
+            continue
+        if "t_s" in table.columns:
+            yield timed(entity, table["t_s"].to_numpy(), values)
+        else:
+            rows = pl.Series(ROW, np.arange(table.height, dtype=np.int64))
+            yield Trace(entity, ROW, values.insert_column(0, rows))
+
+
+def own_evidence(capture: Capture, evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
+    """What was fitted to this capture over time."""
+    return tuple(
+        one
+        for one in evidence
+        if one.capture == capture.path
+        and one.x_name == "t_s"
+        and any(series.fitted.size and series.x.size for series in one.series)
+    )
+
+
+def first_of_each(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
+    """The first evidence of each quantity that has a single series."""
+    first: dict[str, Evidence] = {}
+    for one in evidence:
+        if len(one.series) == 1:
+            first.setdefault(one.y_name, one)
+    return tuple(first.values())
+
+
+def fit_traces(evidence: Sequence[Evidence]) -> Iterator[FitTrace]:
+    """The series of a capture's own evidence."""
+    for number, one in enumerate(evidence):
+        for place, series in enumerate(one.series):
+            if series.fitted.size == 0 or series.x.size == 0:
+                continue
+            with np.errstate(invalid="ignore"):
+                residual = series.measured - series.fitted
+            columns = {"measured": series.measured, "fitted": series.fitted, "residual": residual}
+            frame = pl.DataFrame({k: v.astype(np.float32) for k, v in columns.items()})
+            trace = timed(f"/model/{one.estimator}/{number}_{place}", series.x, frame)
+            finite = np.abs(residual[np.isfinite(residual)])
+            reach, floor = float(finite.max(initial=0.0)), signal_floor(series.measured)
+            yield FitTrace(one.title, series.label, one.y_name, trace, reach, floor)
+
+
+def _send_maps(stream: RecordingStream, maps: ResidualMaps) -> None:
+    from pipeline.io.recordings.views import MODEL, RESIDUAL
+
+    if maps.flat is not None:
+        send_map(stream, f"/maps/{maps.signal}", maps.flat, maps.reach)
+        send_frame(stream, f"/maps/{maps.signal}", maps.flat, maps.reach, MAP_WORDS)
+    if maps.turn is None:
+        return
+    scale = scale_for(max(maps.turn.reach, maps.floor), maps.unit)
+    edges = np.degrees(np.array(maps.turn.x.edges))
+    shown = np.nan_to_num(maps.turn.mean) / 10.0**scale.exponent
+    width = float(edges[1] - edges[0])
+    send_bars(stream, f"/angle/{maps.signal}", shown, edges[:-1], width, RESIDUAL)
+    most = scale.shown(max(maps.turn.reach, maps.floor))
+    send_axis_ends(stream, f"/angle_axis/{maps.signal}", (most, -most), edges[-1])
+    if maps.orders.size:
+        places = np.arange(1.0, maps.orders.size + 1.0) - 0.4
+        amplitudes = maps.orders / 10.0**scale.exponent
+        send_bars(stream, f"/orders/{maps.signal}", amplitudes, places, 0.8, MODEL)
+        send_axis_ends(stream, f"/orders_axis/{maps.signal}", (most,), places[-1] + 1.0)
+
+
+def angle_words(signal: str) -> str:
+    """Which turn a signal's residual is drawn over."""
+    return "mechanical" if angle_of(signal) == "theta_mech_rad" else "electrical"
+
+
+def _send_properties(stream: RecordingStream, capture: Capture) -> None:
+    meta = capture.meta
+    stated = {
+        "motor_id": meta.motor_id,
+        "motor_type": meta.motor_type,
+        "lot": meta.lot,
+        "station": meta.station,
+        "test": meta.test,
+        "started_at": meta.started_at,
+        "file": capture.path,
+        "sha256": capture.sha256,
+        "integrity": capture.integrity,
+    }
+    send_property(stream, "capture", stated)

@@ -1,0 +1,271 @@
+"""How the recording of one capture is laid out: traces, maps, all signals, the datasheet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pipeline.io.recordings.capture import FitTrace, angle_words
+from pipeline.io.recordings.capture_maps import ResidualMaps
+from pipeline.io.recordings.error_map import map_view
+from pipeline.io.recordings.stream import TIME, Trace
+from pipeline.io.recordings.views import (
+    AIR,
+    MEASURED,
+    MODEL,
+    PALETTE,
+    RESIDUAL,
+    WIDE,
+    Line,
+    ViewPlan,
+    bar_view,
+    findings_view,
+    named,
+    page_view,
+    stacked,
+    stem_of,
+    time_view,
+    unit_of,
+    workspace,
+)
+from pipeline.physics.notation import quantity, scale_for
+
+if TYPE_CHECKING:
+    from rerun.blueprint import Blueprint
+
+MOST_FITS, MOST_GROUPS = 2, 2
+LOUPE_SHARE = 100.0
+MOST_UNITS, HELD_SHARE = 12, 0.1
+FIRST_UNITS = ("rad/s", "A", "V", "N·m")
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a recording of one capture holds, for its layout."""
+
+    traces: Sequence[Trace]
+    fits: Sequence[FitTrace]
+    maps: Sequence[ResidualMaps]
+    lanes: tuple[str, ...]
+    datasheet: bool
+
+
+def capture_layout(shown: Shown) -> Blueprint:
+    """Tabs: traces with loupe, lanes and findings; maps; all signals; datasheet and samples."""
+    tabs = [_traces_tab(shown)]
+    if shown.maps:
+        tabs.append(_maps_tab(shown.maps))
+    further = further_views(shown.traces, shown.fits)
+    if further:
+        tabs.append(stacked(further, name=f"{len(tabs) + 1} · Further signals"))
+    tabs.append(_sheet_tab(shown, f"{len(tabs) + 1} · Datasheet & samples"))
+    return workspace(*tabs, timeline=shown.traces[0].index if shown.traces else None)
+
+
+def main_views(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
+    """The first fitted quantities with their residuals, then speed, currents and the like."""
+    return _views(traces, fits, MOST_FITS, MOST_GROUPS)
+
+
+def further_views(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
+    """Every fitted quantity and every column that the main views leave out."""
+    main = main_views(traces, fits)
+    every = _views(traces, fits, len(fits), MOST_UNITS)
+    return tuple(plan for plan in every if plan not in main)
+
+
+def loupe_views(fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
+    """Measured over model, and what is left, close to the cursor."""
+    timed = [fit for fit in fits if fit.trace.index == TIME]
+    if not timed:
+        return ()
+    span_s = max(_span_s(fit.trace) for fit in timed)
+    around_s = _round_s(span_s / LOUPE_SHARE)
+    first = timed[0].y_name
+    own = [fit for fit in timed if fit.y_name == first and fit.title == timed[0].title]
+    words = f"Loupe ±{quantity(around_s, 's', 2)} at the cursor"
+    both = [
+        Line(f.trace.entity, component, f"{word}{_after(f, own)}", colour, width)
+        for f in own
+        for component, word, colour, width in (
+            ("measured", "measured", MEASURED, WIDE),
+            ("fitted", "model", MODEL, 1.4),
+        )
+    ]
+    residual = _residual_view(first, own)
+    return (
+        ViewPlan(f"{words}: {named(first)}", tuple(both), 1.5, None, around_s),
+        ViewPlan(f"{words}: {residual.name}", residual.lines, 1.0, residual.reach, around_s),
+    )
+
+
+def _views(
+    traces: Sequence[Trace], fits: Sequence[FitTrace], most_fits: int, most_groups: int
+) -> tuple[ViewPlan, ...]:
+    views = []
+    quantities = list(dict.fromkeys(fit.y_name for fit in fits))[:most_fits]
+    for y_name in quantities:
+        title = next(fit.title for fit in fits if fit.y_name == y_name)
+        own = [fit for fit in fits if (fit.title, fit.y_name) == (title, y_name)]
+        views += [_fit_view(title, y_name, own, traces), _residual_view(y_name, own)]
+    groups = _by_unit(traces, set(quantities))
+    chosen = list(groups.items())[:most_groups]
+    views += [_group_view(unit, columns, traces) for unit, columns in chosen]
+    return tuple(views)
+
+
+def _fit_view(
+    title: str, y_name: str, fits: Sequence[FitTrace], traces: Sequence[Trace]
+) -> ViewPlan:
+    """Measured under model; the measured trace is the whole column where the capture has it."""
+    home = next((trace for trace in traces if y_name in trace.columns), None)
+    if home is None:
+        measured = [
+            Line(f.trace.entity, "measured", f"measured{_after(f, fits)}", MEASURED, WIDE)
+            for f in fits
+        ]
+    else:
+        measured = [Line(home.entity, y_name, "measured", MEASURED, WIDE)]
+    models = [Line(f.trace.entity, "fitted", f"model{_after(f, fits)}", MODEL) for f in fits]
+    return ViewPlan(f"{title}: {named(y_name)}", (*measured, *models), 3.0)
+
+
+def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
+    """What is left over, on an axis that is symmetric, stays so, and never magnifies noise."""
+    reach = max(*(AIR * fit.reach for fit in fits), *(fit.floor for fit in fits))
+    lines = [
+        Line(f.trace.entity, "residual", f"measured − model{_after(f, fits)}", RESIDUAL)
+        for f in fits
+    ]
+    around = quantity(reach, unit_of(y_name), 2)
+    return ViewPlan(f"{named(y_name)}, measured − model (±{around})", tuple(lines), 1.8, reach)
+
+
+def _after(fit: FitTrace, fits: Sequence[FitTrace]) -> str:
+    return f" {fit.label}" if fit.label and len(fits) > 1 else ""
+
+
+def _group_view(unit: str, columns: Sequence[tuple[str, str]], traces: Sequence[Trace]) -> ViewPlan:
+    lines = [
+        Line(entity, column, stem_of(column), PALETTE[place % len(PALETTE)])
+        for place, (entity, column) in enumerate(columns)
+    ]
+    names = ", ".join(line.name for line in lines)
+    return ViewPlan(f"{names} [{unit}]", tuple(lines), 2.0, span=_held(columns, traces))
+
+
+def _held(
+    columns: Sequence[tuple[str, str]], traces: Sequence[Trace]
+) -> tuple[float, float] | None:
+    """An axis around a value that is all but held, so that its noise does not fill the view."""
+    frames = {trace.entity: trace.frame for trace in traces}
+    lows, highs = [], []
+    for entity, column in columns:
+        values = frames[entity][column].drop_nans()
+        if values.len():
+            lows.append(float(values.min()))  # type: ignore[arg-type]
+            highs.append(float(values.max()))  # type: ignore[arg-type]
+    if not lows:
+        return None
+    low, high = min(lows), max(highs)
+    most = max(abs(low), abs(high))
+    if high - low >= HELD_SHARE * most:
+        return None
+    middle = 0.5 * (low + high)
+    return middle - 0.5 * HELD_SHARE * most, middle + 0.5 * HELD_SHARE * most
+
+
+def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[str, str]]]:
+    """(entity, column) by unit, speed and currents first; quantities shown above left out."""
+    groups: dict[str, list[tuple[str, str]]] = {unit: [] for unit in FIRST_UNITS}
+    for trace in traces:
+        for column in trace.columns:
+            if column not in fitted:
+                groups.setdefault(unit_of(column), []).append((trace.entity, column))
+    return {unit: columns for unit, columns in groups.items() if columns}
+
+
+def _traces_tab(shown: Shown) -> Any:
+    import rerun.blueprint as rrb
+
+    plans = main_views(shown.traces, shown.fits)
+    rows: list[Any] = [time_view(plan) for plan in plans]
+    shares = [plan.share for plan in plans]
+    if shown.lanes:
+        lanes = rrb.StateTimelineView(
+            origin="/lanes",
+            contents=list(shown.lanes),
+            name="Regime, and rows that gates set aside"
+            if len(shown.lanes) > 1
+            else "Regime"
+            if shown.lanes[0].endswith("regime")
+            else "Rows that gates set aside",
+            time_view=rrb.archetypes.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        )
+        rows.append(lanes)
+        shares.append(2.0)
+    side: list[Any] = [time_view(plan) for plan in loupe_views(shown.fits)]
+    side_shares = [plan.share for plan in loupe_views(shown.fits)]
+    side.append(findings_view("/findings", "Findings of this capture, at their rows"))
+    left = rrb.Vertical(*rows, row_shares=shares or None)
+    right = rrb.Vertical(*side, row_shares=[*side_shares, 1.0])
+    return rrb.Horizontal(left, right, column_shares=[1.7, 1.0], name="1 · Traces")
+
+
+def _maps_tab(maps: Sequence[ResidualMaps]) -> Any:
+    import rerun.blueprint as rrb
+
+    rows = []
+    for one in maps:
+        scale = scale_for(one.reach, one.unit)
+        colour = f"full colour ±{scale.shown(one.reach):.3g} {scale.unit}"
+        views: list[Any] = []
+        if one.flat is not None:
+            name = f"{stem_of(one.signal)} residual over speed and current, {colour}"
+            values = rrb.TensorView(
+                origin=f"/maps/{one.signal}/values",
+                name=f"values [{unit_of(one.signal)}]",
+            )
+            picture = map_view(f"/maps/{one.signal}", one.flat, name)
+            views.append(rrb.Tabs(picture, values, active_tab=0))
+        if one.turn is not None:
+            unit = scale_for(max(one.turn.reach, one.floor), one.unit).unit or "1"
+            turn = f"residual [{unit}] over {angle_words(one.signal)} angle [°]"
+            views.append(bar_view(turn, f"/angle/{one.signal}", f"/angle_axis/{one.signal}"))
+            if one.orders.size:
+                orders = f"its amplitude [{unit}] by {angle_words(one.signal)} order"
+                axis = f"/orders_axis/{one.signal}"
+                views.append(bar_view(orders, f"/orders/{one.signal}", axis))
+        rows.append(rrb.Horizontal(*views, column_shares=[1.5, 1.0, 0.8][: len(views)]))
+    return rrb.Vertical(*rows, name="2 · Residual maps")
+
+
+def _sheet_tab(shown: Shown, name: str) -> Any:
+    import rerun.blueprint as rrb
+
+    views: list[Any] = [page_view("/datasheet", "Datasheet")] if shown.datasheet else []
+    if shown.traces:
+        first = shown.traces[0]
+        views.append(
+            rrb.DataframeView(
+                origin=first.entity,
+                name="Samples",
+                query=rrb.archetypes.DataframeQuery(timeline=first.index),
+            )
+        )
+    return rrb.Horizontal(*views, name=name)
+
+
+def _span_s(trace: Trace) -> float:
+    index = trace.frame[TIME].cast(int)
+    return float(index[-1] - index[0]) * 1e-9 if index.len() else 0.0
+
+
+def _round_s(around_s: float) -> float:
+    """The next 1, 2 or 5 times a power of ten."""
+    if around_s <= 0.0:
+        return 1e-3
+    decade = 10.0 ** math.floor(math.log10(around_s))
+    return next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= around_s)

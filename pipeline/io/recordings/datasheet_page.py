@@ -1,0 +1,77 @@
+"""The datasheet as a markdown page inside a recording."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from pipeline.physics.notation import quantity, reading
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.estimate import Estimate
+
+_MARKS = {"fail": "✗ fail", "marginal": "⚠ marginal", "not_evaluated": "–", "pass": "✓ pass"}
+_SPECIAL = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&])")
+
+
+def sheet_markdown(datasheet: Datasheet, path: str, first: Sequence[str] = ()) -> str:
+    """Status, checks and constants of a motor.
+
+    Those that rest on the capture `path` come first, or those of `first`.
+    """
+    names = sorted(datasheet.constants)
+    own = [name for name in names if path in datasheet.constants[name].captures]
+    heading = "Constants from this capture"
+    if first:
+        own, heading = [name for name in first if name in names], "Key constants"
+    rest = [name for name in names if name not in own]
+    lines = [f"# {plain(datasheet.motor_id)}: {datasheet.status}", ""]
+    lines += [f"- {plain(reason)}" for reason in datasheet.why]
+    if own:
+        lines += ["", f"## {heading}", "", *_table(datasheet, own)]
+    if rest:
+        lines += ["", "## Other constants", "", *_table(datasheet, rest)]
+    lines += ["", "## Checks", "", *_checks(datasheet)]
+    return "\n".join([*lines, "", f"version {datasheet.version}", ""])
+
+
+def checks_markdown(datasheet: Datasheet) -> str:
+    """Every check with its value and limit, and the captures that the datasheet rests on."""
+    lines = [f"# {plain(datasheet.motor_id)}: checks", "", *_checks(datasheet), ""]
+    lines += ["## Captures", "", "| capture | test | integrity |", "| --- | --- | --- |"]
+    lines += [
+        f"| {plain(one.path)} | {plain(one.test)} | {plain(one.integrity)} |"
+        for one in datasheet.captures
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _checks(datasheet: Datasheet) -> list[str]:
+    """The failed ones first."""
+    lines = ["| | check | value | limit | meaning |", "| --- | --- | --- | --- | --- |"]
+    for check in sorted(datasheet.checks, key=lambda c: (list(_MARKS).index(c.status), c.name)):
+        suspect = f"; suspect: {check.suspect}" if check.suspect else ""
+        value = "" if check.value is None else quantity(check.value, check.unit)
+        limit = "" if check.limit is None else quantity(check.limit, check.unit)
+        lines.append(
+            f"| {_MARKS[check.status]} | {plain(check.name)} | {value} | {limit} "
+            f"| {plain(check.meaning + suspect)} |"
+        )
+    return lines
+
+
+def _table(datasheet: Datasheet, names: list[str]) -> list[str]:
+    head = ["| constant | value ± U (k = 2) | method |", "| --- | --- | --- |"]
+    return head + [_line(datasheet.constants[name]) for name in names]
+
+
+def _line(estimate: Estimate) -> str:
+    text = "not identifiable"
+    if estimate.known:
+        text = reading(estimate.number, estimate.u, estimate.unit).text()
+        text += " (at its bound)" if estimate.at_bound else ""
+    return f"| {plain(estimate.name)} | {text} | {plain(estimate.method)} |"
+
+
+def plain(text: str) -> str:
+    """Text that markdown leaves alone, on one line."""
+    return _SPECIAL.sub(r"\\\1", " ".join(text.split()))

@@ -1,0 +1,38 @@
+"""Which characters the viewer can draw: it has one font, and without a window it dies of others.
+
+The ranges were found by showing every character of their blocks to the viewer of the pinned
+version; a test shows them all to it again.
+"""
+
+from __future__ import annotations
+
+# First and last code point of what was seen to be drawn, and all that a unit or a name needs.
+RANGES = (
+    (0x20, 0x7E),
+    (0xA0, 0xAC),
+    (0xAE, 0x148),
+    (0x14A, 0x1C3),
+    (0x1C5, 0x24F),
+    (0x384, 0x38A),
+    (0x38E, 0x3A1),
+    (0x3A3, 0x3E1),
+    (0x3F0, 0x45F),
+    (0x1E00, 0x1EFF),
+    (0x2010, 0x2027),
+    (0x2030, 0x205E),
+    (0x2070, 0x2071),
+    (0x2074, 0x208E),
+    (0x20A0, 0x20BF),
+)
+SINGLE = "→←↑↓√∞≈≠≤≥−∂∆∑±×·✓✔✗⚠●■▲Ω"
+
+
+def drawable(text: str) -> str:
+    """The text with every character that the viewer cannot draw as its code point, ‹1F600›."""
+    return "".join(char if can_draw(char) else f"‹{ord(char):X}›" for char in text)
+
+
+def can_draw(char: str) -> bool:
+    """Whether the viewer's font has a character; line breaks and tabs are layout."""
+    code = ord(char)
+    return char in "\n\t" or char in SINGLE or any(a <= code <= b for a, b in RANGES)

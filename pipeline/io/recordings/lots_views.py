@@ -1,0 +1,124 @@
+"""How the recording of a comparison of lots is laid out: verdict, all distributions, drift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from pipeline.io.recordings.lots import (
+    COLOURS,
+    FILL,
+    PLACE,
+    SIDES,
+    compared,
+    constant_scale,
+    drift,
+    leading_order,
+)
+from pipeline.io.recordings.views import (
+    BASELINE,
+    CANDIDATE,
+    MEASURED,
+    RESIDUAL,
+    WIDE,
+    Line,
+    ViewPlan,
+    bar_view,
+    page_view,
+    stem_of,
+    time_view,
+    workspace,
+)
+from pipeline.records.lot_constant import ConstantResult
+from pipeline.records.lot_regression import LotRegression
+
+if TYPE_CHECKING:
+    from rerun.blueprint import Blueprint
+
+MOST_SHOWN, GRID, PERIODS = 2, 3, 6
+FILL_ALPHA, FILL_WIDTH = 40, 3.0
+
+
+def lots_layout(result: LotRegression) -> Blueprint:
+    """Tabs: verdict with what changed most; all distributions; drift of every constant."""
+    import rerun.blueprint as rrb
+
+    shown = compared(result)
+    tabs: list[Any] = [_verdict_tab(result, shown)]
+    if shown:
+        views = [histogram_view(one) for one in shown]
+        name = "2 · All distributions"
+        tabs.append(rrb.Grid(*views, grid_columns=GRID, name=name))
+    drifting = [one for one in shown if drift(one) is not None]
+    if drifting:
+        views = [time_view(drift_plan(one)) for one in drifting]
+        tabs.append(rrb.Grid(*views, grid_columns=GRID, name="3 · Drift, lot by lot"))
+    return workspace(*tabs, timeline=PLACE)
+
+
+def histogram_view(one: ConstantResult) -> Any:
+    """Motors per bin, both sides over each other."""
+    name = f"{stem_of(one.name)} [{constant_scale(one).unit or '1'}], motors per bin: {one.verdict}"
+    return bar_view(name, *(f"/hist/{one.name}/{side}" for side in SIDES), legend=True)
+
+
+def drift_plan(one: ConstantResult) -> ViewPlan:
+    """Lot means with ±U, the candidate's in its own colour, and the chart's control limits."""
+    entity = f"/drift/{one.name}"
+    lines = (
+        Line(entity, "low", "mean ± U", (*BASELINE, 110)),
+        Line(entity, "high", "mean ± U", (*BASELINE, 110)),
+        Line(entity, "mean", "lot mean", BASELINE, WIDE),
+        Line(entity, "candidate", "candidate", CANDIDATE, 4.0),
+        Line(entity, "ewma", "EWMA", MEASURED),
+        Line(entity, "ewma_low", "limit", (*RESIDUAL, 160)),
+        Line(entity, "ewma_high", "limit", (*RESIDUAL, 160)),
+    )
+    words = f"{stem_of(one.name)}: change from the baseline [%] by lot number"
+    return ViewPlan(words, lines, 1.0, rows=len(one.lots))
+
+
+def cogging_plan(result: LotRegression) -> ViewPlan | None:
+    """Both bands over the mechanical angle; None where no motor was turned without current."""
+    lines: list[Line] = []
+    for band in result.cogging:
+        entity, colour = f"/cogging/{band.side}", COLOURS[band.side]
+        words, faint = f"{band.side}: mean ± sd of {band.motors} motors", (*colour, FILL_ALPHA)
+        lines.append(Line(entity, "mean", words, colour, WIDE))
+        lines += [Line(entity, f"fill_{n}", words, faint, FILL_WIDTH) for n in range(1, FILL)]
+        lines += [Line(entity, edge, words, (*colour, 110)) for edge in ("low", "high")]
+    if not lines:
+        return None
+    order = leading_order(result)
+    words = (
+        f"cogging torque [mN·m] over mechanical angle [0.1°], {PERIODS} periods of order {order}"
+    )
+    return ViewPlan(words, tuple(lines), 1.0, rows=-(-3600 * PERIODS // order))
+
+
+def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
+    import rerun.blueprint as rrb
+
+    left: list[Any] = [page_view("/verdict", "Verdict")]
+    shares = [1.4]
+    if shown:
+        query = rrb.archetypes.DataframeQuery(timeline=PLACE)
+        left.append(rrb.DataframeView(origin="/motors", name="Motors", query=query))
+        shares.append(1.0)
+    right: list[Any] = []
+    if shown:
+        views = [histogram_view(one) for one in shown[:MOST_SHOWN]]
+        right.append(rrb.Horizontal(*views))
+    lower: list[Any] = []
+    plan = cogging_plan(result)
+    if plan is not None:
+        lower.append(time_view(plan))
+    if result.orders:
+        orders = "its amplitude [mN·m] by mechanical order"
+        sides = dict.fromkeys(level.side for level in result.orders)
+        lower.append(bar_view(orders, *(f"/orders/{side}" for side in sides), legend=True))
+    if lower:
+        right.append(rrb.Horizontal(*lower, column_shares=[1.8, 1.0][: len(lower)]))
+    columns = [rrb.Vertical(*left, row_shares=shares)]
+    columns += [rrb.Vertical(*right)] if right else []
+    return rrb.Horizontal(*columns, column_shares=[1.0, 1.5][: len(columns)], name="1 · Lots")

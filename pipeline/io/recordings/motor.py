@@ -1,0 +1,304 @@
+"""One motor as a Rerun recording: the row of the fleet's table, and what opens from it.
+
+A recording holds the entities
+
+    /sheet                the datasheet as a markdown page, /checks its checks
+    /constants            every constant on the timeline `row`, in the datasheet's numbers
+    /overview/SIGNAL      residuals of all captures [% of the signal's reach], 1000 steps each, on
+                          the timeline `capture`; /overview_lane which capture that is
+    /cogging/wave, orders zero-current torque over one turn [mN·m], and by order
+    /preview/residual     all residuals as one curve, red where the datasheet is refused
+    /preview/cogging      four periods of the zero-current torque
+    /findings             one text log line a finding at its capture, on `capture`
+
+and the properties `motor` and `shown` (key constants in the table's units).
+Two motors differ in what they hold, never in where, so that one layout fits a whole fleet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.io.recordings.capture import first_of_each, own_evidence
+from pipeline.io.recordings.capture_maps import FULL_COLOUR_SHARE, signal_floor
+from pipeline.io.recordings.datasheet_page import checks_markdown, sheet_markdown
+from pipeline.io.recordings.font import drawable
+from pipeline.io.recordings.stream import (
+    ROW,
+    Trace,
+    recording,
+    send_bars,
+    send_page,
+    send_property,
+    send_trace,
+)
+from pipeline.numerics.thinning import line_points
+from pipeline.records.capture import Campaign
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.evidence import Evidence
+from pipeline.records.finding import Finding
+from pipeline.records.naming import file_stem
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
+Array = NDArray[np.float64]
+
+POINTS_A_SERIES = 400
+CAPTURE, STEPS_A_CAPTURE = "capture", 1000
+WAVE_CELLS, PREVIEW_PERIODS = 720, 4
+HIGHEST_ORDER = 120
+APPLICATION = "fleet"
+ORDER = ("refused", "provisional", "released")
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A constant of the fleet's table: its property, heading, and factor from the SI unit."""
+
+    constant: str
+    key: str
+    heading: str
+    factor: float
+
+
+SHOWN = (
+    Shown("r_phase_ohm", "r_phase_mohm", "R [mΩ]", 1e3),
+    Shown("ld_h", "ld_uh", "Ld [µH]", 1e6),
+    Shown("lq_h", "lq_uh", "Lq [µH]", 1e6),
+    Shown("psi_pm_wb", "psi_pm_mwb", "ψ [mWb]", 1e3),
+    Shown("kt_peak_nm_a", "kt_peak_mnm_a", "Kt [mN·m/A]", 1e3),
+    Shown("cogging_amplitude_nm", "cogging_mnm", "cogging [mN·m]", 1e3),
+    Shown("j_rotor_kgm2", "j_rotor_gcm2", "J [g·cm²]", 1e7),
+    Shown("torque_coulomb_nm", "torque_coulomb_mnm", "friction [mN·m]", 1e3),
+)
+KEY_CONSTANTS = tuple(one.constant for one in SHOWN)
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """One series in the overview: residual [% of the signal's reach] at `places` of `CAPTURE`."""
+
+    capture: str
+    signal: str
+    places: NDArray[np.int64]
+    percent: Array
+
+
+def motor_bytes(
+    campaign: Campaign,
+    datasheet: Datasheet,
+    evidence: Sequence[Evidence],
+    findings: Sequence[Finding],
+) -> bytes:
+    """The .rrd of one motor, made in memory."""
+    from pipeline.io.recordings.fleet import motor_layout
+
+    strips = tuple(overview(campaign, evidence))
+    with recording(
+        datasheet.motor_id,
+        (),
+        motor_layout(signals_of(strips), len({strip.capture for strip in strips})),
+        (APPLICATION, segment_id(datasheet)),
+    ) as made:
+        send_page(
+            made.stream,
+            "/sheet",
+            sheet_markdown(datasheet, "", KEY_CONSTANTS),
+        )
+        send_page(made.stream, "/checks", checks_markdown(datasheet))
+        _send_constants(made.stream, datasheet)
+        _send_overview(made.stream, strips, refused=datasheet.status == "refused")
+        _send_cogging(made.stream, evidence)
+        _send_findings(made.stream, strips, findings)
+        _send_properties(made.stream, datasheet, strips)
+    return made.content
+
+
+def segment_id(datasheet: Datasheet) -> str:
+    """The id of a motor's recording, which names its row: one a motor, whatever its serial."""
+    return file_stem(datasheet.motor_id)
+
+
+def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip]:
+    """What every capture leaves over, all equally wide, against the signal's reach on this motor.
+
+    Against each capture's own reach, a torque of nothing but cogging would seem all wrong.
+    """
+    found = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
+    told = [(number, *one) for number, one in enumerate(one for one in found if one[1])]
+    reach: dict[str, float] = {}
+    for _, _, own in told:
+        for one in own:
+            here = signal_floor(one.series[0].measured) / FULL_COLOUR_SHARE
+            reach[one.y_name] = max(here, reach.get(one.y_name, 0.0))
+    for number, path, own in told:
+        for one in own:
+            series = one.series[0]
+            percent = 100.0 * (series.measured - series.fitted) / reach[one.y_name]
+            kept = line_points(percent, POINTS_A_SERIES)
+            span = float(series.x[-1] - series.x[0]) or 1.0
+            share = (series.x[kept] - series.x[0]) / span
+            places = np.rint((number + share * 0.98) * STEPS_A_CAPTURE).astype(np.int64)
+            yield Strip(path, one.y_name, *_ended(places, percent[kept]))
+
+
+def _ended(places: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
+    """With a gap after the last value, so that no line is drawn to the next capture."""
+    return np.append(places, places[-1] + 1), np.append(values, np.nan)
+
+
+def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
+    """The quantities of an overview, in the order in which they first come."""
+    return tuple(dict.fromkeys(strip.signal for strip in strips))
+
+
+def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
+    """One row a constant; text where there is no number, so that no row is dropped."""
+    import rerun as rr
+
+    told = [est for _, est in sorted(datasheet.constants.items())]
+    numbers = pl.DataFrame(
+        {
+            "value": [None if e.value is None else float(e.value) for e in told],
+            "u": [e.u if e.known else None for e in told],
+        },
+        schema={"value": pl.Float64, "u": pl.Float64},
+    )
+    texts: dict[str, list[str]] = {
+        "name": [e.name for e in told],
+        "unit": [e.unit for e in told],
+        "status": [e.status for e in told],
+        "method": [e.method for e in told],
+    }
+    frame = pl.DataFrame({k: [drawable(t) for t in v] for k, v in texts.items()})
+    index = pl.Series(ROW, np.arange(len(told), dtype=np.int64))
+    whole = pl.concat([frame, numbers], how="horizontal").insert_column(0, index)
+    for batch in whole.to_arrow().to_batches():
+        rr.send_record_batch(batch, stream, index=ROW, entity_path="/constants")
+
+
+def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused: bool) -> None:
+    import rerun as rr
+
+    from pipeline.io.recordings.views import MEASURED, RESIDUAL
+
+    for strip in strips:
+        frame = pl.DataFrame({"percent": strip.percent.astype(np.float32)})
+        index = pl.Series(CAPTURE, strip.places)
+        whole = Trace(f"/overview/{strip.signal}", CAPTURE, frame.insert_column(0, index))
+        send_trace(stream, whole)
+    if not strips:
+        return
+    places = np.concatenate([strip.places for strip in strips])
+    order = np.argsort(places, kind="stable")
+    percent = np.concatenate([strip.percent for strip in strips])[order]
+    style = rr.SeriesLines(
+        colors=RESIDUAL if refused else MEASURED,
+        names="residual [%]",
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+    stream.log("/preview/residual", style, static=True)
+    rr.send_columns(
+        "/preview/residual",
+        indexes=[rr.TimeColumn(CAPTURE, sequence=places[order])],
+        columns=rr.Scalars.columns(scalars=percent),
+        recording=stream,
+    )
+    starts = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
+    rr.send_columns(
+        "/overview_lane",
+        indexes=[rr.TimeColumn(CAPTURE, sequence=list(starts.values()))],
+        columns=rr.StateChange.columns(state=[drawable(_stem(name)) for name in starts]),
+        recording=stream,
+    )
+
+
+def _send_cogging(stream: RecordingStream, evidence: Sequence[Evidence]) -> None:
+    """Torque over one turn, both directions averaged so that friction drops out; its orders."""
+    from pipeline.io.recordings.views import MODEL, RESIDUAL
+
+    own = [one for one in evidence if one.estimator == "cogging"]
+    for one in own:
+        if one.kind == "bars":
+            series = one.series[0]
+            low = series.x <= HIGHEST_ORDER
+            if low.any():
+                values, left = 1e3 * series.measured[low], series.x[low] - 0.4
+                send_bars(stream, "/cogging/orders", values, left, 0.8, MODEL)
+        else:
+            wave, left = _wave(one)
+            width = 360.0 / WAVE_CELLS
+            send_bars(stream, "/cogging/wave", wave, left, width, RESIDUAL)
+            order = 1 + int(np.argmax(np.abs(np.fft.rfft(wave))[1:]))
+            few = max(WAVE_CELLS * PREVIEW_PERIODS // order, 2)
+            send_bars(stream, "/preview/cogging", wave[:few], left[:few], width, RESIDUAL)
+
+
+def _wave(one: Evidence) -> tuple[Array, Array]:
+    """Means over cells of one turn [mN·m] of all directions, each less its own mean."""
+    turn = 2.0 * np.pi
+    total = np.zeros(WAVE_CELLS)
+    for series in one.series:
+        fine = np.isfinite(series.measured)
+        place = (np.mod(series.x[fine], turn) / turn * WAVE_CELLS).astype(int) % WAVE_CELLS
+        values = series.measured[fine] - series.measured[fine].mean()
+        count = np.bincount(place, minlength=WAVE_CELLS)
+        total += np.bincount(place, values, WAVE_CELLS) / np.maximum(count, 1)
+    mean = 1e3 * total / len(one.series)
+    return mean, np.arange(WAVE_CELLS) * 360.0 / WAVE_CELLS
+
+
+def _send_findings(
+    stream: RecordingStream, strips: Sequence[Strip], findings: Sequence[Finding]
+) -> None:
+    import rerun as rr
+
+    order = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
+    told = sorted(findings)
+    lines = [drawable(f"{_stem(f.file)}: {f.message}; {f.remedy} [{f.code}]") for f in told]
+    levels = ["ERROR" if f.severity == "refused" else "WARN" for f in told]
+    places = [order.get(f.file, 0) for f in told]
+    rr.send_columns(
+        "/findings",
+        indexes=[rr.TimeColumn(CAPTURE, sequence=places or [0])],
+        columns=rr.TextLog.columns(
+            text=lines or ["no capture was refused or warned of"], level=levels or ["INFO"]
+        ),
+        recording=stream,
+    )
+
+
+def _send_properties(
+    stream: RecordingStream, datasheet: Datasheet, strips: Sequence[Strip]
+) -> None:
+    known = {name: e.number for name, e in sorted(datasheet.constants.items()) if e.known}
+    failed = [check.name for check in datasheet.checks if check.status == "fail"]
+    worst = max((float(np.nanmax(np.abs(s.percent))) for s in strips), default=None)
+    motor: dict[str, Any] = {
+        "id": datasheet.motor_id,
+        "verdict": datasheet.status,
+        "order": ORDER.index(datasheet.status),
+        "lot": datasheet.lot or "",
+        "type": datasheet.motor_type or "",
+        "failed": ", ".join(failed) or "none",
+        "captures": len({strip.capture for strip in strips}),
+        "largest_residual_percent": None if worst is None else _round(worst),
+    }
+    send_property(stream, "motor", motor)
+    shown = {s.key: _round(s.factor * known[s.constant]) for s in SHOWN if s.constant in known}
+    send_property(stream, "shown", shown)
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def _stem(path: str) -> str:
+    return path.rsplit("/", 1)[-1].rsplit(".", 1)[0]

@@ -1,0 +1,51 @@
+"""The seal of a recording: its digest in a file beside it, without which `review` opens nothing.
+
+The viewer's own check passes changed payload bytes, and even a file that is no recording at all.
+The seal is a line of sha256sum, so that `sha256sum --check NAME.rrd.sha256` reads it as well.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from pipeline.io.publish import write_whole
+from pipeline.records.errors import RecordingError
+
+SEAL = ".sha256"
+MAGIC = b"RRF2"
+REMEDY = "run the command that wrote it again"
+
+
+def write_sealed(path: Path, content: bytes) -> None:
+    """Writes a recording and its seal, each whole or not at all; MachineError on a full disk."""
+    write_whole(path, content)
+    write_whole(seal_of(path), seal_line(path.name, content))
+
+
+def seal_line(name: str, content: bytes) -> bytes:
+    """What the seal of a recording of this name says."""
+    return f"{hashlib.sha256(content).hexdigest()}  {name}\n".encode()
+
+
+def seal_of(path: Path) -> Path:
+    """Where the seal of a recording lies."""
+    return path.with_name(path.name + SEAL)
+
+
+def verify(path: Path) -> None:
+    """Raises RecordingError where a recording is not what was written, or cannot be known to be."""
+    if not path.is_file():
+        raise RecordingError("the recording is not there", REMEDY)
+    with path.open("rb") as stream:
+        magic = stream.read(len(MAGIC))
+        stream.seek(0)
+        found = hashlib.file_digest(stream, "sha256").hexdigest()
+    if magic != MAGIC:
+        raise RecordingError("this is no Rerun recording", REMEDY)
+    seal = seal_of(path)
+    if not seal.is_file():
+        raise RecordingError(f"its seal {seal.name} is missing", REMEDY)
+    stated = seal.read_text(encoding="ascii", errors="replace").split(maxsplit=1)
+    if not stated or stated[0] != found:
+        raise RecordingError("truncated or changed: its digest is not the sealed one", REMEDY)

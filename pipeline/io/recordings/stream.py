@@ -1,0 +1,184 @@
+"""What every recording shares: how tables become components and streams become bytes.
+
+A blueprint belongs to an application id, not to a recording, so each workspace that is laid out in
+its own way has an application id of its own. Two files of equal input differ in the ids that Rerun
+draws, so compare their content, never their bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.io.recordings.font import drawable
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+    from rerun.blueprint import Blueprint
+
+ROWS_A_CHUNK = 4096
+TIME, ROW = "t", "row"
+FLUSH_S = 300.0
+FAINT = (140, 140, 140, 60)
+Colour = tuple[int, int, int]
+Tinted = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A table on its way into a recording: `index` is `TIME` or `ROW`, the rest float32."""
+
+    entity: str
+    index: str
+    frame: pl.DataFrame
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The components, the index left out."""
+        return tuple(name for name in self.frame.columns if name != self.index)
+
+
+@dataclass(slots=True)
+class Recording:
+    """A recording being made in memory; `content` is the .rrd once the `with` block is left."""
+
+    stream: RecordingStream
+    content: bytes = b""
+
+
+@contextmanager
+def recording(
+    name: str,
+    identity: Sequence[str],
+    layout: Blueprint | None,
+    ids: tuple[str, str] | None = None,
+) -> Iterator[Recording]:
+    """A recording called `name` with an id made of `identity`: equal work, equal id.
+
+    The layout is made active at once, since the web viewer lays out what comes first by itself.
+    `ids` are application and recording where they mean something by themselves. Made in memory,
+    since a stream onto a full disk may wait for its dead writer for ever.
+    """
+    import rerun as rr
+
+    rr.set_strict_mode(True)
+    shown = drawable(name)
+    home, own = ids or (application(shown), digest(identity))
+    stream = rr.RecordingStream(home, recording_id=own, send_properties=False)
+    memory = stream.memory_recording()
+    if layout is not None:
+        stream.send_blueprint(layout, make_active=True, make_default=True)
+    stream.send_recording_name(shown)
+    made = Recording(stream)
+    yield made
+    stream.flush(timeout_sec=FLUSH_S)
+    made.content = memory.drain_as_bytes()
+
+
+def application(name: str) -> str:
+    """The application id of a workspace, which the viewer takes as it stands.
+
+    It would replace what is no ASCII letter, digit, space, `-` or `_`, and two names could meet.
+    """
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in " -_") else "-" for c in name)
+    return kept if kept == name else f"{kept} {digest((name,))[:6]}"
+
+
+def digest(parts: Sequence[str]) -> str:
+    """32 hex digits that stand for some texts."""
+    return hashlib.sha256("\n".join(parts).encode("utf-8", "surrogatepass")).hexdigest()[:32]
+
+
+def timed(entity: str, t_s: NDArray[np.float64], values: pl.DataFrame) -> Trace:
+    """A trace on the time line; rows whose instant is not finite have no place there."""
+    finite = np.isfinite(t_s)
+    index = pl.Series(TIME, nanoseconds(t_s[finite])).cast(pl.Duration("ns"))
+    kept = values if finite.all() else values.filter(pl.Series(finite))
+    return Trace(entity, TIME, kept.insert_column(0, index))
+
+
+def nanoseconds(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Instants [n, s] as whole nanoseconds; a float of seconds would lose some."""
+    whole: NDArray[np.int64] = np.rint(t_s * 1e9).astype(np.int64)
+    return whole
+
+
+def send_trace(stream: RecordingStream, trace: Trace) -> None:
+    """Sends a table in slices of 4096 rows."""
+    import rerun as rr
+
+    for batch in trace.frame.to_arrow().to_batches(max_chunksize=ROWS_A_CHUNK):
+        rr.send_record_batch(batch, stream, index=trace.index, entity_path=trace.entity)
+
+
+def send_page(stream: RecordingStream, entity: str, markdown: str) -> None:
+    """A page of text that stands at every time."""
+    import rerun as rr
+
+    page = rr.TextDocument(drawable(markdown), media_type=rr.MediaType.MARKDOWN)
+    stream.log(entity, page, static=True)
+
+
+def send_property(stream: RecordingStream, name: str, values: dict[str, Any]) -> None:
+    """Values that a table of recordings shows, one column each; None is left out."""
+    import rerun as rr
+
+    stated = {key: _drawable(value) for key, value in values.items() if value is not None}
+    if stated:
+        stream.send_property(name, rr.AnyValues(**stated))
+
+
+def send_bars(
+    stream: RecordingStream,
+    entity: str,
+    values: NDArray[np.float64],
+    left: NDArray[np.float64],
+    width: float,
+    colour: Colour,
+    at: tuple[str, int] | None = None,
+) -> None:
+    """Bars of one width from their left edges [B]; `at` is a timeline and a place on it."""
+    import rerun as rr
+
+    if at is None:
+        bars = rr.BarChart(values, abscissa=left, color=colour, widths=[width])
+        stream.log(entity, bars, static=True)
+        return
+    columns = rr.BarChart.columns(
+        values=tensor(values), abscissa=tensor(left), color=[colour], widths=[width]
+    )
+    index = rr.TimeColumn(at[0], sequence=[at[1]])
+    rr.send_columns(entity, indexes=[index], columns=columns, recording=stream)
+
+
+def send_axis_ends(
+    stream: RecordingStream, entity: str, ends: Sequence[float], beyond: float
+) -> None:
+    """Faint marks beyond the last bar that give a bar chart's axis its reach: it has no lock."""
+    import rerun as rr
+
+    step = 0.005 * abs(beyond) or 1.0
+    places = [beyond + step * (1 + 2 * place) for place in range(len(ends))]
+    widths = [step] * len(places)
+    marks = rr.BarChart(list(ends), abscissa=places, color=FAINT, widths=widths)
+    stream.log(entity, marks, static=True)
+
+
+def tensor(values: NDArray[np.float64]) -> Any:
+    """One row of a column of tensors; a bare list of arrays would become one of more axes."""
+    import rerun as rr
+
+    return rr.encodings.TensorData(array=np.ascontiguousarray(values))
+
+
+def _drawable(value: Any) -> Any:
+    if isinstance(value, str):
+        return drawable(value)
+    return [_drawable(one) for one in value] if isinstance(value, list) else value

@@ -1,0 +1,74 @@
+"""What a machine was doing, stretch by stretch, from speed and current."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+BLOCKS = 2000
+SHORTEST_BLOCKS = 3
+SPEED_SHARE, CURRENT_SHARE = 0.01, 0.03
+REST, LOCKED, MOTORING, GENERATING, UNPOWERED = (
+    "at rest",
+    "current at rest",
+    "motoring",
+    "generating",
+    "no current",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Rows from `start` on, up to the next stretch, in one state."""
+
+    start: int
+    state: str
+
+
+def regimes(speed_rad_s: Array, current_a: Array) -> tuple[Stretch, ...]:
+    """States of a record [n] of shaft speed and q current, in order of rows.
+
+    At rest is below 1 % of the largest speed, no current below 3 % of the largest current;
+    motoring is current in the sense of the speed. Means over at most 2000 blocks are judged, and
+    stretches of fewer than three blocks join the one before, so that noise around a threshold
+    makes no confetti. Not finite is at rest, without current.
+    """
+    if speed_rad_s.size == 0:
+        return ()
+    block = -(-speed_rad_s.size // BLOCKS)
+    starts = np.arange(0, speed_rad_s.size, block)
+    speed = _means(np.nan_to_num(speed_rad_s), starts)
+    current = _means(np.nan_to_num(current_a), starts)
+    moving = np.abs(speed) > SPEED_SHARE * np.abs(speed).max(initial=0.0)
+    powered = np.abs(current) > CURRENT_SHARE * np.abs(current).max(initial=0.0)
+    states = np.where(
+        moving,
+        np.where(powered, np.where(speed * current > 0, MOTORING, GENERATING), UNPOWERED),
+        np.where(powered, LOCKED, REST),
+    )
+    return stretches(states, starts, SHORTEST_BLOCKS if starts.size > 10 else 1)
+
+
+def stretches(
+    states: NDArray[np.str_], starts: NDArray[np.int64], shortest: int = 1
+) -> tuple[Stretch, ...]:
+    """Equal states in a row [b] become one stretch; shorter ones than `shortest` join the last."""
+    cuts = np.flatnonzero(np.concatenate([[True], states[1:] != states[:-1]]))
+    lengths = np.diff(np.append(cuts, states.size))
+    told: list[Stretch] = []
+    for cut, length in zip(cuts, lengths, strict=True):
+        state = str(states[cut])
+        if told and (length < shortest or state == told[-1].state):
+            continue
+        told.append(Stretch(int(starts[cut]), state))
+    return tuple(told)
+
+
+def _means(values: Array, starts: NDArray[np.int64]) -> Array:
+    lengths = np.diff(np.append(starts, values.size))
+    means: Array = np.add.reduceat(values, starts) / lengths
+    return means

@@ -1,0 +1,97 @@
+"""How fast and how small a capture becomes a recording, beside zstd Parquet of the same frame.
+
+Ratios hold on any machine. Limits: the file at most 6 bytes a sample and channel, and writing at
+most half as dear again as Parquet, which was measured at 1.0 times its CPU time.
+"""
+
+from __future__ import annotations
+
+import io
+import time
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.io.recordings.capture import capture_traces, recording_bytes
+from pipeline.io.recordings.stream import recording, send_trace
+from pipeline.records.capture import Capture, CaptureMeta
+from tests.looking import Viewer, need_viewer
+
+CHANNELS, RATE_HZ = 20, 20_000
+NAMES = (
+    *("va_v", "vb_v", "vc_v", "ia_a", "ib_a", "ic_a", "vd_v", "vq_v", "id_a", "iq_a"),
+    *("vdc_v", "idc_a", "theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s"),
+    *("torque_shaft_nm", "temp_winding_degc", "temp_magnet_degc", "temp_case_degc"),
+    "temp_ambient_degc",
+)
+SLOWEST = 1.5
+MOST_BYTES = 6.0
+MOST_MEMORY = 2 << 30
+
+
+def make_capture(seconds: float) -> Capture:
+    """Sines with white noise of 1 % on every channel: nothing that compresses by itself."""
+    rows = round(seconds * RATE_HZ)
+    t_s = np.arange(rows) / RATE_HZ
+    noise = np.random.default_rng(3)
+    columns = {
+        name: np.sin((2 + n) * t_s) + 0.01 * noise.standard_normal(rows)
+        for n, name in enumerate(NAMES)
+    }
+    frame = pl.DataFrame({"t_s": t_s, **columns})
+    return Capture(
+        "bench/drive.mcap", "0" * 64, "verified", CaptureMeta("bench", "drive"), (frame,)
+    )
+
+
+def written(capture: Capture) -> bytes:
+    """The capture's samples as a recording."""
+    with recording("bench", ("bench",), None) as made:
+        for trace in capture_traces(capture):
+            send_trace(made.stream, trace)
+    return made.content
+
+
+def parquet(capture: Capture) -> bytes:
+    """The same float32 columns and times as zstd Parquet."""
+    target = io.BytesIO()
+    for trace in capture_traces(capture):
+        trace.frame.write_parquet(target, compression="zstd")
+    return target.getvalue()
+
+
+def seconds_of(task: object, capture: Capture) -> float:
+    """CPU time of one call [s], the best of three: others on the machine do not count."""
+    assert callable(task)
+    best = float("inf")
+    for _ in range(3):
+        start = time.process_time()
+        task(capture)
+        best = min(best, time.process_time() - start)
+    return best
+
+
+def test_a_recording_costs_little_more_than_parquet() -> None:
+    assert len(NAMES) == CHANNELS
+    capture = make_capture(10.0)
+    written(make_capture(0.1))  # the libraries are loaded
+    slow, fast = seconds_of(written, capture), seconds_of(parquet, capture)
+    assert slow < SLOWEST * fast, f"{slow:.3f} s against {fast:.3f} s of Parquet"
+    samples = capture.tables[0].height * CHANNELS
+    size = len(written(capture)) / samples
+    assert size <= MOST_BYTES, f"{size:.2f} bytes, Parquet {len(parquet(capture)) / samples:.2f}"
+
+
+@pytest.mark.slow
+def test_a_minute_at_20_khz_opens_in_less_than_2_gb(tmp_path: Path) -> None:
+    need_viewer()
+    path = tmp_path / "minute.rrd"
+    path.write_bytes(recording_bytes(make_capture(60.0), ()))
+    with Viewer() as viewer:
+        viewer.show(path)
+        viewer.picture()
+        assert viewer.reports() == []
+        assert viewer.largest_memory() < MOST_MEMORY, f"{viewer.largest_memory() / 1e9:.2f} GB"
+    assert path.stat().st_size < MOST_BYTES * 1_200_000 * CHANNELS

@@ -1,0 +1,59 @@
+"""What a machine was doing, told from speed and current."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.numerics.regimes import (
+    GENERATING,
+    LOCKED,
+    MOTORING,
+    REST,
+    UNPOWERED,
+    regimes,
+    stretches,
+)
+
+N = 10_000
+
+
+def test_four_quadrants_and_standstill_in_their_order() -> None:
+    """Current with the speed motors, against it generates, in both senses of rotation."""
+    speed = np.repeat([0.0, 0.0, 100.0, 100.0, -100.0, -100.0, 100.0], N)
+    current = np.repeat([0.0, 5.0, 5.0, -5.0, -5.0, 5.0, 0.0], N)
+    told = regimes(speed, current)
+    assert [one.state for one in told] == [
+        REST,
+        LOCKED,
+        MOTORING,
+        GENERATING,
+        MOTORING,
+        GENERATING,
+        UNPOWERED,
+    ]
+    assert np.abs(np.array([one.start for one in told]) - N * np.arange(7)).max() <= 7 * N / 2000
+
+
+def test_noise_around_a_threshold_makes_no_confetti() -> None:
+    rng = np.random.default_rng(2)
+    speed = np.concatenate([rng.normal(0.0, 1.0, N), np.full(N, 100.0)])
+    told = regimes(speed, np.full(2 * N, 3.0))
+    assert [one.state for one in told] == [LOCKED, MOTORING]
+
+
+def test_missing_values_are_standstill_and_an_empty_record_has_none() -> None:
+    nothing = np.full(50, np.nan)
+    assert [one.state for one in regimes(nothing, nothing)] == [REST]
+    assert regimes(np.zeros(0), np.zeros(0)) == ()
+
+
+def test_a_stretch_that_is_too_short_joins_the_one_before() -> None:
+    states = np.array([*"aaabaaacc"])
+    starts = 10 * np.arange(9)
+    assert [(s.start, s.state) for s in stretches(states, starts, 2)] == [(0, "a"), (70, "c")]
+    assert [(s.start, s.state) for s in stretches(states, starts)] == [
+        (0, "a"),
+        (30, "b"),
+        (40, "a"),
+        (70, "c"),
+    ]
