@@ -23,7 +23,7 @@ NAME = "datasheet"
 TITLE = "Against the datasheet"
 WINDOW_S, LEAST_SAMPLES, LEAST_WINDOWS = 1e-3, 8, 16
 MOST_WINDOWS = 20_000
-GAP, JUMP_SHARE = 1.5, 0.01
+GAP, JUMP_SHARE = 1.5, 0.05
 _VOLTAGE = ("r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "pole_pairs")
 _TORQUE = ("kt_peak_nm_a", "kt_from_ke_nm_a")
 _ZERO_CURRENT = ("cogging",)
@@ -128,7 +128,7 @@ def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...
 def _jumps(
     cut: _Windows, speed: Array, j_kgm2: float, record: Mapping[str, Array]
 ) -> NDArray[np.bool_]:
-    """Samples [n] by windows whose accelerating torque differs by 1 % of the largest torque."""
+    """Samples [n] by windows whose accelerating torque differs by 5 % of the largest torque."""
     torque = j_kgm2 * np.gradient(speed, cut.middle_s)
     step = np.abs(np.diff(torque, prepend=torque[:1], append=torque[-1:]))
     most = float(np.abs(record["torque_shaft_nm"]).max())

@@ -108,8 +108,8 @@ def test_where_the_load_jumps_the_torque_is_left_open_and_nothing_is_left_over()
     t = np.arange(ROWS) * PERIOD_S
     late = np.maximum(t - 0.5, 0.0)
     rows = drive.tables[0].with_columns(
-        pl.col("theta_mech_rad") + 250.0 * late**2,
-        pl.col("torque_shaft_nm") - np.where(late > 0, 0.05 + 1e-5 * 500.0 * late, 0.0),
+        pl.col("theta_mech_rad") + 500.0 * late**2,
+        pl.col("torque_shaft_nm") - np.where(late > 0, 0.1 + 1e-5 * 1000.0 * late, 0.0),
     )
     told = replay(replace(drive, tables=(rows,)), make_sheet())[0].series[0]
     left = told.measured - told.fitted
