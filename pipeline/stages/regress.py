@@ -105,4 +105,8 @@ def _write(output: Path, regression: LotRegression) -> tuple[str, ...]:
     }
     for name, content in files.items():
         write_whole(folder / name, content)
-    return tuple((folder / name).as_posix() for name in files)
+    from pipeline.io.recordings.lots import lots_name, write_lots_recording
+
+    recording = output / "recordings" / lots_name(regression)
+    write_lots_recording(regression, recording)
+    return (*((folder / name).as_posix() for name in files), recording.as_posix())

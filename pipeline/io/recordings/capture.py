@@ -177,10 +177,11 @@ def fit_traces(evidence: Sequence[Evidence]) -> Iterator[FitTrace]:
         for place, series in enumerate(one.series):
             if series.fitted.size == 0 or series.x.size == 0:
                 continue
-            with np.errstate(invalid="ignore"):
+            with np.errstate(invalid="ignore", over="ignore"):
                 residual = series.measured - series.fitted
-            columns = {"measured": series.measured, "fitted": series.fitted, "residual": residual}
-            frame = pl.DataFrame({k: v.astype(np.float32) for k, v in columns.items()})
+                columns = {"measured": series.measured, "fitted": series.fitted}
+                columns |= {"residual": residual}
+                frame = pl.DataFrame({k: v.astype(np.float32) for k, v in columns.items()})
             trace = timed(f"/model/{one.estimator}/{number}_{place}", series.x, frame)
             finite = np.abs(residual[np.isfinite(residual)])
             reach, floor = float(finite.max(initial=0.0)), signal_floor(series.measured)
