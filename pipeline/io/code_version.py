@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 import pipeline
+
+# `from x import a, b` and `import x`, names in brackets over several lines; a whole parse of
+# every source would cost more than many a fit
+_HOME = rf"{pipeline.__name__}[\w.]*"
+_IMPORT = re.compile(
+    rf"^\s*(?:from ({_HOME}) import (\([^)]*\)|[^\n#]*)|import ({_HOME}))", re.MULTILINE
+)
 
 
 @cache
@@ -38,7 +45,7 @@ def closure_digest(module: str) -> str:
         path = _source(root, left.pop())
         if path is not None and path not in found:
             found.add(path)
-            left += _imported(ast.parse(path.read_bytes()))
+            left += _imported(path)
     return _digest(sorted(found))
 
 
@@ -66,11 +73,11 @@ def _source(root: Path, module: str) -> Path | None:
     return None
 
 
-def _imported(tree: ast.Module) -> Iterator[str]:
+@cache
+def _imported(path: Path) -> tuple[str, ...]:
     """Names that may be modules: of every import, and of every name that is taken from one."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    names = []
+    for home, taken, plain in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        names.append(home or plain)
+        names += [f"{home}.{name}" for name in re.findall(r"\w+", taken)]
+    return tuple(names)

@@ -6,6 +6,8 @@ version; a test shows them all to it again.
 
 from __future__ import annotations
 
+import re
+
 # First and last code point of what was seen to be drawn, and all that a unit or a name needs.
 RANGES = (
     (0x20, 0x7E),
@@ -27,9 +29,12 @@ RANGES = (
 SINGLE = "→←↑↓√∞≈≠≤≥−∂∆∑±×·✓✔✗⚠●■▲Ω"
 
 
+_OTHER = re.compile("[^\n\t" + "".join(f"{chr(a)}-{chr(b)}" for a, b in RANGES) + SINGLE + "]")
+
+
 def drawable(text: str) -> str:
     """The text with every character that the viewer cannot draw as its code point, ‹1F600›."""
-    return "".join(char if can_draw(char) else f"‹{ord(char):X}›" for char in text)
+    return _OTHER.sub(lambda found: f"‹{ord(found.group()):X}›", text)
 
 
 def can_draw(char: str) -> bool:

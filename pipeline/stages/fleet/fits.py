@@ -24,7 +24,7 @@ from pipeline.io.publish import write_whole
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.errors import PipelineError
-from pipeline.records.estimate import Estimate
+from pipeline.records.estimate import Estimate, Order
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.naming import file_stem
 from pipeline.records.uncertainty import Contribution
@@ -62,9 +62,10 @@ class FitMemory:
         if kept is not None and kept[0] == key:
             self._used[estimator.name] = kept
             return _decoded(kept[1], kept[2])
-        found = fit()
-        self._used[estimator.name] = (key, *_encoded(found))
-        return found
+        text, data = _encoded(fit())
+        self._used[estimator.name] = key, text, data
+        # as it would be read again, so that those who use it see the same the next time
+        return _decoded(text, data)
 
     def save(self) -> None:
         """Keeps the fits of this campaign; a place that cannot be written is no failure."""
@@ -162,5 +163,6 @@ def _estimate(said: Mapping[str, Any]) -> Estimate:
     values: dict[str, Any] = dict(said)
     values["budget"] = tuple(Contribution(**part) for part in said["budget"])
     values["captures"] = tuple(said["captures"])
+    values["orders"] = tuple(Order(**one) for one in said["orders"])
     values["bounds"] = None if bounds is None else (bounds[0], bounds[1])
     return Estimate(**values)
