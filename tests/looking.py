@@ -122,19 +122,22 @@ class Viewer:
 
     def picture(self, view: str | None = None) -> bytes:
         """A PNG of the window, or of the view of this name, once two frames are equal."""
-        chosen = None
-        if view is not None:
-            views = [v for v in self.client.get_state().views if v.name == view]
-            chosen = views[0].view_id
         deadline, last = time.monotonic() + PATIENCE_S, b""
         while time.monotonic() < deadline:
-            with suppress(TimeoutError):  # a busy machine may be too late for one frame
-                now: bytes = self.client.take_screenshot(chosen)
+            # a busy machine may be too late for one frame, or still be laying the views out
+            with suppress(TimeoutError, ConnectionError, StopIteration):
+                now: bytes = self.client.take_screenshot(self._view(view))
                 if now == last:
                     return now
                 last = now
             time.sleep(0.2)
         raise TimeoutError("the picture does not come to rest")
+
+    def _view(self, name: str | None) -> Any:
+        """The view of a name; None, which is the window, for no name."""
+        if name is None:
+            return None
+        return next(v.view_id for v in self.client.get_state().views if v.name == name)
 
     def reports(self) -> list[str]:
         """What views complain of, and errors in the viewer's own log."""

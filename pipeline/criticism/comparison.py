@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pipeline.criticism.descent import first_fit, gauss_newton
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, leave_out, uncertainties
 from pipeline.criticism.maps import all_maps, told_signal, unit_of
@@ -16,7 +17,7 @@ from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, first_fit, gauss_newton, own_columns
+from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import (
     Comparison,

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import gammaincc
 
+from pipeline.criticism.descent import first_fit
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
@@ -19,7 +20,7 @@ from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import Candidate, Rung, Score, candidates, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import first_fit, own_columns
+from pipeline.criticism.system import own_columns
 from pipeline.criticism.unknown import unknown_structure
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec

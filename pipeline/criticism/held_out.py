@@ -9,13 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.criticism.descent import clipped
 from pipeline.criticism.effect import Array
 from pipeline.criticism.free_run import Run, free_run
 from pipeline.criticism.judge import HeldOut
 from pipeline.criticism.maps import disjoint, unit_of
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Fitted, System, clipped
+from pipeline.criticism.system import Fitted, System
 from pipeline.criticism.traces import smoothed
 from pipeline.records.comparison import SignalError, Trace
 

@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Fitted, System, gauss_newton, own_columns
+from pipeline.criticism.system import Fitted, System, own_columns
 
 
 def trimmed(

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import TIE, Candidate, loss_without, material
-from pipeline.criticism.system import Fitted, System, gauss_newton, own_columns
+from pipeline.criticism.system import Fitted, System, own_columns
 
 _NEAR = 0.5
 _MOST = 3

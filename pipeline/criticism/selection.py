@@ -15,22 +15,14 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.judge import held_out_fall
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.model import zero
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import (
-    Descent,
-    Fitted,
-    System,
-    clipped,
-    gauss_newton,
-    own_columns,
-    system,
-    tolerances,
-)
+from pipeline.criticism.system import Descent, Fitted, System, own_columns, system, tolerances
 
 LEAST_SHARE = 0.1
 TIE = 12.0

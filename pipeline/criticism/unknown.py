@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.descent import clipped
 from pipeline.criticism.effect import Array
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.ports import Port, ports, refined
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.sketch import Pursuit, expression
-from pipeline.criticism.system import Fitted, System, clipped, own_columns, system
+from pipeline.criticism.system import Fitted, System, own_columns, system
 from pipeline.criticism.telling import told
 from pipeline.records.diagnosis import UnknownStructure
 

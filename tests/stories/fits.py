@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.criticism.descent import first_fit
 from pipeline.criticism.judge import leave_out, signal_errors
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.residuals import measured, residual
@@ -15,7 +16,7 @@ from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, first_fit, own_columns
+from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.stages.campaigns import campaigns, start_constants

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.judge import leave_out, remainder
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.selection import candidates, material, score_all, search, widened
-from pipeline.criticism.system import Fitted, floors, gauss_newton, own_columns, system
+from pipeline.criticism.system import Fitted, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
 

@@ -1,0 +1,148 @@
+"""Fits by Gauss-Newton: from orders of magnitude, and from a fit that is near.
+
+References: [1] Marquardt, SIAM J. Appl. Math. 11 (1963), a ridge for steps that reach too far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.bounds import BASE_LIMITS, bounded_step
+from pipeline.criticism.effect import Array, Effect, Machine
+from pipeline.criticism.floors import rough_floor
+from pipeline.criticism.linearise import Column
+from pipeline.criticism.model import BASE, PHYSICAL, Model, zero
+from pipeline.criticism.segment import Segment, row_index
+from pipeline.criticism.segments import sparse
+from pipeline.criticism.size import base_scales
+from pipeline.criticism.system import Fitted, System, floors, system
+
+_ITERATIONS = 8
+_REACH = 1.0
+_SHORT = 8
+_SILENT = 1e4
+_CONVERGED = 1.0
+_HALVINGS = 3
+_SIDES = (
+    ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
+    ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
+)
+
+
+def start_values(model: Model, machine: Machine) -> dict[str, float]:
+    """Where Gauss-Newton begins: orders of magnitude; the base is linear in its constants."""
+    scales = base_scales(machine)
+    values = {c.name: scales.get(c.name, c.center) for c in BASE}
+    for effect in model.effects:
+        values.update(initial(effect, model))
+    return values
+
+
+def initial(effect: Effect, model: Model) -> dict[str, float]:
+    """An effect at zero amplitude, in its own units."""
+    return zero(effect, model)
+
+
+def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
+    """Values moved inside their bounds."""
+    inside = dict(values)
+    inside["j_kgm2"] = max(values["j_kgm2"], 1e-3 * base_scales(model.machine)["j_kgm2"])
+    for name, (low, high) in BASE_LIMITS.items():
+        inside[name] = min(max(values[name], low), high)
+    for name, (_, p) in model.parameters().items():
+        scale = model.machine.scale(p)
+        inside[name] = min(max(values[name], p.low * scale), p.high * scale)
+    return inside
+
+
+def gauss_newton(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    renew: bool = False,
+    iterations: int = _ITERATIONS,
+    before: System | None = None,
+) -> tuple[Fitted, System]:
+    """Fits a model's own parameters; returns the fit and the system around it.
+
+    A step that makes χ² worse is halved. With `renew` the noise floor is computed again on the
+    way, which a start far from the truth needs.
+    """
+    around = system(segments, fitted, before=before)
+    for _ in range(iterations):
+        damped = replace(around, penalty=around.penalty + _ridge(fitted, around.columns))
+        step = bounded_step(damped.best, around.columns, fitted.model, fitted.values)
+        if not renew and around.misfit - around.foreseen(step) < _CONVERGED:
+            break
+        for _ in range(_HALVINGS):
+            moved = _moved(fitted, around.columns, step)
+            if renew:
+                moved = replace(moved, sigma=floors(segments, moved.model, moved.values))
+            tried = system(segments, moved, before=around)
+            if renew or tried.misfit < around.misfit + _CONVERGED:
+                break
+            step = 0.3 * step
+        else:
+            break
+        gain = around.misfit - tried.misfit
+        if renew or gain > 0:
+            fitted, around = moved, tried
+        if not renew and gain < _CONVERGED:
+            break
+    return fitted, around
+
+
+def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:
+    """Inverse variance [P] of one step, not of where it ends: what the captures hardly know does
+    not leap out of the range in which the equations are near their tangent [1].
+    """
+    machine = fitted.model.machine
+    reach = {name: _REACH * abs(fitted.values[name]) for name in PHYSICAL}
+    for name, (_, p) in fitted.model.parameters().items():
+        if p.amplitude:
+            reach[name] = 3.0 * max(abs(fitted.values[name]), p.typical * machine.scale(p))
+    spans = np.array([reach.get(column.name, np.inf) for column in columns])
+    ridge: Array = np.maximum(spans, 1e-30) ** -2
+    return ridge
+
+
+def _moved(fitted: Fitted, columns: Sequence[Column], step: Array) -> Fitted:
+    values = dict(fitted.values)
+    for column, change in zip(columns, step, strict=True):
+        values[column.name] += float(change)
+    return replace(fitted, values=clipped(fitted.model, values))
+
+
+def first_fit(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System]:
+    """Fits a model from orders of magnitude.
+
+    First every equation counts by the machine's own scale, on a few windows of each segment: by
+    its noise floor, one that misses it by far would be given up before the constants are near.
+    """
+    values = start_values(model, model.machine)
+    few = [sparse(segment) for segment in segments]
+    rough = tuple(rough_floor(segment, model, values) for segment in few)
+    near, _ = gauss_newton(few, Fitted(model, values, rough))
+    floor = floors(segments, model, near.values)
+    ends = [gauss_newton(segments, replace(near, sigma=floor))]
+    if len(segments) <= _SHORT:
+        ends += [_one_side_first(segments, replace(near, sigma=floor), side) for side in _SIDES]
+    return min(ends, key=lambda end: end[1].misfit)
+
+
+def _one_side_first(
+    segments: Sequence[Segment], near: Fitted, side: tuple[str, ...]
+) -> tuple[Fitted, System]:
+    """A fit that begins with the equations of some signals alone.
+
+    A short programme holds its equations little together: which of them is given up, where they
+    contradict each other, must not hang on where the fit began.
+    """
+    alone = tuple(
+        np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, _SILENT * sigma)
+        for segment, sigma in zip(segments, near.sigma, strict=True)
+    )
+    begun, _ = gauss_newton(segments, replace(near, sigma=alone))
+    return gauss_newton(segments, replace(begun, sigma=near.sigma))
