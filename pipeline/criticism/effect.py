@@ -187,8 +187,7 @@ class Effect:
     `parameters`, or `expand(machine)` where their number depends on the machine. `signals` are
     capture columns without which the effect cannot be seen, `tests` those that excite it, the
     best first. `rivals`: other effects and the test or calibration that parts them from this.
-    `allowed(q)` is False for parameters without physical meaning together. `left_out`: the
-    numbers of the optional terms that this copy of the effect does without.
+    `left_out`: the numbers of the optional terms that this copy of the effect does without.
     """
 
     name: str
@@ -210,7 +209,6 @@ class Effect:
     voltage: VoltageHook | None = None
     shaft: Callable[[Array, Values], Array] | None = None
     speed: Callable[[Array, Values, float], Array] | None = None
-    allowed: Callable[[Values], bool] | None = None
     left_out: tuple[int, ...] = ()
 
     @property

@@ -43,7 +43,6 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
         "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
         "torque_nm": 1.5 * pole_pairs * psi * current,
         "period_s": period,
-        "period_s2": period**2,
         "flux_wb": psi,
     }
     bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)

@@ -34,7 +34,6 @@ def machine(pole_pairs: int = 7, slots: int | None = 12) -> Machine:
         "freq_hz": 280.0,
         "torque_nm": 1.6,
         "period_s": 5e-5,
-        "period_s2": 2.5e-9,
         "flux_wb": 9.4e-3,
     }
     return Machine(pole_pairs, slots, scales, (12, 14, 84))
