@@ -71,7 +71,9 @@ def rounding_step(signal: Array) -> float:
         return 0.0
     sample = third[:: max(third.size // _LOOKED_AT, 1)]
     steps = np.geomspace(0.25 * spread, 2.0 * spread, _STEPS)
-    together = np.array([abs(np.exp(2j * np.pi / q * sample).mean()) for q in steps])
+    # in single precision, which is several times faster and good to 1e-4 of a turn
+    phase = np.outer(2.0 * np.pi / steps, sample).astype(np.float32)
+    together = np.hypot(np.cos(phase).mean(axis=1), np.sin(phase).mean(axis=1))
     inner = together[1:-1]
     peaks = 1 + np.flatnonzero((inner >= together[:-2]) & (inner >= together[2:]))
     high = [n for n in peaks if together[n] >= max(0.8 * together[peaks].max(), _TOGETHER)]
