@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.bounds import BASE_LIMITS, bounded_step
+from pipeline.criticism.bounds import BASE_LIMITS, Best, bounded_step
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.floors import rough_floor
 from pipeline.criticism.linearise import Column
@@ -72,8 +72,8 @@ def gauss_newton(
     """
     around = system(segments, fitted, before=before)
     for _ in range(iterations):
-        damped = replace(around, penalty=around.penalty + _ridge(fitted, around.columns))
-        step = bounded_step(damped.best, around.columns, fitted.model, fitted.values)
+        best = _damped(fitted, around)
+        step = bounded_step(best, around.columns, fitted.model, fitted.values)
         if not renew and around.misfit - around.foreseen(step) < _CONVERGED:
             break
         for _ in range(_HALVINGS):
@@ -92,6 +92,13 @@ def gauss_newton(
         if not renew and gain < _CONVERGED:
             break
     return fitted, around
+
+
+def _damped(fitted: Fitted, around: System) -> Best:
+    """The best step along some of the columns, none of them far."""
+    ridge = _ridge(fitted, around.columns)
+    grams = replace(around, penalty=around.penalty + ridge).grams()
+    return lambda live: grams.along(live).best()
 
 
 def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:

@@ -114,7 +114,7 @@ def _unknown(
 def _excess(rung: Rung, channels: set[str]) -> float:
     around = rung.around
     own = np.arange(len(own_columns(rung.fitted.model)))
-    spreads = around.spreads(around.best(own).residual)
+    spreads = around.grams(own).best().spreads
     inside = np.array([channel in channels for _, channel, _ in around.labels])
     return float((around.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())
 

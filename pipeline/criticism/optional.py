@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.grams import Grams
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted, System, own_columns
 
@@ -51,6 +52,7 @@ def _spare(fitted: Fitted, around: System, effect: Effect, price: float) -> tupl
     """The optional terms that do not pay to first order, the cheapest first."""
     parameters = effect.parameters_of(fitted.model.machine)
     left = sorted({p.optional for p in parameters} - {0})
+    known = around.grams()
     gone: list[int] = []
     while True:
         costs = []
@@ -58,7 +60,7 @@ def _spare(fitted: Fitted, around: System, effect: Effect, price: float) -> tupl
             if any(p.amplitude and p.optional not in (*gone, term) for p in parameters):
                 names = _parameters(fitted, effect, (*gone, term))
                 more = len(names) * price
-                costs.append((_loss(fitted, around, names) - more, term))
+                costs.append((_loss(fitted, around, known, names) - more, term))
         cheapest = min(costs, default=(0.0, 0))
         if cheapest[0] >= 0.0:
             return tuple(gone)
@@ -66,14 +68,12 @@ def _spare(fitted: Fitted, around: System, effect: Effect, price: float) -> tupl
         left.remove(cheapest[1])
 
 
-def _loss(fitted: Fitted, around: System, names: Sequence[str]) -> float:
+def _loss(fitted: Fitted, around: System, known: Grams, names: Sequence[str]) -> float:
     """Rise of misfit, to first order, when these parameters go to zero and the rest refits."""
     own = np.arange(len(own_columns(fitted.model)))
     out = np.array([n for n in own if around.columns[n].name in names], dtype=int)
-    stay = np.setdiff1d(own, out)
     move = np.array([-fitted.values[around.columns[n].name] for n in out])
-    moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
-    return moved.best(stay).misfit - around.misfit
+    return known.moved(out, move).along(np.setdiff1d(own, out)).best().misfit - known.misfit()
 
 
 def _without(

@@ -30,7 +30,8 @@ def rivals_of(
     Those that to first order keep most of what the effect explains are refitted in its place.
     """
     effect = next(e for e in fitted.model.effects if e.name == name)
-    lost = loss_without(wide, fitted, (name,))
+    grams = wide.grams()
+    lost = loss_without(wide, fitted, (name,), grams=grams)
     first = len(own_columns(fitted.model))
     near: dict[str, tuple[float, Candidate]] = {}
     for candidate in offered:
@@ -38,7 +39,7 @@ def rivals_of(
         first += len(candidate.columns)
         if not _meet(effect, candidate.effect):
             continue
-        rise = loss_without(wide, fitted, (name,), places)
+        rise = loss_without(wide, fitted, (name,), places, grams)
         other = candidate.effect.name
         if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate

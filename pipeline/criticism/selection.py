@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
+from pipeline.criticism.grams import Descent, Grams
 from pipeline.criticism.judge import held_out_fall
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.model import zero
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Descent, Fitted, System, own_columns, system, tolerances
+from pipeline.criticism.system import Fitted, System, own_columns, system, tolerances
 
 LEAST_SHARE = 0.1
 TIE = 12.0
@@ -92,7 +93,7 @@ class Standing:
     def of(cls, around: System, places: NDArray[np.int64], end: Descent) -> Standing:
         """Where a descent along `places` left the system."""
         cost = float(around.prior_costs(places, end.step).sum())
-        return cls(end.misfit, around.spreads(end.residual), cost)
+        return cls(end.misfit, end.spreads, cost)
 
 
 def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate, ...]:
@@ -127,7 +128,8 @@ def widened(
 def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> tuple[Score, ...]:
     """Every candidate's score, the best fall first; of one effect the best shape only."""
     own = np.arange(len(own_columns(fitted.model)))
-    before = Standing.of(around, own, around.best(own))
+    grams = around.grams()
+    before = Standing.of(around, own, grams.along(own).best())
     price = math.log(float(around.size))
     search_price = 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
     best: dict[str, Score] = {}
@@ -135,10 +137,10 @@ def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> t
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        score = _score(around, fitted, own, places, candidate, before, _GLANCE)
+        score = _score(around, grams, fitted, own, places, candidate, before, _GLANCE)
         cost = paid_for(candidate.effect, fitted.model.machine, score) * price + search_price
         if score is not None and score.fall > _PROMISING * cost:
-            score = _score(around, fitted, own, places, candidate, before, _THOROUGH)
+            score = _score(around, grams, fitted, own, places, candidate, before, _THOROUGH)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known.fall):
             best[candidate.effect.name] = replace(score, price=cost)
@@ -157,6 +159,7 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
 
 def _score(
     around: System,
+    grams: Grams,
     fitted: Fitted,
     own: NDArray[np.int64],
     places: NDArray[np.int64],
@@ -172,7 +175,7 @@ def _score(
     }
     live = places
     while live.size:
-        end = around.best(np.concatenate([own, live]), *effort)
+        end = grams.along(np.concatenate([own, live])).best(*effort)
         mine = dict(zip((around.columns[n].name for n in live), end.step[own.size :], strict=True))
         wrong = [
             n
@@ -334,10 +337,12 @@ def loss_without(
     fitted: Fitted,
     names: Iterable[str],
     instead: NDArray[np.int64] | None = None,
+    grams: Grams | None = None,
 ) -> float:
     """Rise of misfit when effects go to zero amplitude and the rest, with `instead`, refits.
 
-    The model is taken as linear between here and there.
+    The model is taken as linear between here and there. `grams` are those of all columns, where
+    they are there already.
     """
     gone = tuple(f"{name}." for name in names)
     own = np.arange(len(own_columns(fitted.model)))
@@ -353,5 +358,5 @@ def loss_without(
     }
     names_out = [around.columns[n].name for n in out]
     move = np.array([-fitted.values[n] if amplitude[n] else 0.0 for n in names_out])
-    moved = replace(around, residual=around.residual + around.matrix[:, out] @ move)
-    return moved.best(stay, *_THOROUGH).misfit - around.misfit
+    known = around.grams() if grams is None else grams
+    return known.moved(out, move).along(stay).best(*_THOROUGH).misfit - known.misfit()

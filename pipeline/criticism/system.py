@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.floors import form_tolerance, noise_floor
+from pipeline.criticism.grams import Grams, misfit_of, pseudo_inverse
 from pipeline.criticism.linearise import Column, base_columns, effect_columns, linearise
 from pipeline.criticism.model import Model
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.size import base_scales
 
-_TIE = 1e-11
 _SEED = 20260302
 _THREADS = 2
 # how far a constant may move before columns are computed anew
@@ -26,8 +26,6 @@ _STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
 _HEAVIER = 0.05
 _COASTING = "omega_mech_rad_s"
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
-_ROUNDS = 30
-_SETTLED = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +40,6 @@ class Fitted:
     values: dict[str, float]
     sigma: tuple[Array, ...]
     tolerance: tuple[Array, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Descent:
-    """Where a fit along some columns ends: step [k], residual [R] after it, and its misfit, the
-    cost of the priors included.
-    """
-
-    step: Array
-    residual: Array
-    misfit: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,9 +118,7 @@ class System:
         """Misfit after a step along the first columns, to first order."""
         places = np.arange(step.size)
         cost = float(self.prior_costs(places, step).sum())
-        return (
-            self.misfit_of(self.spreads(self.residual + self.matrix[:, : step.size] @ step)) + cost
-        )
+        return self.misfit_of(self.spreads(self.after(places, step))) + cost
 
     def spreads(self, residual: Array) -> Array:
         """χ²/n [G] of each group, 1 where empty."""
@@ -142,66 +127,40 @@ class System:
         return np.where(counts > 0, total / np.maximum(counts, 1.0), 1.0)
 
     def misfit_of(self, spreads: Array) -> float:
-        """Σ n [log max(1, q) + min(1, q) − 1]: −2 log likelihood of groups with χ²/n = q."""
-        each = np.log(np.maximum(spreads, 1.0)) + np.minimum(spreads, 1.0) - 1.0
-        return float((self.counts * each).sum())
+        """−2 log likelihood of groups with these χ²/n [G]."""
+        return misfit_of(self.counts, spreads)
 
     def place(self, names: Iterable[str]) -> NDArray[np.int64]:
         """Indices of columns by name."""
         wanted = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
 
-    def best(
-        self,
-        places: NDArray[np.int64],
-        starts: Sequence[float] = (1.0, 0.5, 0.0),
-        rounds: int = _ROUNDS,
-    ) -> Descent:
-        """The step along columns at `places` of least misfit.
+    def grams(self, places: NDArray[np.int64] | None = None) -> Grams:
+        """Normal matrices by group of the columns at `places`, of all without."""
+        along = np.arange(len(self.columns)) if places is None else places
+        elsewhere = self.prior_costs()
+        elsewhere[along] = 0.0
+        return Grams.of(
+            self.matrix[:, along],
+            self.residual,
+            self.group,
+            len(self.labels),
+            self.penalty[along],
+            self.pull[along],
+            float(elsewhere.sum()),
+        )
 
-        Weighted least squares, the weights renewed until the misfit stays. That has more than one
-        end: a group may be given up that another start would have saved, so it is begun with the
-        weights of the residual at hand, with their square roots and with equal ones, or with
-        the powers in `starts`.
-        """
-        now = np.maximum(self.spreads(self.residual), 1.0)
-        ends = [self._descended(places, now**power, rounds) for power in starts]
-        return min(ends, key=lambda end: end.misfit)
-
-    def _descended(self, places: NDArray[np.int64], spreads: Array, rounds: int) -> Descent:
-        matrix, penalty = self.matrix[:, places], np.diag(self.penalty[places])
-        left, step, before = self.residual, np.zeros(places.size), np.inf
-        for _ in range(rounds):
-            weight = self.weights(spreads)
-            weighted = matrix * weight[:, None]
-            slope = weighted.T @ self.residual + self.pull[places]
-            step = -_pseudo_inverse(weighted.T @ matrix + penalty) @ slope
-            left = self.residual + matrix @ step
-            spreads = self.spreads(left)
-            now = self.misfit_of(spreads) + float(self.prior_costs(places, step).sum())
-            if abs(before - now) < _SETTLED:
-                break
-            before = now
-        return Descent(step, left, now)
+    def after(self, places: NDArray[np.int64], step: Array) -> Array:
+        """The residual [R] after a step along some columns, to first order."""
+        left: Array = self.residual + self.matrix[:, places] @ step
+        return left
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance [k, k] of the parameters at `places` when they are fitted together."""
         weight = self.weights(self.spreads(self.residual))
         matrix = self.matrix[:, places]
         normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
-        return _pseudo_inverse(normal)
-
-
-def _pseudo_inverse(normal: Array) -> Array:
-    """Inverse of a normal matrix with directions that carry no information left at zero."""
-    told = np.diag(normal)
-    # a parameter that no capture tells of stays where it is, exactly
-    size = np.sqrt(np.where(told > 0.0, told, 1.0))
-    power, axes = np.linalg.eigh(normal / np.outer(size, size))
-    good = power > _TIE * max(float(power[-1]), 1.0)
-    inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
-    scaled: Array = inverse / np.outer(size, size)
-    return scaled
+        return pseudo_inverse(normal)
 
 
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:

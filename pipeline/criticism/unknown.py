@@ -105,8 +105,8 @@ def _ranked(
     columns = [effect_columns(port.effect, fitted.model) for port in offered]
     wide = system(segments, fitted, [c for some in columns for c in some], before)
     own = np.arange(len(own_columns(fitted.model)))
-    none = wide.best(own)
-    left, base = none.residual, none.misfit
+    none = wide.grams(own).best()
+    left, base = wide.after(own, none.step), none.misfit
     carried = _carried(wide, own, left)
     reference = _held_out(wide, own, left, np.zeros(own.size), carried)
     price = math.log(wide.size)
@@ -119,8 +119,8 @@ def _ranked(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        end = wide.best(chosen, *_EFFORT)
-        after = end.residual
+        end = wide.grams(chosen).best(*_EFFORT)
+        after = wide.after(chosen, end.step)
         gain = base - end.misfit - live.size * price
         if gain <= 0.0:
             continue

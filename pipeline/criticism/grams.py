@@ -1,0 +1,162 @@
+"""Weighted fits along columns from their normal matrices group by group.
+
+Weights are one number a group, so that a fit whose weights change needs the samples only once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array
+
+_TIE = 1e-11
+_ROUNDS = 30
+_SETTLED = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """Where a fit along some columns ends: step [k], χ²/n [G] of every group after it, and its
+    misfit, the cost of the priors included.
+    """
+
+    step: Array
+    spreads: Array
+    misfit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Grams:
+    """What a fit along k columns needs of the rows of G groups.
+
+    `counts` [G] are their weak samples, `power` [G] the residuals' sums of squares, `slope` [G, k]
+    the columns times the residual and `normal` [G, k, k] the columns times each other. `penalty`
+    [k] is the inverse prior variance, `pull` [k] its slope, `elsewhere` what the priors of other
+    columns cost.
+    """
+
+    counts: Array
+    power: Array
+    slope: Array
+    normal: Array
+    penalty: Array
+    pull: Array
+    elsewhere: float
+
+    @classmethod
+    def of(
+        cls,
+        matrix: Array,
+        residual: Array,
+        group: NDArray[np.int64],
+        count: int,
+        penalty: Array,
+        pull: Array,
+        elsewhere: float,
+    ) -> Grams:
+        """From columns [R, k] and residual [R] of rows whose groups are numbered below `count`."""
+        order = np.argsort(group, kind="stable")
+        both = np.column_stack([residual, matrix])[order]
+        counts = np.bincount(group, minlength=count)
+        edges = np.concatenate([[0], np.cumsum(counts)])
+        normal = np.empty((count, both.shape[1], both.shape[1]))
+        for number in range(count):
+            mine = both[edges[number] : edges[number + 1]]
+            np.matmul(mine.T, mine, out=normal[number])
+        return cls(
+            counts.astype(float),
+            normal[:, 0, 0].copy(),
+            normal[:, 0, 1:].copy(),
+            normal[:, 1:, 1:],
+            penalty,
+            pull,
+            elsewhere,
+        )
+
+    def along(self, places: NDArray[np.int64]) -> Grams:
+        """The same for some of the columns."""
+        out = np.setdiff1d(np.arange(self.penalty.size), places)
+        return Grams(
+            self.counts,
+            self.power,
+            self.slope[:, places],
+            self.normal[:, places[:, None], places],
+            self.penalty[places],
+            self.pull[places],
+            self.elsewhere + float(_costs(self.pull[out], self.penalty[out]).sum()),
+        )
+
+    def moved(self, places: NDArray[np.int64], step: Array) -> Grams:
+        """The same around where a step along some columns leads; priors stay where they were."""
+        rows = self.normal[:, places]
+        power = _after(self.power, self.slope[:, places], rows[:, :, places], step)
+        return replace(self, power=power, slope=self.slope + step @ rows)
+
+    def misfit(self) -> float:
+        """−2 log likelihood where the fit stands, and what the priors cost."""
+        cost = float(_costs(self.pull, self.penalty).sum()) + self.elsewhere
+        return misfit_of(self.counts, self._spreads(self.power)) + cost
+
+    def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int = _ROUNDS) -> Descent:
+        """The step of least misfit.
+
+        Weighted least squares, the weights renewed until the misfit stays. That has more than one
+        end: a group may be given up that another start would have saved, so it is begun with the
+        weights of the residual at hand, with their square roots and with equal ones, or with
+        the powers in `starts`.
+        """
+        now = np.maximum(self._spreads(self.power), 1.0)
+        ends = [self._descended(now**power, rounds) for power in starts]
+        return min(ends, key=lambda end: end.misfit)
+
+    def _descended(self, spreads: Array, rounds: int) -> Descent:
+        step, now, before = np.zeros(self.penalty.size), np.inf, np.inf
+        for _ in range(rounds):
+            weight = 1.0 / np.maximum(spreads, 1.0)
+            normal = np.einsum("g,gkl->kl", weight, self.normal) + np.diag(self.penalty)
+            step = -pseudo_inverse(normal) @ (weight @ self.slope + self.pull)
+            spreads = self._spreads(_after(self.power, self.slope, self.normal, step))
+            cost = float(_costs(self.pull + self.penalty * step, self.penalty).sum())
+            now = misfit_of(self.counts, spreads) + cost + self.elsewhere
+            if abs(before - now) < _SETTLED:
+                break
+            before = now
+        return Descent(step, spreads, now)
+
+    def _spreads(self, power: Array) -> Array:
+        return np.where(self.counts > 0, power / np.maximum(self.counts, 1.0), 1.0)
+
+
+def misfit_of(counts: Array, spreads: Array) -> float:
+    """Σ n [log max(1, q) + min(1, q) − 1]: −2 log likelihood of groups with χ²/n = q."""
+    each = np.log(np.maximum(spreads, 1.0)) + np.minimum(spreads, 1.0) - 1.0
+    return float((counts * each).sum())
+
+
+def pseudo_inverse(normal: Array) -> Array:
+    """Inverse of a normal matrix with directions that carry no information left at zero."""
+    told = np.diag(normal)
+    # a parameter that no capture tells of stays where it is, exactly
+    size = np.sqrt(np.where(told > 0.0, told, 1.0))
+    power, axes = np.linalg.eigh(normal / np.outer(size, size))
+    good = power > _TIE * max(float(power[-1]), 1.0)
+    inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T
+    scaled: Array = inverse / np.outer(size, size)
+    return scaled
+
+
+def _after(power: Array, slope: Array, normal: Array, step: Array) -> Array:
+    """Sums of squares [G] of the residuals after a step [k]."""
+    # what is left of a fit that is exact is rounding
+    after: Array = np.maximum(power + (2.0 * slope + normal @ step) @ step, 0.0)
+    return after
+
+
+def _costs(pull: Array, penalty: Array) -> Array:
+    """Squared distances [k] from the priors' centres in standard uncertainties."""
+    costs: Array = pull**2 / np.where(penalty > 0, penalty, np.inf)
+    return costs
