@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipeline.criticism.descent import first_fit, gauss_newton
+from pipeline.criticism.asked import fit_of
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, leave_out, uncertainties
 from pipeline.criticism.maps import all_maps, told_signal, unit_of
@@ -44,7 +45,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     if not found:
         note = "no capture holds what an equation needs: record a torque map"
         return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
-    fitted, around = first_fit(found, asked)
+    fitted, around = fit_of(found, asked)
     fitted, around = trimmed(found, fitted, around, names)
     held = leave_out(around, len(own_columns(fitted.model)), found)
     simulated = simulate(found, fitted, around, held)

@@ -1,6 +1,7 @@
 """Fits by Gauss-Newton: from orders of magnitude, and from a fit that is near.
 
-References: [1] Marquardt, SIAM J. Appl. Math. 11 (1963), a ridge for steps that reach too far.
+References: [1] Marquardt, SIAM J. Appl. Math. 11 (1963), a ridge for steps that reach too far; [2]
+Ortega & Rheinboldt, Iterative Solution of Nonlinear Equations (1970), ch. 7, the chord method.
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ from pipeline.criticism.segments import sparse
 from pipeline.criticism.size import base_scales
 from pipeline.criticism.system import Fitted, System, floors, system
 
-_ITERATIONS = 8
+_ITERATIONS = 12
 _REACH = 1.0
 _SHORT = 8
 _SILENT = 1e4
 _CONVERGED = 1.0
 _HALVINGS = 3
+_KEPT = 0.7
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
@@ -61,37 +63,45 @@ def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
 def gauss_newton(
     segments: Sequence[Segment],
     fitted: Fitted,
-    renew: bool = False,
     iterations: int = _ITERATIONS,
     before: System | None = None,
 ) -> tuple[Fitted, System]:
     """Fits a model's own parameters; returns the fit and the system around it.
 
-    A step that makes χ² worse is halved. With `renew` the noise floor is computed again on the
-    way, which a start far from the truth needs.
+    A step that makes the misfit worse is shortened. Columns stay as they are while steps do about
+    what they promise [2]; a fit is at its end where columns made anew promise nothing.
     """
-    around = system(segments, fitted, before=before)
+    around, fresh = system(segments, fitted, before=before), True
     for _ in range(iterations):
-        best = _damped(fitted, around)
-        step = bounded_step(best, around.columns, fitted.model, fitted.values)
-        if not renew and around.misfit - around.foreseen(step) < _CONVERGED:
+        step = bounded_step(_damped(fitted, around), around.columns, fitted.model, fitted.values)
+        if around.misfit - around.foreseen(step) >= _CONVERGED:
+            moved, tried, promised = _tried(segments, fitted, around, step)
+            gain = around.misfit - tried.misfit
+            if gain > 0:
+                fitted, around = moved, tried
+            fresh = fresh and gain <= 0
+            if gain >= max(_KEPT * promised, _CONVERGED):
+                continue
+        if fresh:
             break
-        for _ in range(_HALVINGS):
-            moved = _moved(fitted, around.columns, step)
-            if renew:
-                moved = replace(moved, sigma=floors(segments, moved.model, moved.values))
-            tried = system(segments, moved, before=around)
-            if renew or tried.misfit < around.misfit + _CONVERGED:
-                break
-            step = 0.3 * step
-        else:
+        around, fresh = system(segments, fitted, before=around), True
+    return fitted, around if fresh else system(segments, fitted, before=around)
+
+
+def _tried(
+    segments: Sequence[Segment], fitted: Fitted, around: System, step: Array
+) -> tuple[Fitted, System, float]:
+    """The fit a step away, or as far as it goes without harm; the system there, with the columns
+    of the start, and the fall of misfit that these promised.
+    """
+    for _ in range(_HALVINGS):
+        moved = _moved(fitted, around.columns, step)
+        tried = system(segments, moved, before=around, chord=True)
+        promised = around.misfit - around.foreseen(step)
+        if tried.misfit < around.misfit + _CONVERGED:
             break
-        gain = around.misfit - tried.misfit
-        if renew or gain > 0:
-            fitted, around = moved, tried
-        if not renew and gain < _CONVERGED:
-            break
-    return fitted, around
+        step = 0.3 * step
+    return moved, tried, promised
 
 
 def _damped(fitted: Fitted, around: System) -> Best:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import gammaincc
 
-from pipeline.criticism.descent import first_fit
+from pipeline.criticism.asked import fit_of
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
@@ -49,7 +49,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     found = segments(campaign, machine)
     if not _enough(found):
         return _insufficient(campaign, model, library)
-    fitted, _ = first_fit(found, asked)
+    fitted, _ = fit_of(found, asked)
     rungs = search(found, fitted, library)
     last = rungs[-1]
     offered = candidates(library, last.fitted)

@@ -83,7 +83,8 @@ def linearise(
 ) -> Rows:
     """Whitened residual and columns of one segment at `values`."""
     group, window, valid, groups = row_index(segment)
-    here = residual(segment, model, values)
+    sampler = _Sampler(segment, model, dict(values))
+    here = sampler.here
     floor = np.hypot(sigma[group[valid]], reading_error(segment, model, values)[valid])
     whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
     kept = np.zeros((int(valid.sum()), len(columns)))
@@ -100,7 +101,6 @@ def linearise(
                 kept[:, place] = projection[valid] * whiten
             pending.clear()
 
-    sampler = _Sampler(segment, model, dict(values), here)
     for place, column in enumerate(columns):
         change = sampler.change(column)
         if change is not None:
@@ -152,15 +152,14 @@ _BETWEEN = ("j_kgm2", *RIPPLES)
 class _Sampler:
     """Sampled change of a segment's residual along columns; hooks are linear, sensors are not."""
 
-    def __init__(
-        self, segment: Segment, model: Model, values: dict[str, float], here: Array
-    ) -> None:
-        self.segment, self.model, self.values, self.here = segment, model, values, here
+    def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:
+        self.segment, self.model, self.values = segment, model, values
         self.x = operate(segment, segment.recorded, model, values)
         pieces = self.pieces = evaluate(model, self.x, values)
         self.own: dict[str, Pieces] = {}
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
+        self.here = measured(segment, segment.recorded, model, values) - self.start
         # a hook's own column does without the small terms between samples
         self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES, 0.0)}
 

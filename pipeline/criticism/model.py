@@ -19,6 +19,7 @@ import numpy as np
 
 from pipeline.criticism.effect import (
     Array,
+    CoenergyHook,
     Complex,
     Effect,
     Machine,
@@ -142,17 +143,17 @@ def effect_flux(effect: Effect, x: Operating, q: Values) -> tuple[Complex, Array
 
     by_d = slope(replace(x, id_a=x.id_a + 1j * _STEP))
     by_q = slope(replace(x, iq_a=x.iq_a + 1j * _STEP))
-    return by_d + 1j * by_q, slope(replace(x, eps_rad=_beside(x)))
+    flux: Complex = by_d + 1j * by_q
+    used = frozenset(name for name, value in q.items() if value)
+    if not x.once(x.eps_rad, (hook, used), lambda: _turns(hook, x.one_sample(), q)):
+        return flux, np.zeros(shape)
+    beside = x.once(x.eps_rad, "beside", lambda: x.eps_rad + 1j * _STEP)
+    return flux, slope(replace(x, eps_rad=beside))
 
 
-def _beside(x: Operating) -> Complex:
-    """The electrical angle [n] a step into the imaginary, the same array every time."""
-    known = x.kept.get((id(x.eps_rad), 0))
-    if known is None:
-        known = x.eps_rad, x.eps_rad + 1j * _STEP, None
-        x.kept[id(x.eps_rad), 0] = known
-    turned: Complex = known[1]
-    return turned
+def _turns(hook: CoenergyHook, x: Operating, q: Values) -> bool:
+    """Whether a co-energy has the electrical angle in it: it is complex if that is."""
+    return np.iscomplexobj(hook(replace(x, eps_rad=x.eps_rad + 1j * _STEP), q))
 
 
 def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
@@ -172,11 +173,11 @@ def mean_current(x: Operating, values: Values) -> Operating:
     """
     if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
         return x
-    turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
+    turn, current = x.machine.pole_pairs * x.omega_rad_s * x.ts_s, x.i_a
     slope = np.zeros(turn.shape, dtype=complex)
-    slope[1:-1] = 0.5 * (x.i_a[2:] - x.i_a[:-2])
-    ripple = values["ripple_mean"] * turn**2 * (values["psi_wb"] / values["ld_h"] + x.i_a)
-    mean = x.i_a - values["ripple_slope"] * slope - ripple
+    slope[1:-1] = 0.5 * (current[2:] - current[:-2])
+    ripple = values["ripple_mean"] * turn**2 * (values["psi_wb"] / values["ld_h"] + current)
+    mean = current - values["ripple_slope"] * slope - ripple
     return replace(
         x,
         id_a=mean.real,

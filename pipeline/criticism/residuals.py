@@ -7,7 +7,7 @@ but the flux linkage and the angle, and those under the smooth windows of `numer
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -215,24 +215,35 @@ def _ahead(signal: Any) -> Any:
 def _rotor_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Complex:
     """Drop + dψ/dt + jω_e ψ [n], over what the capture's voltage samples stand for."""
     period = segment.ts_s
-    eps = x.machine.pole_pairs * x.theta_rad
     held = segment.timing == "held" and segment.kind == "dq"
     difference = _forward if held else _central
     psi, drop = pieces.psi_wb, pieces.drop_v
-    slope, omega = difference(psi, period), difference(eps, period)
-    if segment.kind == "q":
-        omega = x.machine.pole_pairs * x.omega_rad_s
+    slope = difference(psi, period)
     if held:
         psi, drop = _ahead(psi), _ahead(drop)
-    turn = x.machine.pole_pairs * x.omega_rad_s * period
-    averaged = segment.timing != "instant" and segment.kind == "dq"
-    shrink = np.sinc(turn / (2 * math.pi)) if averaged else 1.0
+    omega, turn, shrink = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
     voltage: Complex = drop + slope + 1j * omega * psi
     if segment.kind == "dq" and any(values[name] for name in RIPPLES[:2]):
         shrink = shrink - values["ripple_edge"] * turn**2
         lag = values["ripple_shift"] * 1j * psi * np.gradient(turn) / period
-        return shrink * voltage - lag
-    return shrink * voltage
+        voltage = shrink * voltage - lag
+    else:
+        voltage = shrink * voltage
+    return voltage
+
+
+def _pace(
+    segment: Segment, x: Operating, difference: Callable[[Array, float], Array]
+) -> tuple[Array, Array, Any]:
+    """Electrical speed [n, rad/s], what it turns in a sample period [n, rad], and what is left of
+    a voltage's mean while it turns.
+    """
+    turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
+    averaged = segment.timing != "instant" and segment.kind == "dq"
+    shrink = np.sinc(turn / (2 * math.pi)) if averaged else 1.0
+    if segment.kind == "q":
+        return turn / segment.ts_s, turn, shrink
+    return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn, shrink
 
 
 def _late_torque(x: Operating, pieces: Pieces, period: float, values: Values) -> Array:
@@ -243,7 +254,7 @@ def _late_torque(x: Operating, pieces: Pieces, period: float, values: Values) ->
 
 
 def _stationary_voltage(segment: Segment, x: Operating, pieces: Pieces) -> Complex:
-    turn = np.exp(1j * x.eps_rad)
+    turn = x.once(x.eps_rad, "turn", lambda: np.exp(1j * x.eps_rad))
     voltage: Complex = (pieces.drop_v + _central(pieces.psi_wb, segment.ts_s)) * turn
     return voltage
 

@@ -176,7 +176,9 @@ def _score(
     live = places
     while live.size:
         end = grams.along(np.concatenate([own, live])).best(*effort)
-        mine = dict(zip((around.columns[n].name for n in live), end.step[own.size :], strict=True))
+        mine = dict(
+            zip((around.columns[n].name for n in live), end.step[own.size :].tolist(), strict=True)
+        )
         wrong = [
             n
             for n in live
@@ -277,11 +279,7 @@ def _refit_best(
     least = math.inf
     for score in close:
         effect = score.candidate.effect
-        model = fitted.model.with_effects(effect)
-        moved = {name: fitted.values[name] + change for name, change in score.moves.items()}
-        start = {**fitted.values, **moved, **score.candidate.values, **score.step}
-        values = clipped(model, start)
-        tried = gauss_newton(segments, replace(fitted, model=model, values=values), before=wide)
+        tried = gauss_newton(segments, begun(fitted, score), before=wide)
         # of two that tie, the one that some capture here was made to show
         unsought = TIE if set(effect.tests).isdisjoint(wide.tests) else 0.0
         cost = tried[1].misfit + score.price + unsought
@@ -290,6 +288,14 @@ def _refit_best(
         if held_out_fall(wide, own, tried[1], segments) > _HELD * score.price:
             best, least = tried, cost
     return best
+
+
+def begun(fitted: Fitted, score: Score) -> Fitted:
+    """Where a refit with a candidate begins: what its score foresees."""
+    model = fitted.model.with_effects(score.candidate.effect)
+    moved = {name: fitted.values[name] + change for name, change in score.moves.items()}
+    start = {**fitted.values, **moved, **score.candidate.values, **score.step}
+    return replace(fitted, model=model, values=clipped(model, start))
 
 
 def material(fitted: Fitted, effect: Effect) -> bool:

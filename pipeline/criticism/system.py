@@ -69,6 +69,7 @@ class System:
     pull: Array
     around: Fitted
     tests: tuple[str, ...]
+    made_at: Values
 
     @property
     def size(self) -> int:
@@ -191,15 +192,16 @@ def system(
     fitted: Fitted,
     candidates: Sequence[Column] = (),
     before: System | None = None,
+    chord: bool = False,
 ) -> System:
     """Linearises every segment around a fit, along its own columns and those of candidates.
 
     Columns of hooks that are linear stay as they were in `before`, a system around a near fit with
-    the same noise floor.
+    the same noise floor; with `chord` all that it has stay.
     """
     model, values = fitted.model, fitted.values
     columns = [*own_columns(model), *candidates]
-    known = _kept(before, fitted)
+    known = _kept(before, fitted, chord)
     new = [column for column in columns if column.key not in known]
     none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
     floor = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
@@ -237,10 +239,11 @@ def system(
         pull=pull,
         around=fitted,
         tests=tuple(segment.test for segment in segments),
+        made_at=values if before is None or not known else before.made_at,
     )
 
 
-def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
+def _kept(before: System | None, fitted: Fitted, chord: bool) -> dict[ColumnKey, Array]:
     """Columns of an earlier system that hold at a new fit too.
 
     A stale column costs no accuracy: a fit ends where the residual, which is always computed anew,
@@ -248,9 +251,11 @@ def _kept(before: System | None, fitted: Fitted) -> dict[ColumnKey, Array]:
     """
     if before is None or before.around.sigma is not fitted.sigma:
         return {}
-    if _moved_base(before.around.values, fitted.values):
+    if chord:
+        return {c.key: before.matrix[:, place] for place, c in enumerate(before.columns)}
+    if _moved_base(before.made_at, fitted.values):
         return {}
-    heavier = abs(fitted.values["j_kgm2"] / before.around.values["j_kgm2"] - 1.0)
+    heavier = abs(fitted.values["j_kgm2"] / before.made_at["j_kgm2"] - 1.0)
     return {
         column.key: before.matrix[:, place]
         for place, column in enumerate(before.columns)
@@ -267,7 +272,7 @@ def _linear(column: Column, model: Model) -> bool:
     """Whether the residual is linear along a column, whatever the other parameters are."""
     effect = column.effect
     if effect is None:
-        return column.name not in ("gain_current", "offset_temp_k")
+        return column.name != "offset_temp_k"
     if effect not in model.effects:
         return True
     shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.criticism.descent import first_fit
+from pipeline.criticism.asked import fit_of
 from pipeline.criticism.judge import leave_out, signal_errors
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.residuals import measured, residual
@@ -59,7 +59,7 @@ def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bo
     if not offsets:
         parts = tuple(replace(s, offsets=None) for s in parts)
     model = model_of(ModelSpec("ideal", effects), machine)
-    fitted, around = trimmed(parts, *first_fit(parts, model), effects)
+    fitted, around = trimmed(parts, *fit_of(parts, model), effects)
     held = leave_out(around, len(own_columns(fitted.model)), parts)
     left = np.where(np.isfinite(held.residual), held.residual, around.residual)
     return Fit(parts, fitted, around, signal_errors(around, left))

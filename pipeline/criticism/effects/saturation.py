@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from pipeline.criticism.effect import Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Effect, Operating, Parameter, Values, log1p
 
 _STRAIGHT = 1e-4
 
@@ -15,7 +13,7 @@ def _lost(square: Any, bend: float) -> Any:
     """∫ s³/(1 + bend s²) ds over s², a series where the bend is next to nothing."""
     if bend < _STRAIGHT:
         return square * square * (0.25 - bend / 6 * square)
-    return (bend * square - np.log1p(bend * square)) / (2 * bend**2)
+    return (bend * square - log1p(bend * square)) / (2 * bend**2)
 
 
 def _coenergy(x: Operating, q: Values) -> Any:

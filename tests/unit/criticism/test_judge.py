@@ -31,6 +31,7 @@ def captures(levels: list[float], seed: int = 4) -> System:
         pull=np.zeros(1),
         around=Fitted(None, {}, ()),  # type: ignore[arg-type]
         tests=("drive",) * len(levels),
+        made_at={},
     )
 
 

@@ -49,7 +49,6 @@ def test_an_effect_of_nobodys_library_is_unknown_with_its_variable():
     assert result.unknown.variables == ("omega_mech_rad_s",)
 
 
-@pytest.mark.slow
 def test_compare_knows_the_constants_and_the_size_of_what_was_added():
     spec = ModelSpec("standard", ("angle_eccentricity", "stribeck"))
     result = compare(campaign("P3"), spec, Constants())
