@@ -27,7 +27,7 @@ _SHORT = 8
 _SILENT = 1e4
 _CONVERGED = 1.0
 _HALVINGS = 3
-_KEPT = 0.7
+_KEPT = 0.9
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
@@ -75,7 +75,8 @@ def gauss_newton(
     for _ in range(iterations):
         step = bounded_step(_damped(fitted, around), around.columns, fitted.model, fitted.values)
         if around.misfit - around.foreseen(step) >= _CONVERGED:
-            moved, tried, promised = _tried(segments, fitted, around, step)
+            halvings = _HALVINGS if fresh else 1
+            moved, tried, promised = _tried(segments, fitted, around, step, halvings)
             gain = around.misfit - tried.misfit
             if gain > 0:
                 fitted, around = moved, tried
@@ -89,12 +90,12 @@ def gauss_newton(
 
 
 def _tried(
-    segments: Sequence[Segment], fitted: Fitted, around: System, step: Array
+    segments: Sequence[Segment], fitted: Fitted, around: System, step: Array, halvings: int
 ) -> tuple[Fitted, System, float]:
     """The fit a step away, or as far as it goes without harm; the system there, with the columns
     of the start, and the fall of misfit that these promised.
     """
-    for _ in range(_HALVINGS):
+    for _ in range(halvings):
         moved = _moved(fitted, around.columns, step)
         tried = system(segments, moved, before=around, chord=True)
         promised = around.misfit - around.foreseen(step)
