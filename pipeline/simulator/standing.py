@@ -13,6 +13,8 @@ from pipeline.simulator.sensors import Session, grid, to_grid
 
 Array = NDArray[np.float64]
 ROOT3 = math.sqrt(3.0)
+# tanh(8) is 1 to 2e-7
+_CRAWL = 8.0
 # Direction of a pair's current in alpha and beta, per ampere; then its two phases.
 PAIRS = {
     "ab": (1.0, -1.0 / ROOT3, 0, 1),
@@ -272,7 +274,8 @@ def holding_current(session: Session, how: protocols.HoldingCurrent) -> Recordin
     once = np.arange(how.angles) * 2.0 * math.pi / how.angles
     theta = np.concatenate([once, once[::-1]])
     sense = np.repeat([1.0, -1.0], how.angles)
-    crawl = sense * 100.0 * plant.omega_eps
+    # fast enough for the whole of Coulomb's friction, too slow for any other drag
+    crawl = sense * _CRAWL * plant.omega_eps
     kt = 1.5 * motor.pole_pairs * max(motor.psi_pm_wb, 1e-9)
     degc = motor.ambient_degc
     eps, i_q = motor.pole_pairs * theta, np.zeros(theta.size)
