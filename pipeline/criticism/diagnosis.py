@@ -17,7 +17,15 @@ from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import segments
-from pipeline.criticism.selection import Candidate, Rung, Score, candidates, loss_without, search
+from pipeline.criticism.selection import (
+    TIE,
+    Candidate,
+    Rung,
+    Score,
+    candidates,
+    loss_without,
+    search,
+)
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import own_columns
@@ -36,6 +44,7 @@ from pipeline.records.naming import file_stem
 
 _SEEN = 3.0
 _EXPLAINED = 0.5
+_AS_GOOD = 0.1
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -175,7 +184,8 @@ def _ranking(
     found = []
     for place, name in enumerate(last.added):
         effect = next(e for e in last.fitted.model.effects if e.name == name)
-        confused = rivals_of(name, last.fitted, last.around, offered, captured)
+        over = _passed_over(rungs, name, last.added)
+        confused = rivals_of(name, last.fitted, last.around, offered, captured, over)
         loss = loss_without(last.around, last.fitted, (name,))
         dof = effect.dof(last.fitted.model.machine)
         found.append(
@@ -201,6 +211,18 @@ def _ranking(
         )
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
     return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
+
+
+def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tuple[Candidate, ...]:
+    """Candidates that promised as much as an effect on the rung before it was added."""
+    before = [rung for rung in rungs if name not in rung.added][-1]
+    falls = {score.candidate.effect.name: score.fall for score in before.scores}
+    least = falls[name] - max(TIE, _AS_GOOD * falls[name]) if name in falls else math.inf
+    return tuple(
+        score.candidate
+        for score in before.scores
+        if score.fall > least and score.passes and score.candidate.effect.name not in added
+    )
 
 
 def _drop(held: Sequence[HeldOut], place: int) -> float:

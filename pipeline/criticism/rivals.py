@@ -23,11 +23,13 @@ def rivals_of(
     wide: System,
     offered: Sequence[Candidate],
     segments: Sequence[Segment],
+    passed_over: Sequence[Candidate] = (),
 ) -> tuple[str, ...]:
     """Effects that explain the captures as well in an effect's place (misfit within 12, and so
     much of it that is over noise floors and priors).
 
-    Those that to first order keep most of what the effect explains are refitted in its place.
+    Those are refitted in its place that to first order keep most of what the effect explains, or
+    that were `passed_over` for it.
     """
     effect = next(e for e in fitted.model.effects if e.name == name)
     grams = wide.grams()
@@ -43,10 +45,12 @@ def rivals_of(
         other = candidate.effect.name
         if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate
+    for candidate in passed_over:
+        near.setdefault(candidate.effect.name, (_NEAR * lost, candidate))
     nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))[:_MOST]
     ties = []
     for _, candidate in nearest:
-        swapped = _refitted(name, fitted, candidate, segments)
+        swapped = _refitted(name, fitted, candidate, segments, wide)
         if (
             swapped is not None
             and swapped.misfit < wide.misfit + TIE
@@ -57,13 +61,13 @@ def rivals_of(
 
 
 def _refitted(
-    name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment]
+    name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment], wide: System
 ) -> System | None:
     """The system with a candidate in an effect's place; None where it comes out negligible."""
     model = fitted.model.without(name).with_effects(candidate.effect)
     kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{name}.")}
     start = replace(fitted, model=model, values={**kept, **candidate.values})
-    swapped, around = gauss_newton(segments, start)
+    swapped, around = gauss_newton(segments, start, before=wide)
     return around if material(swapped, candidate.effect) else None
 
 
