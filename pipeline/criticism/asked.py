@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from pipeline.criticism.descent import first_fit, gauss_newton, initial
+from pipeline.criticism.descent import first_fit, gauss_newton, initial, rough_fit
+from pipeline.criticism.mains import Hum, hum_of, with_hum
 from pipeline.criticism.model import Model
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import begun, candidates, score_all, widened
 from pipeline.criticism.system import Fitted, System
 
 
-def fit_of(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System]:
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """A model fitted to segments, which know the mains lines in them; the system around it."""
+
+    segments: tuple[Segment, ...]
+    fitted: Fitted
+    around: System
+    hum: tuple[Hum, ...]
+
+
+def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     """Fits a model from orders of magnitude.
 
     Effects that have a shape or a choice come in one by one, the most helpful first, each from the
@@ -24,16 +35,20 @@ def fit_of(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System]:
         for effect in model.effects
         if not all(p.amplitude for p in effect.parameters_of(model.machine))
     }
-    fitted, around = first_fit(segments, model.without(*shaped))
+    near = rough_fit(segments, model.without(*shaped))
+    hum = hum_of(segments, near.model, near.values)
+    heard = with_hum(segments, hum)
+    fitted, around = first_fit(heard, near)
     if not shaped:
-        return fitted, around
+        return Begun(heard, fitted, around, hum)
     while shaped:
         offered = candidates(shaped, fitted)
-        wide = widened(segments, fitted, offered, around)
+        wide = widened(heard, fitted, offered, around)
         scores = score_all(wide, fitted, offered)
         if not scores:
             break
         del shaped[scores[0].candidate.effect.name]
-        fitted, around = gauss_newton(segments, begun(fitted, scores[0]), before=wide)
+        fitted, around = gauss_newton(heard, begun(fitted, scores[0]), before=wide)
     unheard = {k: v for effect in shaped.values() for k, v in initial(effect, model).items()}
-    return gauss_newton(segments, replace(fitted, model=model, values={**fitted.values, **unheard}))
+    whole = replace(fitted, model=model, values={**fitted.values, **unheard})
+    return Begun(heard, *gauss_newton(heard, whole), hum)

@@ -11,6 +11,7 @@ from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, leave_out, uncertainties
+from pipeline.criticism.mains import told_hum
 from pipeline.criticism.maps import all_maps, told_signal, unit_of
 from pipeline.criticism.model import BASE, PHYSICAL, Model
 from pipeline.criticism.optional import trimmed
@@ -45,8 +46,9 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     if not found:
         note = "no capture holds what an equation needs: record a torque map"
         return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
-    fitted, around = fit_of(found, asked)
-    fitted, around = trimmed(found, fitted, around, names)
+    begun = fit_of(found, asked)
+    found = begun.segments
+    fitted, around = trimmed(found, begun.fitted, begun.around, names)
     held = leave_out(around, len(own_columns(fitted.model)), found)
     simulated = simulate(found, fitted, around, held)
     residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
@@ -62,7 +64,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         (*_errors(found, around, held), *run_errors(simulated)),
         held.total if math.isfinite(held.total) else 0.0,
         tuple(_where(maps)),
-        (),
+        told_hum(begun.hum),
         maps,
         moved,
         bare,

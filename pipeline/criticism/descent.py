@@ -133,17 +133,22 @@ def _moved(fitted: Fitted, columns: Sequence[Column], step: Array) -> Fitted:
     return replace(fitted, values=clipped(fitted.model, values))
 
 
-def first_fit(segments: Sequence[Segment], model: Model) -> tuple[Fitted, System]:
-    """Fits a model from orders of magnitude.
+def rough_fit(segments: Sequence[Segment], model: Model) -> Fitted:
+    """Fits a model from orders of magnitude, every equation by the machine's own scale.
 
-    First every equation counts by the machine's own scale, on a few windows of each segment: by
-    its noise floor, one that misses it by far would be given up before the constants are near.
+    By its noise floor, an equation that misses it by far would be given up before the constants
+    are near. A few windows of each segment are enough.
     """
     values = start_values(model, model.machine)
     few = [sparse(segment) for segment in segments]
     rough = tuple(rough_floor(segment, model, values) for segment in few)
     near, _ = gauss_newton(few, Fitted(model, values, rough))
-    floor = floors(segments, model, near.values)
+    return near
+
+
+def first_fit(segments: Sequence[Segment], near: Fitted) -> tuple[Fitted, System]:
+    """Fits a model from a rough fit, every equation by its noise floor."""
+    floor = floors(segments, near.model, near.values)
     ends = [gauss_newton(segments, replace(near, sigma=floor))]
     if len(segments) <= _SHORT:
         ends += [_one_side_first(segments, replace(near, sigma=floor), side) for side in _SIDES]

@@ -13,6 +13,7 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.ladder import parameters_of, rung_record
+from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
 from pipeline.criticism.segment import Segment
@@ -58,8 +59,9 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     found = segments(campaign, machine)
     if not _enough(found):
         return _insufficient(campaign, model, library)
-    fitted, _ = fit_of(found, asked)
-    rungs = search(found, fitted, library)
+    start_fit = fit_of(found, asked)
+    found = start_fit.segments
+    rungs = search(found, start_fit.fitted, library)
     last = rungs[-1]
     offered = candidates(library, last.fitted)
     held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
@@ -81,7 +83,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
         sketch if verdict == "unknown" else None,
         left,
-        tuple(_wanted(library[name]) for name in unseen),
+        (*told_hum(start_fit.hum), *(_wanted(library[name]) for name in unseen)),
     )
 
 

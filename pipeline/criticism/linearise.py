@@ -6,7 +6,6 @@ a group of (channel, order), so that any subset of effects or captures is then s
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -109,16 +108,21 @@ def linearise(
             flush()
     flush()
     both = np.column_stack([projected(segment, here)[valid] * whiten, kept])
-    for offset in offsets(segment, valid, whiten):
-        both -= np.outer(offset, offset @ both) * _absorbed(float(offset @ offset))
+    absorb(both, offsets(segment, valid, whiten))
     unit = told_unit(segment, values) / (whiten * window_gain(segment))
     soft = floor * whiten
     return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
 
 
-def _absorbed(power: float) -> float:
-    """Weight c of x − c n (n·x) that whitens 1 + n nᵀ along n, |n|² = power."""
-    return (1.0 - 1.0 / math.sqrt(1.0 + power)) / max(power, 1e-300)
+def absorb(rows: Array, unknown: Sequence[Array]) -> None:
+    """Whitens rows [R, P] in place for disturbances [R] of standard size that they may hold.
+
+    (1 + N Nᵀ)^(−1/2) leaves all that is across the disturbances N as it is.
+    """
+    if unknown:
+        axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
+        lost = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
+        rows -= (axes * lost) @ (axes.T @ rows)
 
 
 _VOLTAGE_BASE = (

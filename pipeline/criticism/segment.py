@@ -33,7 +33,8 @@ class Segment:
     numbers the parts of a capture that are held out one by one where there is no other capture to
     predict it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the
     capture may have; `runs_rad` the angles turned between reversals, of which the column `run`
-    numbers the one at hand.
+    numbers the one at hand; `lines` [K, C, W, M] are weak samples of the mains lines that there
+    may be.
     """
 
     capture: str
@@ -52,6 +53,7 @@ class Segment:
     blocks: NDArray[np.int64] | None = None
     offsets: Array | None = None
     runs_rad: Array | None = None
+    lines: Array | None = None
 
     @property
     def size(self) -> int:

@@ -78,7 +78,8 @@ def sparse(segment: Segment) -> Segment:
     moved = PAD + (weak.length + 2 * PAD) * np.arange(_FEW)
     few = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     blocks = None if segment.blocks is None else segment.blocks[chosen]
-    return replace(segment, recorded=cut, weak=few, blocks=blocks)
+    lines = None if segment.lines is None else segment.lines[:, :, chosen]
+    return replace(segment, recorded=cut, weak=few, blocks=blocks, lines=lines)
 
 
 def _temperatures(capture: Capture) -> list[str]:

@@ -59,7 +59,9 @@ def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bo
     if not offsets:
         parts = tuple(replace(s, offsets=None) for s in parts)
     model = model_of(ModelSpec("ideal", effects), machine)
-    fitted, around = trimmed(parts, *fit_of(parts, model), effects)
+    begun = fit_of(parts, model)
+    parts = begun.segments
+    fitted, around = trimmed(parts, begun.fitted, begun.around, effects)
     held = leave_out(around, len(own_columns(fitted.model)), parts)
     left = np.where(np.isfinite(held.residual), held.residual, around.residual)
     return Fit(parts, fitted, around, signal_errors(around, left))

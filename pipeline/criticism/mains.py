@@ -1,0 +1,134 @@
+"""Mains hum in the recordings: found at its own frequencies, and taken as noise from then on.
+
+A line at 50 or 60 Hz, or a harmonic, that stands out of the residuals of several captures whatever
+the shaft does there, is the building's and not the machine's. Every capture may then have it, of
+that size and of any phase.
+
+Reference: Kay, Fundamentals of Statistical Signal Processing II (1998), section 7.6.3, a sinusoid
+of unknown phase in noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Values
+from pipeline.criticism.model import Model
+from pipeline.criticism.residuals import residual
+from pipeline.criticism.segment import Segment
+
+LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
+_BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
+_CYCLES = 12.0
+_STANDS_OUT = 20.0
+_SEEN = 4.0
+_CAPTURES = 3
+_SLIDE = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Hum:
+    """A line that the recordings of one signal share: frequency [Hz], rms [the signal's unit].
+
+    `kind` is that of the equations: terminals, drive and slow turn have instruments of their own.
+    """
+
+    kind: str
+    signal: str
+    freq_hz: float
+    rms: float
+
+
+def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Hum, ...]:
+    """The mains lines of every signal, from the residuals around a rough fit.
+
+    The mains are there if the power of a line is 20 times that beside it in three captures of one
+    signal. Then every signal has the line in which it stands out in half of the captures that could
+    show it: where an order of the turning shaft comes too near, none could.
+    """
+    powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
+    for segment in segments:
+        duration = segment.size * segment.ts_s
+        if segment.weak is None or duration * LINES_HZ[0] < _CYCLES:
+            continue
+        lines = [f for f in LINES_HZ if 2.2 * f * segment.ts_s < 1.0 and not _turns_at(segment, f)]
+        left = residual(segment, model, values)
+        for channel, one in zip(segment.channels, left, strict=True):
+            power = _spectrum(one)
+            for freq in lines:
+                powers[segment.kind, channel, freq].append(_stands_out(power, freq, duration))
+    ratios = {
+        key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
+    }
+    there = {freq for (_, _, freq), r in ratios.items() if (r > _STANDS_OUT).sum() >= _CAPTURES}
+    return tuple(
+        Hum(*key, math.sqrt(float(np.median([line for line, _ in powers[key]]))))
+        for key, ratio in ratios.items()
+        if key[-1] in there and float(np.median(ratio)) > _SEEN
+    )
+
+
+def with_hum(segments: Sequence[Segment], heard: Sequence[Hum]) -> tuple[Segment, ...]:
+    """The segments, each knowing the lines that its channels may have."""
+    return tuple(_humming(segment, heard) for segment in segments)
+
+
+def told_hum(heard: Sequence[Hum]) -> tuple[str, ...]:
+    """A note on every signal with mains hum in it."""
+    notes = []
+    for signal in dict.fromkeys(hum.signal for hum in heard):
+        mine = [hum for hum in heard if hum.signal == signal]
+        lines = ", ".join(f"{freq:g}" for freq in sorted({hum.freq_hz for hum in mine}))
+        rms = max(hum.rms for hum in mine)
+        notes.append(f"mains hum in {signal} at {lines} Hz, {rms:.2g} rms: taken as noise")
+    return tuple(notes)
+
+
+def _humming(segment: Segment, heard: Sequence[Hum]) -> Segment:
+    weak = segment.weak
+    mine = [h for h in heard if h.kind == segment.kind and h.signal in segment.channels]
+    if weak is None or not mine:
+        return segment
+    time = np.arange(segment.size) * segment.ts_s
+    lines = np.zeros((2 * len(mine), len(segment.channels), weak.starts.size, weak.orders.size))
+    for number, hum in enumerate(mine):
+        turn = 2.0 * math.pi * hum.freq_hz * time
+        waves = math.sqrt(2.0) * hum.rms * np.stack([np.cos(turn), np.sin(turn)])
+        place = segment.channels.index(hum.signal)
+        lines[2 * number : 2 * number + 2, place] = weak.project(waves)
+    return replace(segment, lines=lines)
+
+
+def _spectrum(signal: Array) -> Array:
+    """Mean squares [bins] of the lines of a signal [n]."""
+    window = np.hanning(signal.size + 2)[1:-1]
+    power: Array = 2.0 * (np.abs(np.fft.rfft(window * signal)) / window.sum()) ** 2
+    return power
+
+
+def _stands_out(power: Array, freq_hz: float, duration_s: float) -> tuple[float, float]:
+    """Mean square of the line at a frequency, and of what lies beside it."""
+    middle = round(freq_hz * duration_s)
+    beside = middle + np.array(_BESIDE)
+    beside = beside[(beside > 0) & (beside < power.size)]
+    level = float(np.median(power[beside]))
+    return float(power[middle - 1 : middle + 2].max()), max(level, 1e-300)
+
+
+def _turns_at(segment: Segment, freq_hz: float) -> bool:
+    """Whether an order of a steadily turning shaft may make a line of this frequency."""
+    theta = segment.recorded.get("theta_mech_rad")
+    if theta is None or segment.kind in ("terminal", "lcr"):
+        return False
+    speed = np.gradient(theta, segment.ts_s) / (2.0 * math.pi)
+    mean = float(np.abs(speed.mean()))
+    duration = segment.size * segment.ts_s
+    if mean * duration < 0.5 or float(speed.std()) > _SLIDE * mean:
+        return False
+    order = freq_hz / mean
+    return abs(order - round(order)) * mean * duration < 2.0 and order < 100.0

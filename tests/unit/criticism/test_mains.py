@@ -1,0 +1,83 @@
+"""Mains hum: found where it is, not taken from the shaft, and no longer in the way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.floors import noise_floor
+from pipeline.criticism.linearise import absorb, linearise
+from pipeline.criticism.mains import Hum, hum_of, told_hum, with_hum
+from pipeline.criticism.model import Model
+from tests.unit.criticism.machines import BASE, log, machine
+
+PLAIN = Model(machine(), ())
+
+
+def with_line(segment, name, rms, freq, phase):
+    time = np.arange(segment.size) * segment.ts_s
+    wave = np.sqrt(2.0) * rms * np.sin(2.0 * np.pi * freq * time + phase)
+    return replace(segment, recorded={**segment.recorded, name: segment.recorded[name] + wave})
+
+
+def logs(rms=0.0, freq=50.0, count=3):
+    return [
+        with_line(log(seed=n, noise=1.0), "vq_v", rms, freq, 0.7 * n) for n in range(5, 5 + count)
+    ]
+
+
+def test_a_line_is_heard_with_its_size_in_the_signal_that_has_it():
+    (hum,) = hum_of(logs(rms=0.02), PLAIN, BASE)
+    assert (hum.kind, hum.signal, hum.freq_hz) == ("dq", "vq_v", 50.0)
+    assert hum.rms == pytest.approx(0.02, rel=0.15)
+    assert told_hum([hum]) == ("mains hum in vq_v at 50 Hz, 0.02 rms: taken as noise",)
+
+
+@pytest.mark.parametrize("freq", [40.0, 73.0])
+def test_no_other_line_is_the_mains(freq):
+    assert hum_of(logs(rms=0.02, freq=freq), PLAIN, BASE) == ()
+
+
+def test_white_noise_hums_in_none_of_forty_programmes():
+    for first in range(0, 120, 3):
+        recorded = [log(seed=first + n, noise=1.0) for n in range(3)]
+        assert hum_of(recorded, PLAIN, BASE) == ()
+
+
+def test_two_captures_alone_do_not_make_a_building():
+    assert hum_of(logs(rms=0.02, count=2), PLAIN, BASE) == ()
+
+
+def test_once_a_turn_of_a_steady_shaft_is_not_taken_for_it():
+    """A shaft at 3000 rpm has its own line at 50 Hz."""
+    made = []
+    for one in logs(rms=0.02):
+        theta = 2.0 * np.pi * 50.0 * np.arange(one.size) * one.ts_s
+        made.append(replace(one, recorded={**one.recorded, "theta_mech_rad": theta}))
+    assert not [h for h in hum_of(made, PLAIN, BASE) if h.freq_hz == 50.0]
+
+
+def test_a_line_that_is_known_no_longer_misses_the_floor():
+    (segment,) = logs(rms=0.05, count=1)
+    sigma = noise_floor(segment, PLAIN, BASE, 1)
+    strict = np.zeros(sigma.size)
+    (known,) = with_hum([segment], [Hum("dq", "vq_v", 50.0, 0.05)])
+    left = {}
+    for name, one in (("as it is", segment), ("known", known)):
+        rows = linearise(one, PLAIN, BASE, [], sigma, strict)
+        mine = [n for n, (channel, _) in enumerate(rows.groups) if channel == "vq_v"]
+        left[name] = float((rows.residual[np.isin(rows.group, mine)] ** 2).mean())
+    assert left["as it is"] > 5.0
+    assert left["known"] < 1.5
+
+
+def test_absorbed_rows_have_the_likelihood_of_their_covariance():
+    """|z|² is r' (1 + N N')⁻¹ r, for disturbances that are not at right angles."""
+    random = np.random.default_rng(3)
+    unknown, rows = random.normal(size=(3, 12)), random.normal(size=(12, 2))
+    covariance = np.eye(12) + unknown.T @ unknown
+    expected = rows.T @ np.linalg.solve(covariance, rows)
+    absorb(rows, list(unknown))
+    assert rows.T @ rows == pytest.approx(expected)
