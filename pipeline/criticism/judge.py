@@ -85,18 +85,12 @@ def uncertainties(around: System, held: HeldOut, own: int) -> Array:
     return wider
 
 
-def held_out_fall(
-    before: System, own: int, after: System, segments: Sequence[Segment] = ()
-) -> float:
-    """Fall of misfit from one system, of `own` columns, to another of the same rows, every capture
-    predicted from all the others; those that are always in the fit count as fitted.
+def held_out_spreads(around: System, own: int, segments: Sequence[Segment] = ()) -> Array:
+    """χ²/n [G] of every group, each capture predicted from all the others along the first `own`
+    columns; captures that are always in the fit count as fitted.
     """
-    misfits = []
-    for around, count in ((before, own), (after, len(after.columns))):
-        held = leave_out(around, count, segments).residual
-        left = np.where(np.isfinite(held), held, around.residual)
-        misfits.append(around.misfit_of(around.spreads(left)) + float(around.prior_costs().sum()))
-    return misfits[0] - misfits[1]
+    held = leave_out(around, own, segments).residual
+    return around.spreads(np.where(np.isfinite(held), held, around.residual))
 
 
 def _units(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:

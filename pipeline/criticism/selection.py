@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.grams import Descent, Grams
-from pipeline.criticism.judge import held_out_fall
+from pipeline.criticism.judge import held_out_spreads
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.model import zero
 from pipeline.criticism.optional import trimmed
@@ -208,21 +208,41 @@ def _outside(value: float, parameter: Parameter) -> bool:
 
 def _share(around: System, effect: Effect, before: Standing, after: Standing) -> float:
     """Largest share of the removable misfit that went away: of one recorded signal, of the
-    captures of the tests that excite the effect, or of what the priors of the station cost.
+    captures of the tests that excite the effect, or of what the priors of the station cost; but of
+    a signal's error no more than the share of its power, at one order, that went with it.
 
-    An excess counts from 30 on, or from half a nat a sample where there are few.
+    An excess counts from 30 on, or from half a nat a sample where there are few. Instruments that
+    wander and effects of nobody's library are misfit that many an effect can nibble at.
     """
     excess = around.counts * np.log(np.maximum(before.spreads, 1.0))
     left = around.counts * np.log(np.maximum(after.spreads, 1.0))
     channel = np.array([name for _, name, _ in around.labels])
     places = [channel == name for name in dict.fromkeys(channel.tolist())]
     places.append(np.array([around.tests[n] in effect.tests for n, _, _ in around.labels]))
-    found = [
-        (float(excess[n].sum()), float(left[n].sum()), min(_WORTH, _CLEAR * around.counts[n].sum()))
-        for n in places
-    ]
-    found.append((before.prior_cost, after.prior_cost, _WORTH))
-    return max((1.0 - still / had for had, still, least in found if had > least), default=0.0)
+    shares = [0.0]
+    for place in places:
+        had = float(excess[place].sum())
+        if had > min(_WORTH, _CLEAR * float(around.counts[place].sum())):
+            shares.append(1.0 - float(left[place].sum()) / had)
+    error = min(max(shares), _power_share(around, before.spreads, after.spreads))
+    cost = before.prior_cost
+    return max(error, 1.0 - after.prior_cost / cost if cost > _WORTH else 0.0)
+
+
+def _power_share(around: System, before: Array, after: Array) -> float:
+    """Largest share of the power over the noise floor, of one signal at one order, that went away
+    between two sets of χ²/n [G].
+    """
+    numbers: dict[tuple[str, int], int] = {}
+    pool = [numbers.setdefault((name, k), len(numbers)) for _, name, k in around.labels]
+    count = np.bincount(pool, around.counts)
+    nats = np.bincount(pool, around.counts * np.log(np.maximum(before, 1.0)))
+    had, has = (
+        np.bincount(pool, around.counts * np.maximum(spreads - 1.0, 0.0))
+        for spreads in (before, after)
+    )
+    worth = nats > np.minimum(_WORTH, _CLEAR * count)
+    return float((1.0 - has[worth] / had[worth]).max(initial=0.0))
 
 
 def search(
@@ -274,6 +294,7 @@ def _refit_best(
     with captures predicted from all the others by half of it at least.
     """
     own = len(own_columns(fitted.model))
+    before = held_out_spreads(wide, own, segments)
     close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
     least = math.inf
@@ -285,9 +306,22 @@ def _refit_best(
         cost = tried[1].misfit + score.price + unsought
         if not material(tried[0], effect) or cost >= min(least, wide.misfit):
             continue
-        if held_out_fall(wide, own, tried[1], segments) > _HELD * score.price:
+        if _holds(wide, before, tried[1], segments, _HELD * score.price):
             best, least = tried, cost
     return best
+
+
+def _holds(
+    wide: System, before: Array, tried: System, segments: Sequence[Segment], least: float
+) -> bool:
+    """Whether the misfit of captures predicted from all the others falls by `least`, and with it a
+    share of some signal's power; `before` are their χ²/n without the candidate.
+    """
+    after = held_out_spreads(tried, len(tried.columns), segments)
+    cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
+    fall = wide.misfit_of(before) + cost - tried.misfit_of(after) - left
+    priors = cost > _WORTH and left < (1.0 - LEAST_SHARE) * cost
+    return fall > least and (priors or _power_share(wide, before, after) >= LEAST_SHARE)
 
 
 def begun(fitted: Fitted, score: Score) -> Fitted:
