@@ -7,13 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.judge import leave_out, remainder
+from pipeline.criticism.linearise import effect_columns
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
-from pipeline.criticism.selection import candidates, material, score_all, search, widened
-from pipeline.criticism.system import Fitted, floors, own_columns, system
+from pipeline.criticism.selection import (
+    Candidate,
+    candidates,
+    material,
+    score_all,
+    search,
+    widened,
+)
+from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
 
@@ -112,6 +121,52 @@ def test_zero_of_an_effect_takes_the_trial_shape():
     values = zero(effects()["stribeck"], model)
     assert values["stribeck.excess_nm"] == 0.0
     assert values["stribeck.speed_rad_s"] == pytest.approx(0.004 * 250.0)
+
+
+def test_what_is_asked_for_is_looked_for_at_all_its_trial_shapes():
+    """From the first of them, 1 rad/s, a bump of 20 rad/s is out of sight."""
+
+    def drag(omega, _):
+        return np.sign(omega) * (0.02 + 0.03 * np.exp(-((omega / 20.0) ** 2)))
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    asked = tuple(effects()[name] for name in ("coulomb_friction", "stribeck"))
+    found = fit_of(segments, Model(machine(), asked)).fitted.values
+    assert found["stribeck.speed_rad_s"] == pytest.approx(20.0, rel=0.05)
+    assert found["stribeck.excess_nm"] == pytest.approx(0.03, rel=0.05)
+    assert found["coulomb_friction.torque_nm"] == pytest.approx(0.02, rel=0.05)
+
+
+@pytest.mark.parametrize(("other", "expected"), [(1.0, 1.0), (1000.0, 0.002)])
+def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
+    """One capture of two comes to its floor from χ²/n = 3, the other stays where it is.
+
+    By logarithms, that would be an eighth of all misfit beside a capture at 1000.
+    """
+    effect, model = effects()["windage"], Model(machine(), ())
+    (column,) = effect_columns(effect, model)
+    random = np.random.default_rng(4)
+    shape = np.concatenate([np.sqrt(2.0) * random.choice([-1.0, 1.0], 100), np.zeros(100)])
+    noise = random.choice([-1.0, 1.0], 200)
+    around = System(
+        columns=(*own_columns(model), column),
+        residual=noise * np.repeat([1.0, np.sqrt(other)], 100) - shape,
+        matrix=np.column_stack([np.zeros((200, len(own_columns(model)))), shape / 0.1]),
+        group=np.repeat([0, 1], 100),
+        window=np.tile(np.arange(100), 2),
+        unit=np.ones(200),
+        soft=np.ones(200),
+        whiten=np.ones(200),
+        labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
+        penalty=np.zeros(1 + len(own_columns(model))),
+        pull=np.zeros(1 + len(own_columns(model))),
+        around=Fitted(model, dict(BASE), ()),
+        tests=("drive", "drive"),
+        made_at=BASE,
+    )
+    (score,) = score_all(around, around.around, [Candidate(effect, (column,))])
+    assert score.fall > score.price
+    assert score.share == pytest.approx(expected, abs=0.2 * expected)
 
 
 def test_an_unknown_drag_is_told_by_its_variable_and_curve():
