@@ -23,9 +23,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 
 from pipeline.__main__ import main
+from pipeline.io.recordings.capture import LONG_ROWS, recording_bytes
 from pipeline.io.recordings.font import RANGES, SINGLE, can_draw, drawable
 from pipeline.io.recordings.ladder import write_ladder_recording
 from pipeline.io.recordings.lots import lots_name, write_lots_recording
@@ -34,6 +36,7 @@ from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.io.recordings.seal import SEAL, seal_of
 from pipeline.io.recordings.viewer import catalogue
 from pipeline.io.recordings.views import MEASURED, MODEL, PALETTE, RESIDUAL
+from pipeline.records.capture import Capture, CaptureMeta
 from tests.looking import Browser, Viewer, browser_path, count, need_viewer, pixels
 from tests.unit.ladders import make_diagnosis
 from tests.unit.regressions import make_regression
@@ -124,6 +127,23 @@ def test_traces_are_drawn_in_their_colours(output: Path, viewer: Viewer) -> None
     for colour in (MODEL, RESIDUAL):
         assert count(picture, colour) > 200
     assert count(picture, MEASURED, 30) > 200
+    assert viewer.reports() == []
+
+
+def test_a_long_capture_is_drawn_from_its_pack(tmp_path: Path, viewer: Viewer) -> None:
+    t_s = np.arange(LONG_ROWS + 1) * 5e-5
+    speed, current = 100.0 + 5.0 * np.sin(3.0 * t_s), 4.0 * np.sin(40.0 * t_s)
+    frame = pl.DataFrame({"t_s": t_s, "omega_mech_rad_s": speed, "iq_a": current})
+    capture = Capture("m/l.mcap", "0" * 64, "verified", CaptureMeta("m", "drive"), (frame,))
+    (tmp_path / "long.rrd").write_bytes(recording_bytes(capture, ()))
+    viewer.show(tmp_path / "long.rrd")
+    for name in ("omega mech [rad/s]", "iq [A]"):
+        picture = pixels(viewer.picture(name))
+        assert count(picture, PALETTE[0], 30) > 1000
+    viewer.tab(1)
+    viewer.picture()
+    views = {view.name for view in viewer.client.get_state().views}
+    assert views >= {"Samples, one row in 6", "All samples"}
     assert viewer.reports() == []
 
 

@@ -2,7 +2,9 @@
 
 A recording holds the entities
 
-    /measured, /measured_1  every table of the capture, one component a column, float32
+    /measured, /measured_1  every table of the capture, one component a column, float32; a long
+                            one as the fields of one component
+    /samples                rows of the first table as components, where it is a long one
     /model/ESTIMATOR/N      `measured`, `fitted`, `residual` of each series fitted to this capture
     /maps/SIGNAL            residual over speed and current: `picture`, `values`; `axes`, `bar`
     /angle/SIGNAL           residual over one turn; /orders/SIGNAL its amplitudes by order
@@ -16,7 +18,7 @@ on the timeline `t` (duration) or, for a table without `t_s`, `row`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
 
 MOST_MAPS = 2
+LONG_ROWS, TABLE_ROWS = 100_000, 20_000
 MAP_WORDS = ("speed [rad/s]", "iq [A]")
 
 
@@ -103,10 +106,13 @@ def recording_bytes(
     told = (residual_maps(capture, one) for one in first_of_each(own))
     maps = tuple(islice((one for one in told if one is not None), MOST_MAPS))
     name = f"{capture.meta.motor_id} {PurePosixPath(capture.path).stem}"
-    shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None)
+    table = sample_table(traces)
+    shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None, table)
     with recording(name, identity(capture, datasheet), capture_layout(shown)) as made:
         for trace in (*traces, *(fit.trace for fit in fits)):
             send_trace(made.stream, trace)
+        if table is not None and table[1] > 1:
+            send_trace(made.stream, table[0])
         for one in maps:
             _send_maps(made.stream, one)
         send_lanes(made.stream, capture)
@@ -145,10 +151,26 @@ def capture_traces(capture: Capture) -> Iterator[Trace]:
         if table.height == 0 or values.width == 0:
             continue
         if "t_s" in table.columns:
-            yield timed(entity, table["t_s"].to_numpy(), values)
+            trace = timed(entity, table["t_s"].to_numpy(), values)
         else:
             rows = pl.Series(ROW, np.arange(table.height, dtype=np.int64))
-            yield Trace(entity, ROW, values.insert_column(0, rows))
+            trace = Trace(entity, ROW, values.insert_column(0, rows))
+        plain = all(name.isascii() and name.isidentifier() for name in trace.columns)
+        yield replace(trace, packed=plain and table.height > LONG_ROWS)
+
+
+def sample_table(traces: Sequence[Trace]) -> tuple[Trace, int] | None:
+    """What the table of samples shows, and that it is one row in how many.
+
+    It is the first table itself; of a packed one evenly spaced rows, column by column.
+    """
+    if not traces:
+        return None
+    first = traces[0]
+    if not first.packed:
+        return first, 1
+    step = -(-first.frame.height // TABLE_ROWS)
+    return Trace("/samples", first.index, first.frame.gather_every(step)), step
 
 
 def own_evidence(capture: Capture, evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:

@@ -50,14 +50,16 @@ class Shown:
     maps: Sequence[ResidualMaps]
     lanes: tuple[str, ...]
     datasheet: bool
+    table: tuple[Trace, int] | None
 
 
 def capture_layout(shown: Shown) -> Blueprint:
     """Tabs: traces with loupe, lanes and findings; maps; all signals; datasheet and samples."""
-    tabs = [_traces_tab(shown)]
+    main = main_views(shown.traces, shown.fits)
+    tabs = [_traces_tab(shown, main)]
     if shown.maps:
         tabs.append(_maps_tab(shown.maps))
-    further = further_views(shown.traces, shown.fits)
+    further = further_views(shown.traces, shown.fits, main)
     if further:
         tabs.append(stacked(further, name=f"{len(tabs) + 1} · Further signals"))
     tabs.append(_sheet_tab(shown, f"{len(tabs) + 1} · Datasheet & samples"))
@@ -69,9 +71,10 @@ def main_views(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> tuple[ViewP
     return _views(traces, fits, MOST_FITS, MOST_GROUPS)
 
 
-def further_views(traces: Sequence[Trace], fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
+def further_views(
+    traces: Sequence[Trace], fits: Sequence[FitTrace], main: Sequence[ViewPlan]
+) -> tuple[ViewPlan, ...]:
     """Every fitted quantity and every column that the main views leave out."""
-    main = main_views(traces, fits)
     every = _views(traces, fits, len(fits), MOST_UNITS)
     return tuple(plan for plan in every if plan not in main)
 
@@ -127,7 +130,7 @@ def _fit_view(
             for f in fits
         ]
     else:
-        measured = [Line(home.entity, y_name, "measured", MEASURED, WIDE)]
+        measured = [Line(home.entity, y_name, "measured", MEASURED, WIDE, home.packed)]
     models = [Line(f.trace.entity, "fitted", f"model{_after(f, fits)}", MODEL) for f in fits]
     return ViewPlan(f"{title}: {named(y_name)}", (*measured, *models), 3.0)
 
@@ -148,8 +151,15 @@ def _after(fit: FitTrace, fits: Sequence[FitTrace]) -> str:
 
 
 def _group_view(unit: str, columns: Sequence[tuple[str, str]], traces: Sequence[Trace]) -> ViewPlan:
+    packed = {trace.entity for trace in traces if trace.packed}
     lines = [
-        Line(entity, column, stem_of(column), PALETTE[place % len(PALETTE)])
+        Line(
+            entity,
+            column,
+            stem_of(column),
+            PALETTE[place % len(PALETTE)],
+            packed=entity in packed,
+        )
         for place, (entity, column) in enumerate(columns)
     ]
     names = ", ".join(line.name for line in lines)
@@ -187,10 +197,9 @@ def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[
     return {unit: columns for unit, columns in groups.items() if columns}
 
 
-def _traces_tab(shown: Shown) -> Any:
+def _traces_tab(shown: Shown, plans: Sequence[ViewPlan]) -> Any:
     import rerun.blueprint as rrb
 
-    plans = main_views(shown.traces, shown.fits)
     rows: list[Any] = [time_view(plan) for plan in plans]
     shares = [plan.share for plan in plans]
     if shown.lanes:
@@ -206,8 +215,9 @@ def _traces_tab(shown: Shown) -> Any:
         )
         rows.append(lanes)
         shares.append(2.0)
-    side: list[Any] = [time_view(plan) for plan in loupe_views(shown.fits)]
-    side_shares = [plan.share for plan in loupe_views(shown.fits)]
+    loupe = loupe_views(shown.fits)
+    side: list[Any] = [time_view(plan) for plan in loupe]
+    side_shares = [plan.share for plan in loupe]
     side.append(findings_view("/findings", "Findings of this capture, at their rows"))
     left = rrb.Vertical(*rows, row_shares=shares or None)
     right = rrb.Vertical(*side, row_shares=[*side_shares, 1.0])
@@ -246,16 +256,21 @@ def _sheet_tab(shown: Shown, name: str) -> Any:
     import rerun.blueprint as rrb
 
     views: list[Any] = [page_view("/datasheet", "Datasheet")] if shown.datasheet else []
-    if shown.traces:
-        first = shown.traces[0]
-        views.append(
-            rrb.DataframeView(
-                origin=first.entity,
-                name="Samples",
-                query=rrb.archetypes.DataframeQuery(timeline=first.index),
-            )
-        )
+    if shown.table is not None:
+        table, step = shown.table
+        if step == 1:
+            views.append(_table_view(table, "Samples"))
+        else:
+            some = _table_view(table, f"Samples, one row in {step}")
+            views.append(rrb.Tabs(some, _table_view(shown.traces[0], "All samples"), active_tab=0))
     return rrb.Horizontal(*views, name=name)
+
+
+def _table_view(trace: Trace, name: str) -> Any:
+    import rerun.blueprint as rrb
+
+    query = rrb.archetypes.DataframeQuery(timeline=trace.index)
+    return rrb.DataframeView(origin=trace.entity, name=name, query=query)
 
 
 def _span_s(trace: Trace) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.io.recordings.font import drawable
-from pipeline.io.recordings.stream import TIME, Colour, Tinted
+from pipeline.io.recordings.stream import PACK, TIME, Colour, Tinted
 from pipeline.physics.glossary import suffix_of
 from pipeline.physics.notation import unit_text
 from pipeline.physics.units import SUFFIX_UNITS
@@ -37,13 +37,14 @@ Panel = Literal["collapsed", "expanded", "hidden"]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One curve: `component` of `entity`, and how it is drawn."""
+    """One curve: `component` of `entity`, and how it is drawn; `packed` as the trace is."""
 
     entity: str
     component: str
     name: str
     colour: Colour | Tinted
     width: float = NARROW
+    packed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,8 @@ def _curve(line: Line) -> Any:
     mapping = VisualizerComponentMapping(
         target="Scalars:scalars",
         source_kind=ComponentSourceKind.SourceComponent,
-        source_component=line.component,
+        source_component=PACK if line.packed else line.component,
+        selector=f".{line.component}" if line.packed else None,
     )
     style = rr.SeriesLines(
         names=drawable(line.name),

@@ -9,6 +9,8 @@ import polars as pl
 import pytest
 
 from pipeline.io.recordings.capture import (
+    LONG_ROWS,
+    TABLE_ROWS,
     capture_traces,
     fit_traces,
     own_evidence,
@@ -17,6 +19,7 @@ from pipeline.io.recordings.capture import (
 )
 from pipeline.io.recordings.capture_views import further_views, loupe_views, main_views
 from pipeline.io.recordings.datasheet_page import sheet_markdown
+from pipeline.io.recordings.readback import entities
 from pipeline.io.recordings.seal import seal_of, verify
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.datasheet import Check, Datasheet
@@ -121,6 +124,56 @@ def test_residual_is_measured_less_fitted_and_only_this_captures_fits_are_there(
     assert {trace.trace.entity for trace in fit_traces(own)} == {"/model/step/0_0"}
 
 
+def long_capture() -> Capture:
+    t_s = np.arange(LONG_ROWS + 1) * 5e-5
+    noise = np.random.default_rng(7)
+    frame = pl.DataFrame(
+        {"t_s": t_s, "ia_a": noise.normal(0, 5, t_s.size), "vab_v": noise.normal(0, 20, t_s.size)}
+    )
+    return Capture("m/long.mcap", "cd" * 32, "verified", CaptureMeta("m", "drive"), (frame,))
+
+
+def test_a_long_capture_is_packed_to_the_last_sample_and_has_a_table_of_fewer_rows(
+    tmp_path: Path,
+) -> None:
+    capture = long_capture()
+    write_recording(capture, (), tmp_path / "long.rrd")
+    table = capture.tables[0]
+    packed = read_back(tmp_path / "long.rrd", "/measured").unnest("samples")
+    shown = read_back(tmp_path / "long.rrd", "/samples")
+    step = -(-table.height // TABLE_ROWS)
+    assert 0.5 * TABLE_ROWS < shown.height <= TABLE_ROWS
+    for back, told in ((packed, table), (shown, table.gather_every(step))):
+        assert back.height == told.height
+        nanoseconds = np.rint(told["t_s"].to_numpy() * 1e9).astype(np.int64)
+        np.testing.assert_array_equal(back["t"].to_physical().to_numpy(), nanoseconds)
+        for name in ("ia_a", "vab_v"):
+            np.testing.assert_array_equal(
+                back[name].to_numpy(), told[name].to_numpy().astype(np.float32)
+            )
+    lines = [line for plan in main_views(list(capture_traces(capture)), ()) for line in plan.lines]
+    assert {line.component for line in lines} == {"ia_a", "vab_v"}
+    assert all(line.packed for line in lines)
+
+
+def test_columns_of_odd_names_are_not_packed() -> None:
+    """The viewer's selectors know plain names alone."""
+    frame = long_capture().tables[0].rename({"vab_v": "shunt (mV)"})
+    capture = Capture("o.csv", "cd" * 32, "verified", CaptureMeta("m", "drive"), (frame,))
+    assert [trace.packed for trace in capture_traces(capture)] == [False]
+
+
+def test_where_no_file_may_grow_the_same_is_made_in_the_streams_own_memory(
+    recording: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("pipeline.io.recordings.stream._has_nameless_files", lambda: False)
+    capture, other = make_capture(), tmp_path / "other.rrd"
+    write_recording(capture, make_evidence(capture), other, make_sheet(), FINDINGS)
+    assert entities(other) == entities(recording)
+    for entity in ("/measured", "/findings"):
+        assert read_back(other, entity).equals(read_back(recording, entity), null_equal=True)
+
+
 def test_findings_stand_at_their_first_row_and_no_wall_clock_is_written(recording: Path) -> None:
     from rerun.chunk import RrdReader
 
@@ -161,7 +214,8 @@ def test_every_planned_curve_exists_in_the_data_and_every_column_is_planned() ->
     traces = list(capture_traces(capture))
     fits = list(fit_traces(own_evidence(capture, make_evidence(capture))))
     held = {(t.entity, name) for t in [*traces, *(f.trace for f in fits)] for name in t.columns}
-    main, further = main_views(traces, fits), further_views(traces, fits)
+    main = main_views(traces, fits)
+    further = further_views(traces, fits, main)
     drawn = {(line.entity, line.component) for view in (*main, *further) for line in view.lines}
     assert drawn <= held
     assert held - drawn == {("/model/step/0_0", "measured")}
