@@ -55,8 +55,37 @@ def browser_path() -> str:
     return str(found)
 
 
-class Viewer:
-    """The viewer without a window; a context that ends it."""
+class Program:
+    """A program that a test looks through; a context that ends it and leaves nothing over."""
+
+    _process: subprocess.Popen[bytes]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ask_to_end()
+        try:
+            self._process.wait(timeout=20)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._tidy()
+
+    def _ask_to_end(self) -> None:
+        self._process.terminate()
+
+    def _tidy(self) -> None:
+        raise NotImplementedError
+
+
+class Viewer(Program):
+    """The viewer without a window."""
 
     def __init__(self, *sources: str, size: str = "1600x1000") -> None:
         self._home = TemporaryDirectory()
@@ -73,21 +102,7 @@ class Viewer:
         )
         self.client = self._connected(f"rerun+http://{HERE}:{port}/proxy")
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(timeout=20)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+    def _tidy(self) -> None:
         self._home.cleanup()
 
     @property
@@ -177,7 +192,7 @@ def count(picture: Picture, colour: Iterable[int], tolerance: int = 24) -> int:
     return int((far <= tolerance).sum())
 
 
-class Browser:
+class Browser(Program):
     """Chromium without a window, driven through a pair of pipes; it finds no other machine."""
 
     def __init__(self, size: tuple[int, int] = (1600, 1000)) -> None:
@@ -221,22 +236,11 @@ class Browser:
         self._number, self._rest = 0, b""
         self.events: list[dict[str, Any]] = []
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _ask_to_end(self) -> None:
         with suppress(OSError, TimeoutError, EOFError):
             self.call("Browser.close")
-        try:
-            self._process.wait(timeout=20)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+
+    def _tidy(self) -> None:
         os.close(self._read)
         os.close(self._write)
         self._profile.cleanup()

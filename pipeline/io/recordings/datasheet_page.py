@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 from pipeline.physics.notation import quantity, reading
 from pipeline.records.datasheet import Datasheet
@@ -67,11 +68,18 @@ def _table(datasheet: Datasheet, names: list[str]) -> list[str]:
 def _line(estimate: Estimate) -> str:
     text = "not identifiable"
     if estimate.known:
-        text = reading(estimate.number, estimate.u, estimate.unit).text()
+        text = _text(estimate.number, estimate.u, estimate.unit)
         text += " (at its bound)" if estimate.at_bound else ""
     return f"| {plain(estimate.name)} | {text} | {plain(estimate.method)} |"
 
 
+@lru_cache(1024)
+def _text(value: float, u: float, unit: str) -> str:
+    """A reading as text; every capture of a motor shows the same ones."""
+    return reading(value, u, unit).text()
+
+
+@lru_cache(1024)
 def plain(text: str) -> str:
     """Text that markdown leaves alone, on one line."""
     return _SPECIAL.sub(r"\\\1", " ".join(text.split()))

@@ -191,8 +191,6 @@ def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
 
 def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
     """A row a motor; a constant that it lacks stays empty."""
-    import rerun as rr
-
     rows: dict[str, dict[str, Any]] = {}
     shown = compared(result)
     for one in shown:
@@ -209,8 +207,7 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
     numbers = {one.name: [row.get(one.name) for row in told] for one in shown}
     frame = pl.DataFrame(texts | numbers, schema=_types(texts, numbers))
     index = pl.Series(PLACE, np.arange(frame.height, dtype=np.int64))
-    for batch in frame.insert_column(0, index).to_arrow().to_batches():
-        rr.send_record_batch(batch, stream, index=PLACE, entity_path="/motors")
+    send_trace(stream, Trace("/motors", PLACE, frame.insert_column(0, index)))
 
 
 def _types(texts: Sequence[str] | dict[str, Any], numbers: dict[str, Any]) -> dict[str, Any]:

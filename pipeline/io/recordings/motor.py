@@ -161,8 +161,6 @@ def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
 
 def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
     """One row a constant; text where there is no number, so that no row is dropped."""
-    import rerun as rr
-
     told = [est for _, est in sorted(datasheet.constants.items())]
     numbers = pl.DataFrame(
         {
@@ -180,8 +178,7 @@ def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
     frame = pl.DataFrame({k: [drawable(t) for t in v] for k, v in texts.items()})
     index = pl.Series(ROW, np.arange(len(told), dtype=np.int64))
     whole = pl.concat([frame, numbers], how="horizontal").insert_column(0, index)
-    for batch in whole.to_arrow().to_batches():
-        rr.send_record_batch(batch, stream, index=ROW, entity_path="/constants")
+    send_trace(stream, Trace("/constants", ROW, whole))
 
 
 def _send_overview(stream: RecordingStream, strips: Sequence[Strip], *, refused: bool) -> None:

@@ -36,7 +36,7 @@ Tinted = tuple[int, int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """A table on its way into a recording: `index` is `TIME` or `ROW`, the rest float32.
+    """A table on its way into a recording: `index` names its column of times or of whole numbers.
 
     Each column is a component. Of a `packed` one all columns are fields of the component `PACK`,
     which is written in two thirds of the time, but shows as one column in a table.
