@@ -134,9 +134,10 @@ def _write(
     output, stem = Path(job.output), file_stem(job.motor_id)
     files: list[tuple[str, str]] = []
 
-    def write(name: str, content: bytes) -> None:
+    def write(name: str, content: bytes) -> str:
         write_whole(output / name, content)
         files.append((name, hashlib.sha256(content).hexdigest()))
+        return files[-1][1]
 
     with watch.stage("datasheet"):
         write(f"datasheets/{stem}.json", canonical_json(datasheet.document()))
@@ -152,8 +153,8 @@ def _write(
 
         with watch.stage("recordings"):
             for name, content in _recordings(stem, campaign, datasheet, evidence, findings):
-                write(name, content)
-                write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], content))
+                sha256 = write(name, content)
+                write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
     return tuple(files)
 
 

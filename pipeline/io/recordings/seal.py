@@ -20,12 +20,12 @@ REMEDY = "run the command that wrote it again"
 def write_sealed(path: Path, content: bytes) -> None:
     """Writes a recording and its seal, each whole or not at all; MachineError on a full disk."""
     write_whole(path, content)
-    write_whole(seal_of(path), seal_line(path.name, content))
+    write_whole(seal_of(path), seal_line(path.name, hashlib.sha256(content).hexdigest()))
 
 
-def seal_line(name: str, content: bytes) -> bytes:
-    """What the seal of a recording of this name says."""
-    return f"{hashlib.sha256(content).hexdigest()}  {name}\n".encode()
+def seal_line(name: str, sha256: str) -> bytes:
+    """What the seal of a recording of this name and digest says."""
+    return f"{sha256}  {name}\n".encode()
 
 
 def seal_of(path: Path) -> Path:
