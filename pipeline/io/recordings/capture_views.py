@@ -7,6 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
 from pipeline.io.recordings.capture import FitTrace, angle_words
 from pipeline.io.recordings.capture_maps import ResidualMaps
 from pipeline.io.recordings.error_map import map_view
@@ -132,7 +136,9 @@ def _fit_view(
     else:
         measured = [Line(home.entity, y_name, "measured", MEASURED, WIDE, home.packed)]
     models = [Line(f.trace.entity, "fitted", f"model{_after(f, fits)}", MODEL) for f in fits]
-    return ViewPlan(f"{title}: {named(y_name)}", (*measured, *models), 3.0)
+    shown = [(f.trace.frame, column) for f in fits for column in ("measured", "fitted")]
+    span = _span(shown if home is None else [(home.frame, y_name), *shown])
+    return ViewPlan(f"{title}: {named(y_name)}", (*measured, *models), 3.0, span=span)
 
 
 def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
@@ -163,28 +169,33 @@ def _group_view(unit: str, columns: Sequence[tuple[str, str]], traces: Sequence[
         for place, (entity, column) in enumerate(columns)
     ]
     names = ", ".join(line.name for line in lines)
-    return ViewPlan(f"{names} [{unit}]", tuple(lines), 2.0, span=_held(columns, traces))
-
-
-def _held(
-    columns: Sequence[tuple[str, str]], traces: Sequence[Trace]
-) -> tuple[float, float] | None:
-    """An axis around a value that is all but held, so that its noise does not fill the view."""
     frames = {trace.entity: trace.frame for trace in traces}
-    lows, highs = [], []
-    for entity, column in columns:
-        values = frames[entity][column].drop_nans()
-        if values.len():
-            lows.append(float(values.min()))  # type: ignore[arg-type]
-            highs.append(float(values.max()))  # type: ignore[arg-type]
-    if not lows:
+    span = _span([(frames[entity], column) for entity, column in columns])
+    return ViewPlan(f"{names} [{unit}]", tuple(lines), 2.0, span=span)
+
+
+def _span(frames: Sequence[tuple[pl.DataFrame, str]]) -> tuple[float, float] | None:
+    """The y axis over all values of some columns: by itself the viewer may settle on the first.
+
+    Around values that are all but held it is wider, so that their noise does not fill the view.
+    """
+    ends = [_ends(frame[column].to_numpy()) for frame, column in frames]
+    lows, highs = [low for low, _ in ends], [high for _, high in ends]
+    low, high = min(lows, default=math.inf), max(highs, default=-math.inf)
+    if not math.isfinite(high - low):
         return None
-    low, high = min(lows), max(highs)
     most = max(abs(low), abs(high))
-    if high - low >= HELD_SHARE * most:
-        return None
-    middle = 0.5 * (low + high)
-    return middle - 0.5 * HELD_SHARE * most, middle + 0.5 * HELD_SHARE * most
+    if high - low < HELD_SHARE * most:
+        middle = 0.5 * (low + high)
+        return middle - 0.5 * HELD_SHARE * most, middle + 0.5 * HELD_SHARE * most
+    air = (AIR - 1.0) * (high - low) / 2.0
+    return (low - air, high + air) if air > 0.0 else None
+
+
+def _ends(values: NDArray[np.float32]) -> tuple[float, float]:
+    """The least and the largest finite value; of none, infinities that any value replaces."""
+    finite = values[np.isfinite(values)]
+    return float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
 
 
 def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[str, str]]]:

@@ -229,6 +229,22 @@ def test_every_planned_curve_exists_in_the_data_and_every_column_is_planned() ->
     assert {(line.entity, line.component) for line in (*both.lines, *left.lines)} <= held
 
 
+def test_value_axes_reach_over_all_values_and_do_not_magnify_the_noise_of_a_held_one() -> None:
+    """The viewer would set them by what has come so far."""
+    capture = make_capture()
+    traces = list(capture_traces(capture))
+    fits = list(fit_traces(own_evidence(capture, make_evidence(capture))))
+    spans = {plan.name: plan.span for plan in main_views(traces, fits)}
+    current, held = spans["Step: ia [A]"], spans["vab [V]"]
+    assert current is not None
+    assert held is not None
+    shown = [traces[0].frame["ia_a"].to_numpy(), fits[0].trace.frame["fitted"].to_numpy()]
+    least, most = min(a.min() for a in shown), max(a.max() for a in shown)
+    assert least - 0.1 * (most - least) < current[0] < least
+    assert most < current[1] < most + 0.1 * (most - least)
+    assert held == pytest.approx((6.2 - 0.31, 6.2 + 0.31))
+
+
 def test_a_table_without_time_goes_by_row(tmp_path: Path) -> None:
     table = pl.DataFrame({"theta_elec_deg": [0.0, 15.0, 30.0], "lab_h": [1e-4, 2e-4, 3e-4]})
     capture = Capture("lcr.csv", "cd" * 32, "verified", CaptureMeta("m", "lcr"), (table,))
