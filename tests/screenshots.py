@@ -7,6 +7,7 @@ follows the browser's colour scheme. Both draw in software, so they take a minut
 from __future__ import annotations
 
 import argparse
+import io
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +21,7 @@ from tests.looking import Browser, Viewer
 MOTOR = "G52-1402"
 BEFORE, AFTER = "2026-W06", "2026-W14"
 SIZE = (1700, 1000)
+NARROW_PX = 1000
 LIGHT_PATIENCE_S = 600.0
 
 
@@ -67,9 +69,12 @@ def _dark(output: Path, into: Path) -> None:
         _keep(into, "maps", viewer.picture())
         state = viewer.show(places["ladder"])
         last = next(line for line in state.recordings[-1].timelines if line.name == "rung").end
+        rungs = []
         for name, rung in (("ladder-first", 0), ("ladder-last", last or 0)):
             viewer.client.set_time("rung", sequence=rung)
-            _keep(into, name, viewer.picture())
+            rungs.append(viewer.picture())
+            _keep(into, name, rungs[-1])
+        (into / "ladder.png").write_bytes(_under_each_other(rungs))
         for name in ("motor", "lots"):
             viewer.show(places[name])
             _keep(into, name, viewer.picture())
@@ -77,6 +82,20 @@ def _dark(output: Path, into: Path) -> None:
     with catalogue(motors, 0) as address, Viewer(address, size=f"{SIZE[0]}x{SIZE[1]}") as viewer:
         time.sleep(5)  # previews come one by one
         _keep(into, "fleet", viewer.picture())
+
+
+def _under_each_other(pictures: list[bytes]) -> bytes:
+    """One PNG, narrow enough for a page."""
+    from PIL import Image
+
+    images = [Image.open(io.BytesIO(png)).convert("RGB") for png in pictures]
+    height = max(round(i.height * NARROW_PX / i.width) for i in images)
+    whole = Image.new("RGB", (NARROW_PX, height * len(images)))
+    for place, image in enumerate(images):
+        whole.paste(image.resize((NARROW_PX, height)), (0, place * height))
+    made = io.BytesIO()
+    whole.save(made, "PNG", optimize=True)
+    return made.getvalue()
 
 
 def _light(output: Path, into: Path) -> None:

@@ -10,6 +10,7 @@ from pipeline.report.axis import quantity_words
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 760.0, 250.0, 56.0, 130.0, 22.0, 44.0
 LABEL_PITCH, COLOURS = 14.0, 6
+LETTER, MOST_LEVELS = 6.3, 3
 
 
 def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str:
@@ -42,18 +43,25 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
             parts.append(
                 f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10**decade}</text>'
             )
+    levels = _levels(names)
     for rung, name in enumerate(names):
-        parts.append(
-            f'<text class="tick x" x="{x(rung):.1f}" y="{bottom + 16:.1f}">{escape(name)}</text>'
-        )
+        place = f'x="{x(rung):.1f}" y="{bottom + 16 + LABEL_PITCH * (rung % levels):.1f}"'
+        parts.append(f'<text class="tick x" {place}>{escape(name)}</text>')
     parts += _lines(over, x, y)
     return (
         f'<svg class="ladder" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
         'aria-label="error over noise floor of every signal, rung by rung">'
         f'<text class="title" x="2" y="12">held-out error over noise floor</text>'
-        f'<text class="tick" x="{WIDTH - RIGHT + 8:g}" y="{y(1.0) + 14:.1f}">noise floor</text>'
+        f'<text class="tick" x="{LEFT + 8:g}" y="{y(1.0) + 14:.1f}">noise floor</text>'
         f"{''.join(parts)}</svg>"
     )
+
+
+def _levels(names: Sequence[str]) -> int:
+    """Over how many lines the rungs' words go in turn, so that neighbours do not meet."""
+    pitch = (WIDTH - LEFT - RIGHT) / len(names)
+    longest = LETTER * max(map(len, names))
+    return min(math.ceil(longest / pitch), MOST_LEVELS, len(names))
 
 
 def _lines(
