@@ -22,6 +22,8 @@ MOTOR = "G52-1402"
 BEFORE, AFTER = "2026-W06", "2026-W14"
 SIZE = (1700, 1000)
 NARROW_PX = 1000
+VIEWS = (0.036, 0.747)  # from the tabs to the panel of time, shares of a ladder's height
+NOTICES_S = 15.0
 LIGHT_PATIENCE_S = 600.0
 
 
@@ -80,16 +82,18 @@ def _dark(output: Path, into: Path) -> None:
             _keep(into, name, viewer.picture())
     motors = sorted((output / "recordings").glob("motor-*.rrd"))
     with catalogue(motors, 0) as address, Viewer(address, size=f"{SIZE[0]}x{SIZE[1]}") as viewer:
-        time.sleep(5)  # previews come one by one
+        time.sleep(NOTICES_S)  # previews come one by one, and notices about the machine go
         _keep(into, "fleet", viewer.picture())
 
 
 def _under_each_other(pictures: list[bytes]) -> bytes:
-    """One PNG, narrow enough for a page."""
+    """Their views as one PNG, narrow enough for a page."""
     from PIL import Image
 
-    images = [Image.open(io.BytesIO(png)).convert("RGB") for png in pictures]
-    height = max(round(i.height * NARROW_PX / i.width) for i in images)
+    whole_ones = [Image.open(io.BytesIO(png)).convert("RGB") for png in pictures]
+    top, bottom = (round(share * whole_ones[0].height) for share in VIEWS)
+    images = [one.crop((0, top, one.width, bottom)) for one in whole_ones]
+    height = round(images[0].height * NARROW_PX / images[0].width)
     whole = Image.new("RGB", (NARROW_PX, height * len(images)))
     for place, image in enumerate(images):
         whole.paste(image.resize((NARROW_PX, height)), (0, place * height))
