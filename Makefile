@@ -67,3 +67,4 @@ lock:
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find pipeline tests -name __pycache__ -prune -exec rm -rf {} +
