@@ -69,29 +69,32 @@ def _rules_of(column: str) -> tuple[str, ...]:
 def table_schema(columns: tuple[str, ...]) -> pa.DataFrameSchema:
     """The contract of a table with these glossary columns; other columns are let pass.
 
-    Each check is named by the code of the refusal that it leads to.
+    All rules are one check, evaluated together: one for each would take eight times as long.
     """
     import pandera.polars as pa
 
-    def check(code: str) -> pa.Check:
-        def holds(data: pa.PolarsData) -> pl.LazyFrame:
-            return data.lazyframe.select(RULES[code](data.key))
-
-        return pa.Check(holds, name=code, n_failure_cases=EXAMPLES)
+    def hold(data: pa.PolarsData) -> bool:
+        return not broken(data.lazyframe, columns)
 
     return pa.DataFrameSchema(
         {
-            name: pa.Column(
-                pl.Float64,
-                nullable=True,
-                checks=[check(code) for code in _rules_of(name)],
-                description=COLUMNS[name].words,
-            )
+            name: pa.Column(pl.Float64, nullable=True, description=COLUMNS[name].words)
             for name in columns
         },
+        checks=pa.Check(hold, name="rules"),
         strict=False,
         coerce=False,
     )
+
+
+def broken(table: pl.LazyFrame, columns: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Column and code of every rule that some row does not keep, in their order."""
+    asked = [(column, code) for column in columns for code in _rules_of(column)]
+    kept = table.select(
+        RULES[code](column).all().alias(str(place)) for place, (column, code) in enumerate(asked)
+    )
+    told = kept.collect().row(0) if asked else ()
+    return [one for one, holds in zip(asked, told, strict=True) if not holds]
 
 
 def check_tables(capture: Capture) -> None:
@@ -112,12 +115,11 @@ def _table_faults(table: pl.DataFrame) -> list[CaptureError]:
     known = tuple(name for name in table.columns if name in COLUMNS)
     try:
         table_schema(known).validate(table, lazy=True)
-    except pandera.errors.SchemaErrors as errors:
-        failed = errors.failure_cases.select("column", "check").unique(maintain_order=True)
-        codes = {(str(column), str(check)) for column, check in failed.iter_rows()}
-        ordered = [(c, code) for c in known for code in _rules_of(c) if (c, code) in codes]
+    except pandera.errors.SchemaErrors:
         typed = [c for c in known if table.schema[c] != pl.Float64]
-        return [_not_numbers(table, c) for c in typed] or [_fault(table, *one) for one in ordered]
+        if typed:
+            return [_not_numbers(table, c) for c in typed]
+        return [_fault(table, *one) for one in broken(table.lazy(), known)]
     return []
 
 
