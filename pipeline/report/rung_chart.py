@@ -45,8 +45,8 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
             )
     levels = _levels(names)
     for rung, name in enumerate(names):
-        place = f'x="{x(rung):.1f}" y="{bottom + 16 + LABEL_PITCH * (rung % levels):.1f}"'
-        parts.append(f'<text class="tick x" {place}>{escape(name)}</text>')
+        where = f'x="{x(rung):.1f}" y="{bottom + 16 + LABEL_PITCH * (rung % levels):.1f}"'
+        parts.append(f'<text class="tick x" {where}>{escape(name)}</text>')
     parts += _lines(over, x, y)
     return (
         f'<svg class="ladder" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '

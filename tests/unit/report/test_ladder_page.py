@@ -109,6 +109,20 @@ def test_the_chart_puts_the_floor_and_the_errors_on_one_logarithmic_scale() -> N
     assert ys[0][1] - ys[0][0] == pytest.approx(decade * np.log10(65.0 / 1.3), abs=0.3)
 
 
+def test_words_of_neighbouring_rungs_do_not_meet() -> None:
+    """Six pixels a letter at the size of the chart's words."""
+    names = [f"{n}: + {name}" for n, name in enumerate(["magnet_temperature", "cogging"] * 3)]
+    root = ElementTree.fromstring(rung_chart(names, {"vq_v": [60.0, 9.0, 7.0, 5.0, 2.0, 1.0]}))
+    words = [t for t in root.iter("text") if t.attrib["class"] == "tick x"]
+    assert [t.text for t in words] == names
+    rows: dict[str, float] = {}
+    for one in words:
+        half = 3.0 * len(one.text or "")
+        middle, row = float(one.attrib["x"]), one.attrib["y"]
+        assert middle - half > rows.get(row, 0.0)
+        rows[row] = middle + half
+
+
 def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
     errors = (
         SignalError("vq_v", "a.mcap", "held_out", 0.03, 0.01, 10, 9.0, "V"),
