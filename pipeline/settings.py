@@ -30,7 +30,19 @@ class Settings:
 
 
 @dataclass(kw_only=True)
-class RunSettings(Settings):
+class ReadingSettings(Settings):
+    """Keys of every command that reads strangers' files."""
+
+    read_seconds: float = key(
+        60.0, "longest time for reading one file, and 1 s more a MB", result=False
+    )
+    read_memory_mb: int = key(
+        1024, "most memory for reading one file, and 16 times its size more", result=False
+    )
+
+
+@dataclass(kw_only=True)
+class RunSettings(ReadingSettings):
     """`run`: captures in; datasheets, checks, report and recordings out."""
 
     input: str = key("data/demo", "folder of captures, searched with its subfolders", result=False)
@@ -48,12 +60,6 @@ class RunSettings(Settings):
     tls_cert: str | None = key(None, "certificate of this client", result=False)
     tls_key: str | None = key(None, "key of that certificate", result=False)
     cache: bool = key(True, "remember in output/.cache what need not be done again", result=False)
-    read_seconds: float = key(
-        60.0, "longest time for reading one file, and 1 s more a MB", result=False
-    )
-    read_memory_mb: int = key(
-        1024, "most memory for reading one file, and 16 times its size more", result=False
-    )
     recordings: bool = key(True, "write a Rerun recording a capture", result=False)
     report: bool = key(True, "write the HTML report", result=False)
     registry: str | None = key(
@@ -76,7 +82,7 @@ class CalcSettings(Settings):
 
 
 @dataclass(kw_only=True)
-class InspectSettings(Settings):
+class InspectSettings(ReadingSettings):
     """`inspect`: what one file holds."""
 
     file: str = key("", "any file")
@@ -171,7 +177,7 @@ class ModelSettings:
 
 
 @dataclass(kw_only=True)
-class CompareSettings(Settings):
+class CompareSettings(ReadingSettings):
     """`compare`: where a model is off, signal by signal."""
 
     input: str = key("data/demo", "folder of captures, searched with its subfolders", result=False)

@@ -56,7 +56,8 @@ def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
     """The capture without columns that hold no value, which are as good as not there."""
     tables, blanks = [], []
     for table in capture.tables:
-        kept = [n for n in table.columns if table[n].is_finite().any() or not table.height]
+        filled = {n: np.isfinite(table[n].to_numpy()).any() for n in table.columns}
+        kept = [name for name in table.columns if filled[name] or not table.height]
         blanks += [name for name in table.columns if name not in kept]
         if set(kept) - {"t_s"}:
             tables.append(table.select(kept))

@@ -139,3 +139,10 @@ def last_words(path: Path) -> LastWords:
     if not name:
         return LastWords(begun=True)
     return LastWords(True, name.decode("utf-8", "surrogatepass"), rest.startswith(_TIMEOUT))
+
+
+def died(reason: str) -> CaptureError:
+    """The refusal of a file that kills whoever reads it."""
+    return CaptureError(
+        "reader_died", reason, "leave the file out and report it; a sound recording does not do so"
+    )

@@ -1,22 +1,36 @@
-"""Captures of a folder as validated campaigns, one a motor; shared by compare and diagnose."""
+"""Captures of a folder as validated campaigns, one a motor; shared by compare and diagnose.
+
+Strangers' files are parsed by workers under limits, as in a run, and never in the driver.
+"""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from pipeline.contracts.validate import validate
-from pipeline.fit.registry import fit_all
-from pipeline.io.ingest import Entry, read_capture, survey
+from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import find_map, load_source_maps
-from pipeline.records.capture import Campaign, Capture
-from pipeline.records.constants import Constants
-from pipeline.records.errors import CaptureError, UsageError
+from pipeline.io.survey import Entry, Survey, survey
+from pipeline.records.capture import Campaign
+from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.settings import configuration_folder
+from pipeline.stages.fleet.captures import ReadTask, usable_captures
+from pipeline.stages.fleet.crew import Crew
+from pipeline.stages.fleet.looking import look_with
+from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
+
+if TYPE_CHECKING:
+    from pipeline.records.constants import Constants
 
 
 def campaigns(
-    folder: str, source: str = "auto", motor: str | None = None
+    folder: str,
+    source: str = "auto",
+    motor: str | None = None,
+    limits: ReadLimits | None = None,
 ) -> tuple[tuple[Campaign, ...], tuple[Finding, ...]]:
     """Every motor's usable captures, by motor_id, and what was refused or doubtful.
 
@@ -25,8 +39,28 @@ def campaigns(
     if not Path(folder).is_dir():
         raise UsageError(f"input={folder} is no folder", "name the folder of captures")
     maps = load_source_maps(configuration_folder() / "source")
-    found = survey(Path(folder), maps if source == "auto" else {source: find_map(maps, source)})
+    sources = maps if source == "auto" else {source: find_map(maps, source)}
+    bounds = limits or ReadLimits()
+    with TemporaryDirectory() as crumbs:
+        pool = open_pool("local", Cluster())
+        with Crew(pool, core_count(), Path(crumbs) / "work") as crew:
+            ask = partial(look_with, crew, Path(folder), sources, bounds, recover=False)
+            found = survey(Path(folder), sources, ask)
+            tasks = _tasks(folder, found, motor, bounds)
+            read = crew.work_through(usable_captures, tasks)
     findings = list(found.findings)
+    made = []
+    for task, end in zip(tasks, read, strict=True):
+        if isinstance(end, MachineError):
+            raise end
+        captures, doubts = end
+        findings += doubts
+        if captures:
+            made.append(Campaign(task.motor_id, captures))
+    return tuple(made), tuple(findings)
+
+
+def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
     motors: dict[str, list[Entry]] = {}
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
@@ -34,29 +68,15 @@ def campaigns(
         raise UsageError(
             f"no capture of motor {motor} in {folder}", f"there are {', '.join(sorted(motors))}"
         )
-    made = []
-    for motor_id in sorted(motors) if motor is None else [motor]:
-        captures = _usable(Path(folder), motors[motor_id], findings)
-        if captures:
-            made.append(Campaign(motor_id, captures))
-    return tuple(made), tuple(findings)
-
-
-def _usable(folder: Path, entries: list[Entry], findings: list[Finding]) -> tuple[Capture, ...]:
-    captures = []
-    for entry in entries:
-        try:
-            capture, doubts = validate(read_capture(folder, entry), {})
-        except CaptureError as error:
-            findings.append(Finding.refusal(entry.path, error))
-        else:
-            captures.append(capture)
-            findings.extend(doubts)
-    return tuple(sorted(captures, key=lambda capture: capture.path))
+    wanted = sorted(motors) if motor is None else [motor]
+    return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
 
 
 def start_constants(campaign: Campaign) -> Constants:
     """Constants to start criticism from: none where a nameplate or a spin tells the pole pairs."""
+    from pipeline.fit.registry import fit_all
+    from pipeline.records.constants import Constants
+
     if campaign.nameplate("pole_pairs") is not None or campaign.of("open_circuit"):
         return Constants()
     return fit_all(campaign, {})[0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.criticism.comparison import compare
 from pipeline.io.publish import canonical_json, write_whole
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -18,12 +17,14 @@ from pipeline.stages.criticism import Judged, each_motor
 
 def main(settings: CompareSettings) -> Outcome:
     """Writes `comparison/MOTOR.json` and a recording for every motor of `input`."""
-    return each_motor(settings, _judge)
+    return each_motor(settings, _judge, "pipeline.criticism.comparison")
 
 
 def _judge(
     campaign: Campaign, spec: ModelSpec, start: Constants, output: Path, watch: Stopwatch
 ) -> Judged:
+    from pipeline.criticism.comparison import compare
+
     with watch.stage("compare"):
         result = compare(campaign, spec, start)
     stem = file_stem(campaign.motor_id)

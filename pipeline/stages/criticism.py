@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
+from pipeline.io.guard import ReadLimits
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -25,11 +28,18 @@ class Judged:
 Judge = Callable[[Campaign, ModelSpec, Constants, Path, Stopwatch], Judged]
 
 
-def each_motor(settings: CompareSettings, judge: Judge) -> Outcome:
-    """Runs `judge` on every motor of `input`; it writes under the folder that it is given."""
+def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
+    """Runs `judge` on every motor of `input`; it writes under the folder that it is given.
+
+    While workers read the captures, the module that the judge `needs` is imported.
+    """
     watch, output = Stopwatch(), Path(settings.output)
-    with watch.stage("read"):
-        found, findings = campaigns(settings.input, settings.source, settings.motor)
+    limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
+    with watch.stage("read"), ThreadPoolExecutor(1) as aside:
+        asked = settings.input, settings.source, settings.motor, limits
+        read = aside.submit(campaigns, *asked)
+        import_module(needs)
+        found, findings = read.result()
     spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
     told = [judge(one, spec, start_constants(one), output, watch) for one in found]
     refused = any(finding.severity == "refused" for finding in findings)

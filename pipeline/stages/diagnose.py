@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.criticism.diagnosis import diagnose
 from pipeline.io.publish import canonical_json, write_whole
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -22,12 +21,14 @@ def main(settings: DiagnoseSettings) -> Outcome:
     Where structure is left that no effect explains, an effect to start from is written as well:
     `diagnosis/effects/MOTOR_unknown.py`.
     """
-    return each_motor(settings, _judge)
+    return each_motor(settings, _judge, "pipeline.criticism.diagnosis")
 
 
 def _judge(
     campaign: Campaign, spec: ModelSpec, start: Constants, output: Path, watch: Stopwatch
 ) -> Judged:
+    from pipeline.criticism.diagnosis import diagnose
+
     with watch.stage("diagnose"):
         result = diagnose(campaign, spec, start)
     stem = file_stem(campaign.motor_id)

@@ -2,16 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from pipeline.contracts.requirements import requirements
-from pipeline.io.inspect_file import InspectReport, describe
-from pipeline.io.source_map import load_source_maps
-from pipeline.io.starter_map import FieldSeen
+from pipeline.io.files import size_bytes
+from pipeline.io.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings, configuration_folder
+from pipeline.stages.fleet.crew import Crew
+from pipeline.stages.fleet.pools import Cluster, open_pool
+
+if TYPE_CHECKING:
+    from pipeline.io.inspect_file import InspectReport
+    from pipeline.io.starter_map import FieldSeen
+
+
+@dataclass(frozen=True, slots=True)
+class InspectTask:
+    """A stranger's file to look into; `refused` is why it must not be read."""
+
+    file: str
+    limits: ReadLimits
+    refused: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"file {printable(self.file)}"
+
+    def without(self, path: str, reason: str) -> InspectTask:  # noqa: ARG002 (it has one file)
+        """The task with its file refused for a reason."""
+        return replace(self, refused=reason)
 
 
 def main(settings: InspectSettings) -> Outcome:
@@ -20,8 +46,27 @@ def main(settings: InspectSettings) -> Outcome:
         raise UsageError(f"file={settings.file or ''} is no file", "name the file to look into")
     if Path(settings.file).is_dir():
         raise UsageError(f"{settings.file} is a folder", "name one file of it")
+    task = InspectTask(settings.file, ReadLimits(settings.read_seconds, settings.read_memory_mb))
+    pool = open_pool("local", Cluster())
+    with TemporaryDirectory() as crumbs, Crew(pool, 1, Path(crumbs) / "work") as crew:
+        (text,) = crew.work_through(look_into, [task])
+    if isinstance(text, MachineError):
+        raise text
+    return Outcome(text=text)
+
+
+def look_into(task: InspectTask) -> str:
+    """What a file holds, as text for people; in a worker, under its limits."""
+    from pipeline.io.inspect_file import describe
+    from pipeline.io.source_map import load_source_maps
+
+    if task.refused is not None:
+        raise died(task.refused)
+    path = Path(task.file)
     sources = load_source_maps(configuration_folder() / "source")
-    return Outcome(text=render(describe(Path(settings.file), sources)))
+    with reading(task.file, size_bytes(path), task.limits):
+        report = describe(path, sources)
+    return render(report)
 
 
 def render(report: InspectReport) -> str:
@@ -61,6 +106,8 @@ def _field(seen: FieldSeen) -> str:
 
 def _tests(report: InspectReport, pair: str | None) -> list[str]:
     """One line a test of the contract: enough, or what is missing."""
+    from pipeline.contracts.requirements import requirements
+
     columns = report.columns
     if any(stream.rate_hz is not None for stream in report.streams):
         columns |= {"t_s"}

@@ -9,27 +9,22 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.contracts.motor import agree
-from pipeline.contracts.validate import validate
 from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.verdict import verdict
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.code_version import code_version
-from pipeline.io.files import size_bytes
-from pipeline.io.guard import reading
-from pipeline.io.ingest import read_capture
 from pipeline.io.publish import canonical_json, write_whole
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
-from pipeline.records.errors import CaptureError
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
+from pipeline.stages.fleet.captures import ReadTask, usable_captures
 from pipeline.stages.fleet.fits import FitMemory
 from pipeline.stages.fleet.jobs import MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import Files, Finished, note_motor
-from pipeline.stages.fleet.looking import died
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -45,9 +40,11 @@ def process_motor(job: MotorJob) -> MotorResult:
 
 
 def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
-    captures, findings = _usable_captures(job, watch)
+    task = ReadTask(job.motor_id, job.input, job.entries, job.limits, job.gates, job.refused)
+    captures, found = usable_captures(task, watch)
+    findings = list(found)
     if not captures:
-        return Finished(tuple(findings), ())
+        return Finished(found, ())
     campaign = Campaign(job.motor_id, captures)
     findings.extend(agree(campaign))
     with watch.stage("fit"):
@@ -61,27 +58,6 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     datasheet = assemble(job, campaign, constants, checks)
     files = _write(job, campaign, datasheet, evidence, (*job.findings, *findings), watch)
     return Finished(tuple(findings), files)
-
-
-def _usable_captures(job: MotorJob, watch: Stopwatch) -> tuple[tuple[Capture, ...], list[Finding]]:
-    captures: list[Capture] = []
-    findings: list[Finding] = []
-    folder, refused = Path(job.input), dict(job.refused)
-    for entry in job.entries:
-        try:
-            if entry.path in refused:
-                raise died(refused[entry.path])
-            size = size_bytes(folder / entry.path)
-            with watch.stage("read"), reading(entry.path, size, job.limits):
-                capture = read_capture(folder, entry)
-            with watch.stage("validate"):
-                capture, found = validate(capture, job.gates)
-        except CaptureError as error:
-            findings.append(Finding.refusal(entry.path, error))
-        else:
-            captures.append(capture)
-            findings.extend(found)
-    return tuple(sorted(captures, key=lambda capture: capture.path)), findings
 
 
 def assemble(

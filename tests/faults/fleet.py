@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,14 +88,16 @@ def cost(*words: str, cache: Path | None = None) -> Cost:
 
 
 def family(process: int) -> list[int]:
-    """A process, its children and theirs (Linux)."""
+    """A process, its children and theirs, whichever thread has started them (Linux)."""
     found = [process]
     for member in found:
         try:
-            text = Path(f"/proc/{member}/task/{member}/children").read_text()
+            threads = list(Path(f"/proc/{member}/task").iterdir())
         except OSError:
             continue
-        found += [int(child) for child in text.split()]
+        for thread in threads:
+            with suppress(OSError):
+                found += [int(child) for child in (thread / "children").read_text().split()]
     return found
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipeline.io.files import size_bytes
-from pipeline.io.guard import ReadLimits, reading
+from pipeline.io.guard import ReadLimits, died, reading
 from pipeline.io.source_map import SourceMap
 from pipeline.io.survey import Answer, Question, look
 from pipeline.records.errors import CaptureError, MachineError
@@ -37,13 +37,6 @@ class LookTask:
     def without(self, path: str, reason: str) -> LookTask:
         """The task with a file refused for a reason."""
         return replace(self, refused=(*self.refused, (path, reason)))
-
-
-def died(reason: str) -> CaptureError:
-    """The refusal of a file that kills whoever reads it."""
-    return CaptureError(
-        "reader_died", reason, "leave the file out and report it; a sound recording does not do so"
-    )
 
 
 def look_through(task: LookTask) -> tuple[Answer, ...]:

@@ -66,7 +66,8 @@ def core_count() -> int:
 @contextmanager
 def local_pool(workers: int) -> Iterator[Pool]:
     """Processes of this machine, each begun anew: strangers' files never meet the driver."""
-    executor = ProcessPoolExecutor(workers, get_context("spawn"), begin_worker)
+    share = str(max(1, core_count() // max(workers, 1)))
+    executor = ProcessPoolExecutor(workers, get_context("spawn"), begin_worker, (share,))
     try:
         yield Pool(executor, (BrokenExecutor,))
     finally:
@@ -162,4 +163,6 @@ OWN_CLUSTER = {
     "distributed.worker.http.routes": [],
     # Looking at what workers do a hundred times a second costs a tenth of their time.
     "distributed.worker.profile.enabled": False,
+    # There is a worker a core: threads of its libraries would only wake each other.
+    "distributed.nanny.pre-spawn-environ.POLARS_MAX_THREADS": 1,
 }

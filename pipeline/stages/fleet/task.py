@@ -68,8 +68,13 @@ def _collected(logged: list[tuple[int, str]]) -> Iterator[None]:
         root.removeHandler(collector)
 
 
-def begin_worker() -> None:
-    """Ends this worker as soon as the driver is gone, however it went; garbage waits longer."""
+def begin_worker(threads: str) -> None:
+    """Ends this worker as soon as the driver is gone; `threads` is its share of the cores.
+
+    Polars hands every query to threads of its own: those of several workers would wait for each
+    other. Garbage waits longer.
+    """
+    os.environ.setdefault("POLARS_MAX_THREADS", threads)
     gc.set_threshold(GARBAGE_ROUND)
     driver = parent_process()
     if driver is None:

@@ -1,0 +1,66 @@
+"""The captures of one motor read and judged, each file under its limits; in a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from pipeline.io.files import size_bytes
+from pipeline.io.guard import ReadLimits, died, reading
+from pipeline.io.survey import Entry
+from pipeline.records.capture import Capture
+from pipeline.records.errors import CaptureError
+from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
+from pipeline.records.outcome import Stopwatch
+
+
+@dataclass(frozen=True, slots=True)
+class ReadTask:
+    """One motor's files; `refused` are those that must not be read, with the reason."""
+
+    motor_id: str
+    folder: str
+    entries: tuple[Entry, ...]
+    limits: ReadLimits
+    gates: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    refused: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"motor {printable(self.motor_id)}"
+
+    def without(self, path: str, reason: str) -> ReadTask:
+        """The task with a file refused for a reason."""
+        return replace(self, refused=(*self.refused, (path, reason)))
+
+
+Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]
+
+
+def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
+    """The captures that hold, by path, and what was refused or doubtful."""
+    from pipeline.contracts.validate import validate
+    from pipeline.io.ingest import read_capture
+
+    watch = watch or Stopwatch()
+    captures: list[Capture] = []
+    findings: list[Finding] = []
+    folder, refused = Path(task.folder), dict(task.refused)
+    for entry in task.entries:
+        try:
+            if entry.path in refused:
+                raise died(refused[entry.path])
+            size = size_bytes(folder / entry.path)
+            with watch.stage("read"), reading(entry.path, size, task.limits):
+                capture = read_capture(folder, entry)
+            with watch.stage("validate"):
+                capture, found = validate(capture, task.gates)
+        except CaptureError as error:
+            findings.append(Finding.refusal(entry.path, error))
+        else:
+            captures.append(capture)
+            findings.extend(found)
+    return tuple(sorted(captures, key=lambda capture: capture.path)), tuple(findings)
