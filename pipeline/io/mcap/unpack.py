@@ -12,7 +12,10 @@ _ZSTD_MAX_WINDOW_BYTES = 128 * 2**20
 
 
 def unpack(data: bytes, chunk: Chunk, first_message: int = 0) -> bytes:
-    """The records of a chunk [bytes], exactly as many as declared; raises CaptureError."""
+    """The records of a chunk [bytes], exactly as many as declared; raises CaptureError.
+
+    Raises MemoryError where the limits of this process are below what a sound chunk takes.
+    """
     packed = memoryview(data)[chunk.begin : chunk.end]
     if chunk.compression == "":
         plain = bytes(packed)
@@ -50,7 +53,7 @@ def _unzstd(packed: memoryview, chunk: Chunk) -> bytes:
             packed, read_across_frames=True
         )
         plain = reader.read(chunk.size + 1)
-    except (zstandard.ZstdError, MemoryError) as fault:
+    except zstandard.ZstdError as fault:
         raise corrupt(f"{_where(chunk)} does not unpack: {fault}") from None
     return plain
 
@@ -61,7 +64,7 @@ def _unlz4(packed: memoryview, chunk: Chunk) -> bytes:
     unpacker = lz4.frame.LZ4FrameDecompressor()
     try:
         plain: bytes = unpacker.decompress(packed, max_length=chunk.size + 1)
-    except (RuntimeError, EOFError, MemoryError) as fault:
+    except (RuntimeError, EOFError) as fault:
         raise corrupt(f"{_where(chunk)} does not unpack: {fault}") from None
     if not unpacker.eof or unpacker.unused_data:
         raise corrupt(f"{_where(chunk)} unpacks to another size than declared")

@@ -1,0 +1,79 @@
+"""`compare`, `diagnose` and `inspect` parse no stranger's file in the driver, and keep limits."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zstandard
+
+from pipeline.__main__ import main
+from tests.faults.bombs import MB, chunk, file_of
+
+pytestmark = pytest.mark.workers
+PARSERS = (
+    ("pipeline.io.survey", "scan"),
+    ("pipeline.io.survey", "split_comments"),
+    ("pipeline.io.ingest", "read_csv"),
+    ("pipeline.io.ingest", "scan"),
+    ("pipeline.io.inspect_file", "describe"),
+)
+HEAVY = "reading it takes more than"
+LITTLE = "read_memory_mb=40"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A whole resistance test, and a chunk that keeps every rule but unpacks to 60 MiB.
+
+    Whatever parses a file is broken in this process; workers begin anew and know nothing of that.
+    """
+    folder = tmp_path / "in"
+    folder.mkdir()
+    rows = "".join(f"{n / 1000},{n // 50},{2 * (n // 50)},25.0\n" for n in range(400))
+    head = "# contract: 1\n# motor_id: m\n# test: resistance\n# pair: ab\n"
+    text = f"{head}t_s,vab_v,ia_a,temp_winding_degc\n{rows}"
+    (folder / "whole.csv").write_text(text)
+    plain = os.urandom(MB) + bytes(59 * MB)
+    packed = zstandard.compress(plain)
+    (folder / "heavy.mcap").write_bytes(file_of(chunk(packed, len(plain), zlib.crc32(plain))))
+
+    def broken(*_: Any, **__: Any) -> Any:
+        raise AssertionError("a stranger's file was parsed in the driver")
+
+    for module, name in PARSERS:
+        monkeypatch.setattr(f"{module}.{name}", broken)
+    return folder
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_one_heavy_file_costs_itself(
+    command: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Expected: exit 3, one line for the heavy file, a result for the motor of the other."""
+    output = tmp_path / "out"
+    assert main([command, f"input={folder}", f"output={output}", LITTLE]) == 3
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("refused: ") and "heavy.mcap" in line and HEAVY in line
+    room = {"compare": "comparison", "diagnose": "diagnosis"}[command]
+    assert (output / room / "m.json").is_file()
+    assert not (output / ".work").exists()
+
+
+def test_inspect_reads_in_a_worker(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Expected: exit 3 and one line for the heavy file, the usual text for the other."""
+    assert main(["inspect", str(folder / "heavy.mcap"), LITTLE]) == 3
+    assert HEAVY in capsys.readouterr().err
+    assert main(["inspect", str(folder / "whole.csv")]) == 0
+    assert "in the form of the contract" in capsys.readouterr().out
+
+
+def test_inspect_ends_where_the_reader_hangs(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A time that no reading keeps: tried twice, then one line and exit 3."""
+    assert main(["inspect", str(folder / "heavy.mcap"), "read_seconds=-1"]) == 3
+    assert "took too long, twice" in capsys.readouterr().err
