@@ -9,6 +9,7 @@ is either an interrupted writer's, whose pending file is there, or a lost file.
 from __future__ import annotations
 
 import hashlib
+import re
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
@@ -21,6 +22,8 @@ from pipeline.records.naming import file_stem
 
 FOLDER = "_versions"
 PENDING = ".pending"
+TREE = re.compile("\x1b\\[[0-9;]*m|\u21b3")
+LONGEST_REASON = 160
 Key = tuple[str, str]
 
 
@@ -133,4 +136,12 @@ def place_of(key: Key) -> str:
 
 
 def _failure(place: str, error: OSError) -> MachineError:
-    return MachineError(f"registry {place}: {error.strerror or error}", "free the disk")
+    remedy = "is it whole, and open to you?" if "://" in place else "free the disk"
+    return MachineError(f"registry {place}: {error.strerror or one_line(error)}", remedy)
+
+
+def one_line(error: Exception) -> str:
+    """One line of an error that object stores print as a coloured tree: its root and its cause."""
+    lines = [TREE.sub("", line).strip() for line in str(error).strip().splitlines()]
+    said = dict.fromkeys([lines[0], lines[-1]]) if lines else [type(error).__name__]
+    return ": ".join(line[:LONGEST_REASON] for line in said)

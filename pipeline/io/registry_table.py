@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from pipeline.io.publish import sync_file, sync_folder
+from pipeline.io.registry_exports import one_line
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Event
 
@@ -63,8 +64,6 @@ MOST_FILES = 32
 SMALL_BYTES = 16 << 20
 PATIENCE_S = 120.0
 LONGEST_PAUSE_S = 0.25
-TREE = re.compile("\x1b\\[[0-9;]*m|\u21b3")
-LONGEST_REASON = 160
 
 Row = tuple[Event, str | None]
 Decide = Callable[[Sequence[Event]], Sequence[Row]]
@@ -229,15 +228,8 @@ class EventTable:
             yield
         except (DeltaError, OSError) as error:
             raise MachineError(
-                f"registry {self.place}: {_reason(error)}", "is it whole, and open to you?"
+                f"registry {self.place}: {one_line(error)}", "is it whole, and open to you?"
             ) from error
-
-
-def _reason(error: Exception) -> str:
-    """One line of an error that object stores print as a coloured tree: its root and its cause."""
-    lines = [TREE.sub("", line).strip() for line in str(error).strip().splitlines()]
-    said = dict.fromkeys([lines[0], lines[-1]]) if lines else [type(error).__name__]
-    return ": ".join(line[:LONGEST_REASON] for line in said)
 
 
 def _rows(table: DeltaTable, columns: Sequence[str], where: str = "true") -> pl.DataFrame:

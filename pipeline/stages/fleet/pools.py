@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
@@ -14,6 +15,7 @@ from pipeline.records.errors import MachineError, UsageError
 from pipeline.stages.fleet.task import begin_worker
 
 NEEDED = ("tls_ca", "tls_cert", "tls_key")
+TALKATIVE = ("distributed", "tornado", "asyncio")
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +109,24 @@ class _Dask:
         from distributed.client import FutureCancelledError
         from distributed.comm.core import CommClosedError
 
-        with _client(self.cluster, workers) as client:
+        with _quiet(), _client(self.cluster, workers) as client:
             executor = client.get_executor(pure=False)
             lost = (CancelledError, FutureCancelledError, CommClosedError)
             yield Pool(executor, (KilledWorker,), lost, spares=True)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """No traceback of Dask's own threads; the driver tells in a line what became of the work."""
+    names = [n for n in logging.root.manager.loggerDict if n.split(".")[0] in TALKATIVE]
+    before = {logger: logger.level for logger in map(logging.getLogger, names)}
+    for logger in before:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)
 
 
 @contextmanager
