@@ -6,11 +6,11 @@ it repeats what the data section says. Chunks stay packed.
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from isal.isal_zlib import crc32
 
 from pipeline.io.mcap import records as rec
 from pipeline.io.mcap.limits import MAX_WHOLE_FLOOR_BYTES, MAX_WHOLE_RATIO
@@ -205,7 +205,7 @@ def _data_record(layout: Layout, spans: RecordSpans, number: int) -> None:
 def _data_end(layout: Layout, spans: RecordSpans, end: int) -> None:
     stated = _fields(layout, spans, end, "the end of the data section").u32()
     section = memoryview(layout.data)[: int(spans.start[end]) - HEAD_BYTES]
-    if stated and stated != zlib.crc32(section):
+    if stated and stated != crc32(section):
         rows = (0, max(layout.messages_seen - 1, 0))
         raise corrupt("the data section fails its checksum", rows)
     layout.data_crc_holds = stated != 0
@@ -222,7 +222,7 @@ def _summary(layout: Layout, spans: RecordSpans, end: int) -> None:
     summary_start, offset_start = footer.u64(), footer.u64()
     covered = memoryview(layout.data)[first_byte : footer.position]
     stated = footer.u32()
-    if stated and stated != zlib.crc32(covered):
+    if stated and stated != crc32(covered):
         raise corrupt("the summary section fails its checksum")
     if summary_start != (first_byte if footer_byte > first_byte else 0):
         raise corrupt("the footer points to the wrong place for the summary")

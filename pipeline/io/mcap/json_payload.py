@@ -90,10 +90,7 @@ def _all_at_once(
         return None
     if table.height != len(payloads):
         return None
-    found: dict[str, Leaf] = {}
-    nulls = 0
-    for series in table.get_columns():
-        nulls += _collect(series, series.name, wanted, found)
+    found, nulls = _leaves(table, wanted)
     return found if nulls == joined.count(b"null") else None
 
 
@@ -102,7 +99,7 @@ def _quotes(value: Any) -> int | None:
     if isinstance(value, str):
         return 2 if '"' not in json.dumps(value, ensure_ascii=False)[1:-1] else None
     if isinstance(value, list):
-        return None if any(isinstance(item, (str, dict, list)) for item in value) else 0
+        return None if {str, dict, list} & set(map(type, value)) else 0
     if not isinstance(value, dict):
         return 0
     parts = [_quotes(part) for part in value.values()]
@@ -124,10 +121,31 @@ def _dtype(value: Any) -> Any:
     if isinstance(value, str):
         return pl.String
     if isinstance(value, list):
-        large = any(isinstance(n, int) and abs(n) > _EXACT_INTEGER for n in value)
+        kinds = set(map(type, value))
+        large = int in kinds and any(type(n) is int and abs(n) > _EXACT_INTEGER for n in value)
         return pl.List(pl.Int64 if large else pl.Float64)
     parts = {key: _dtype(part) for key, part in value.items()}
     return None if not parts or None in parts.values() else pl.Struct(parts)
+
+
+def _leaves(table: Any, wanted: Wanted) -> tuple[dict[str, Leaf], int]:
+    """The leaves of a table, and how many nulls it holds.
+
+    Arrays of one length in each message, as blocks have them, are unpacked together.
+    """
+    import polars as pl
+
+    if all(dtype == pl.List(pl.Float64) for dtype in table.dtypes):
+        lengths = table.select(pl.all().list.len()).to_numpy()  # NaN, unequal to all, for a null
+        if (lengths == lengths[:, :1]).all():
+            counts = lengths[:, 0].astype(np.int64)
+            flat = table.select(pl.all().explode(empty_as_null=False, keep_nulls=False))
+            columns = [series for series in flat.get_columns() if wanted(series.name)]
+            found = {series.name: Leaf(series.to_numpy(), counts) for series in columns}
+            return found, sum(series.null_count() for series in flat.get_columns())
+    found = {}
+    columns = table.get_columns()
+    return found, sum(_collect(series, series.name, wanted, found) for series in columns)
 
 
 def _collect(series: Any, name: str, wanted: Wanted, found: dict[str, Leaf]) -> int:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
+
+from isal.isal_zlib import crc32
 
 from pipeline.io.mcap.limits import (
     MAX_CHUNK_BYTES,
@@ -193,7 +194,7 @@ def attachment(fields: Fields, offset: int, length: int) -> Located:
     fields.span(size)
     covered = fields.position
     crc = fields.u32()
-    if crc and crc != zlib.crc32(memoryview(fields.data)[begin:covered]):
+    if crc and crc != crc32(memoryview(fields.data)[begin:covered]):
         raise corrupt(f"the attachment {name!r} at byte {offset} fails its checksum")
     return Located(offset, length, (log_time, create_time, size, name, media))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import zlib
+from isal.isal_zlib import crc32
 
 from pipeline.io.mcap.records import Chunk
 from pipeline.io.mcap.wire import corrupt
@@ -31,7 +31,7 @@ def unpack(data: bytes, chunk: Chunk, first_message: int = 0) -> bytes:
         )
     if len(plain) != chunk.size:
         raise corrupt(f"{_where(chunk)} unpacks to another size than declared")
-    if chunk.crc and zlib.crc32(plain) != chunk.crc:
+    if chunk.crc and crc32(plain) != chunk.crc:
         raise corrupt(f"{_where(chunk)} fails its checksum", (first_message, first_message))
     return plain
 
