@@ -94,10 +94,9 @@ class Registry:
         def decide(events: Sequence[Event]) -> list[Row]:
             known = {event.key for event in events}
             new = [sheet for sheet in sheets.values() if sheet.key not in known]
-            for sheet in new:
-                if sheet.key not in prepared:
-                    self._exports.prepare(sheet.key, sheet.content)
-                    prepared.add(sheet.key)
+            fresh = {sheet.key: sheet.content for sheet in new if sheet.key not in prepared}
+            prepared.update(fresh)
+            self._exports.prepare_all(fresh)
             return _rows(events, new, now)
 
         try:
@@ -119,16 +118,18 @@ class Registry:
     ) -> Receipt:
         registered = {e.key: e for e in reversed(before) if e.kind == "publish"}
         known, conflicts = [], []
-        for event in added:
-            self._exports.settle(event.key, sheets[event.key].content)
+        whole = {event.key for event in added}
         for key in sheets.keys() - {event.key for event in added}:
             event = registered[key]
             if event.content_sha256 == sheets[key].sha256:
-                self._exports.settle(key, sheets[key].content)
+                whole.add(key)
                 known.append(event)
             else:
                 self._exports.discard(key)
                 conflicts.append(event)
+        self._exports.settle_all(
+            {key: sheet.content for key, sheet in sheets.items() if key in whole}
+        )
         order = sorted(known, key=lambda e: e.sequence), sorted(conflicts, key=lambda e: e.sequence)
         return Receipt(tuple(added), tuple(order[0]), tuple(order[1]))
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 import hashlib
 import re
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from pipeline.records.naming import file_stem
 
 FOLDER = "_versions"
 PENDING = ".pending"
+AT_ONCE = 8
 TREE = re.compile("\x1b\\[[0-9;]*m|\u21b3")
 LONGEST_REASON = 160
 Key = tuple[str, str]
@@ -35,11 +37,19 @@ class Exports:
         self.options = dict(options or {})
         self.folder = None if "://" in place else Path(place)
 
-    def prepare(self, key: Key, content: bytes) -> None:
-        """Puts the content on the disk under a pending name; an object store needs no such step."""
-        if self.folder is None:
-            return
-        pending = self._pending(key)
+    def prepare_all(self, contents: Mapping[Key, bytes]) -> None:
+        """Puts contents on the disk under pending names; an object store needs no such step."""
+        if self.folder is not None and contents:
+            owner = threading.get_native_id()
+            _each(lambda key: self._prepare(key, contents[key], owner), contents)
+
+    def settle_all(self, contents: Mapping[Key, bytes]) -> None:
+        """Gives versions their files, unless they are there: each is written once, never again."""
+        owner = threading.get_native_id()
+        _each(lambda key: self._settle(key, contents[key], owner), contents)
+
+    def _prepare(self, key: Key, content: bytes, owner: int) -> None:
+        pending = self._pending(key, owner)
         try:
             new = not pending.parent.is_dir()
             pending.parent.mkdir(parents=True, exist_ok=True)
@@ -51,19 +61,18 @@ class Exports:
                 pending.unlink()
             raise _failure(self.place, error) from error
 
-    def settle(self, key: Key, content: bytes) -> None:
-        """Gives the version its file, unless it is there: it is written once and never again."""
+    def _settle(self, key: Key, content: bytes, owner: int) -> None:
         try:
             if self.folder is None:
                 if self.read(key) is None:
                     self._put(key, content)
                 return
-            final, pending = self.folder / place_of(key), self._pending(key)
+            final, pending = self.folder / place_of(key), self._pending(key, owner)
             if final.exists():
                 pending.unlink(missing_ok=True)
                 return
             if not pending.exists():
-                self.prepare(key, content)
+                self._prepare(key, content, owner)
             pending.replace(final)
             sync_folder(final.parent)
         except OSError as error:
@@ -73,7 +82,7 @@ class Exports:
         """Takes this writer's pending file away."""
         if self.folder is not None:
             with suppress(OSError):
-                self._pending(key).unlink()
+                self._pending(key, threading.get_native_id()).unlink()
 
     def finish(self, key: Key, sha256: str) -> bool:
         """Whether the pending file of an interrupted writer had this digest and is the file now."""
@@ -122,11 +131,21 @@ class Exports:
 
         return DeltaFileSystemHandler(self.place, self.options or None)
 
-    def _pending(self, key: Key) -> Path:
-        """A name of this thread's own."""
+    def _pending(self, key: Key, owner: int) -> Path:
+        """A name of the thread that publishes."""
         assert self.folder is not None
         final = self.folder / place_of(key)
-        return final.with_name(f".{key[1]}.{threading.get_native_id()}{PENDING}")
+        return final.with_name(f".{key[1]}.{owner}{PENDING}")
+
+
+def _each(work: Callable[[Key], None], keys: Iterable[Key]) -> None:
+    """Does something for every key, several at once: it is mostly waiting for the disk.
+
+    Raises what the first that failed raised, when the others have ended.
+    """
+    with ThreadPoolExecutor(AT_ONCE) as threads:
+        for done in [threads.submit(work, key) for key in keys]:
+            done.result()
 
 
 def place_of(key: Key) -> str:

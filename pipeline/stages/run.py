@@ -31,6 +31,8 @@ from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
 from pipeline.stages.fleet.publishing import datasheets_of, outcome_of, placed, publish
 
 CRUMBS = ".work"
+COMMITTED = 100
+"""Datasheets in a commit of the registry, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,22 +152,28 @@ def _registry(settings: RunSettings) -> Registry | None:
 def _register(
     registry: Registry | None, output: Path, results: Sequence[MotorResult]
 ) -> Registered:
-    """Publishes all datasheets in one commit; a registry that fails leaves the outputs whole."""
+    """Publishes the datasheets, so many in a commit that memory does not grow with the batch.
+
+    A registry that fails leaves the outputs whole.
+    """
     names = [n for r in results for n, _ in r.finished.files if n.startswith("datasheets/")]
     if registry is None or not names:
         return Registered()
-    try:
-        sheets = ((output / name).read_bytes() for name in names)
-        receipt = registry.publish(sheets, datetime.now(UTC))
-    except MachineError as error:
-        return Registered(error.exit_code, errors=(f"error: {error}",))
-    counts = f"{len(receipt.added)} new, {len(receipt.known)} known"
-    text = f"registry {registry.place}: {counts}"
-    errors = tuple(
-        f"error: motor {printable(event.motor_id)}: version {event.version[:12]} is registered "
-        "with other content; the same work gave other bytes, so the registered one stays"
-        for event in receipt.conflicts
-    )
+    added = known = 0
+    errors: tuple[str, ...] = ()
+    for first in range(0, len(names), COMMITTED):
+        some = names[first : first + COMMITTED]
+        try:
+            receipt = registry.publish(((output / n).read_bytes() for n in some), datetime.now(UTC))
+        except MachineError as error:
+            return Registered(error.exit_code, errors=(*errors, f"error: {error}"))
+        added, known = added + len(receipt.added), known + len(receipt.known)
+        errors += tuple(
+            f"error: motor {printable(event.motor_id)}: version {event.version[:12]} is registered "
+            "with other content; the same work gave other bytes, so the registered one stays"
+            for event in receipt.conflicts
+        )
+    text = f"registry {registry.place}: {added} new, {known} known"
     return Registered(1 if errors else 0, text, errors)
 
 

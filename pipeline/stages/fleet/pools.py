@@ -179,6 +179,12 @@ OWN_CLUSTER = {
     "distributed.worker.http.routes": [],
     # Looking at what workers do a hundred times a second costs a tenth of their time.
     "distributed.worker.profile.enabled": False,
-    # There is a worker a core: threads of its libraries would only wake each other.
-    "distributed.nanny.pre-spawn-environ.POLARS_MAX_THREADS": 1,
+    # There is a worker a core: threads of its libraries would only wake each other. Dask's own
+    # choice would hand every freed array back to the system, and fetch it again.
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(
+        ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS"), "1"
+    ),
+    # Fifty times a second a worker's loop would ask for the interpreter of the work.
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
 }

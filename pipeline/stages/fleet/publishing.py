@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.io.datasheets import read_datasheet
@@ -15,7 +16,8 @@ from pipeline.io.survey import Survey
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
 from pipeline.records.outcome import Outcome, first_that_applies
-from pipeline.report.console import summary
+from pipeline.report.console import COLUMNS, summary
+from pipeline.report.words import KEY_CONSTANTS
 from pipeline.settings import RunSettings
 from pipeline.stages.fleet.jobs import MotorResult
 from pipeline.stages.fleet.keeping import Files
@@ -23,13 +25,24 @@ from pipeline.stages.fleet.keeping import Files
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"
 """Stand for the names of the folders; no file may bear such a name."""
+OF_BATCH = frozenset({*KEY_CONSTANTS, *(name for _, name, _ in COLUMNS)})
+"""Constants that the batch's page and summary show."""
 ROOMS = ("datasheets", "report", "recordings", ".cache")
 
 
 def datasheets_of(output: Path, results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
-    """The datasheets of a batch, read back from where they were written."""
+    """The datasheets of a batch, read back from where they were written.
+
+    Only what belongs to the batch is kept of each, or memory would grow with the batch.
+    """
     names = [name for result in results for name, _ in result.finished.files]
-    return tuple(read_datasheet(output / n) for n in names if n.startswith("datasheets/"))
+    sheets = (read_datasheet(output / name) for name in names if name.startswith("datasheets/"))
+    return tuple(_kept(sheet) for sheet in sheets)
+
+
+def _kept(sheet: Datasheet) -> Datasheet:
+    constants = {name: one for name, one in sheet.constants.items() if name in OF_BATCH}
+    return replace(sheet, constants=constants, alternatives=(), captures=())
 
 
 def publish(
