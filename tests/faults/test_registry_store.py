@@ -24,6 +24,15 @@ from tests.registered import NOON, document, version_of
 
 pytestmark = pytest.mark.slow
 BUCKET = "fleet"
+# One request at a time: moto's own command answers several at once, and between "is it there?" and
+# "put it" another may come in, which the conditional write of a store rules out.
+SERVE = """
+import sys
+from moto.moto_server.werkzeug_app import DomainDispatcherApplication, create_backend_app
+from werkzeug.serving import run_simple
+app = DomainDispatcherApplication(create_backend_app)
+run_simple("127.0.0.1", int(sys.argv[1]), app, threaded=False)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +43,7 @@ def store() -> Iterator[dict[str, str]]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    words = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+    words = [sys.executable, "-c", SERVE, str(port)]
     server = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     options = {
         "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
