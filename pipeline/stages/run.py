@@ -31,7 +31,7 @@ from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
 from pipeline.stages.fleet.publishing import datasheets_of, outcome_of, placed, publish
 
 CRUMBS = ".work"
-COMMITTED = 100
+COMMITTED = 50
 """Datasheets in a commit of the registry, at most."""
 
 
