@@ -22,12 +22,12 @@ PARSERS = (
     ("pipeline.io.inspect_file", "describe"),
 )
 HEAVY = "reading it takes more than"
-LITTLE = "read_memory_mb=40"
+LITTLE = "read_memory_mb=60"
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A whole resistance test, and a chunk that keeps every rule but unpacks to 60 MiB.
+    """A whole resistance test, and a chunk that keeps every rule but unpacks to 64 MiB.
 
     Whatever parses a file is broken in this process; workers begin anew and know nothing of that.
     """
@@ -37,7 +37,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     head = "# contract: 1\n# motor_id: m\n# test: resistance\n# pair: ab\n"
     text = f"{head}t_s,vab_v,ia_a,temp_winding_degc\n{rows}"
     (folder / "whole.csv").write_text(text)
-    plain = os.urandom(MB) + bytes(59 * MB)
+    plain = os.urandom(MB // 8) + bytes(64 * MB - MB // 8)
     packed = zstandard.compress(plain)
     (folder / "heavy.mcap").write_bytes(file_of(chunk(packed, len(plain), zlib.crc32(plain))))
 
@@ -75,5 +75,5 @@ def test_inspect_ends_where_the_reader_hangs(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A time that no reading keeps: tried twice, then one line and exit 3."""
-    assert main(["inspect", str(folder / "heavy.mcap"), "read_seconds=-1"]) == 3
+    assert main(["inspect", str(folder / "whole.csv"), "read_seconds=0.000001"]) == 3
     assert "took too long, twice" in capsys.readouterr().err
