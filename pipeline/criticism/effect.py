@@ -8,7 +8,7 @@ to any model.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -199,6 +199,36 @@ class Recorded:
 
 
 Values = Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """All of one drive log [n], with what the fitted model makes of it.
+
+    `x` with its air-gap torque, `drag_nm` of everything else in the model, `shaft_nm` the true
+    torque at the shaft's sensor, `good` the samples that were recorded well; `u_*` are the standard
+    deviations of the noise of angle [rad], shaft torque and air-gap torque [N·m].
+    """
+
+    x: Operating
+    drag_nm: Array
+    shaft_nm: Array
+    good: NDArray[np.bool_]
+    u_theta_rad: float
+    u_shaft_nm: float
+    u_air_gap_nm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """Which of the effects that share a closer look it was, and parameters with their standard
+    uncertainties, in their own units.
+    """
+
+    name: str
+    values: Mapping[str, tuple[float, float]]
+
+
 CoenergyHook = Callable[[Operating, Values], Any]
 DropHook = Callable[[Operating, Values], Complex]
 TorqueHook = Callable[[Operating, Values], Array]
@@ -206,6 +236,7 @@ AngleHook = Callable[[Operating, Values], Array]
 CurrentHook = Callable[[Recorded, Values], Complex]
 LoadHook = Callable[[Recorded, Values], Array]
 VoltageHook = Callable[[Complex, Operating, Values, str], Complex]
+CloserHook = Callable[[Sequence[Whole], Values], Told | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +254,9 @@ class Effect:
     speed(ω, q, T): a drive's own recorded speed from the true one [rad/s], T the sample period.
     voltage(v, x, q, instrument): recorded voltage from the true one [V].
     shaft(t, q): recorded shaft torque from the true one [N·m].
+
+    closer(wholes, q): which of the effects that share this very function it was, from whole logs;
+        None where these do not tell. For effects whose equations differ in what windows smooth.
 
     `parameters`, or `expand(machine)` where their number depends on the machine. `signals` are
     capture columns without which the effect cannot be seen, `tests` those that excite it, the
@@ -249,6 +283,7 @@ class Effect:
     voltage: VoltageHook | None = None
     shaft: Callable[[Array, Values], Array] | None = None
     speed: Callable[[Array, Values, float], Array] | None = None
+    closer: CloserHook | None = None
     left_out: tuple[int, ...] = ()
 
     @property

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.criticism.closer import kin, told_by_wholes
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.segment import Segment
@@ -29,9 +30,12 @@ def rivals_of(
     much of it that is over noise floors and priors).
 
     Those are refitted in its place that to first order keep most of what the effect explains, or
-    that were `passed_over` for it.
+    that were `passed_over` for it; those that share its closer look are rivals where that does not
+    tell them apart.
     """
     effect = next(e for e in fitted.model.effects if e.name == name)
+    alike = kin(effect, {one.effect.name: one.effect for one in offered})
+    ties = [] if told_by_wholes(segments, fitted, effect) else list(alike)
     grams = wide.grams()
     lost = loss_without(wide, fitted, (name,), grams=grams)
     first = len(own_columns(fitted.model))
@@ -39,16 +43,17 @@ def rivals_of(
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        if not _meet(effect, candidate.effect):
+        if candidate.effect.name in alike or not _meet(effect, candidate.effect):
             continue
         rise = loss_without(wide, fitted, (name,), places, grams)
         other = candidate.effect.name
         if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate
     for candidate in passed_over:
+        if candidate.effect.name in alike:
+            continue
         near.setdefault(candidate.effect.name, (_NEAR * lost, candidate))
     nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))[:_MOST]
-    ties = []
     for _, candidate in nearest:
         swapped = _refitted(name, fitted, candidate, segments, wide)
         if (

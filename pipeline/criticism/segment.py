@@ -34,7 +34,8 @@ class Segment:
     predict it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the
     capture may have; `runs_rad` the angles turned between reversals, of which the column `run`
     numbers the one at hand; `lines` [K, C, W, M] are weak samples of the mains lines that there
-    may be.
+    may be; `whole` are the columns of a drive log before it was thinned, with `good`, the samples
+    that were recorded well.
     """
 
     capture: str
@@ -54,6 +55,7 @@ class Segment:
     offsets: Array | None = None
     runs_rad: Array | None = None
     lines: Array | None = None
+    whole: Mapping[str, Array] | None = None
 
     @property
     def size(self) -> int:

@@ -112,9 +112,11 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
         even_angle(found, noise, window)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
+    whole = {**found, "good": keep} if capture.meta.test == "drive" and len(channels) > 2 else None
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
-    return segment_of(capture, "dq", "drive", period, found, noise, channels, weak, runs_rad=runs)
+    made = segment_of(capture, "dq", "drive", period, found, noise, channels, weak, runs_rad=runs)
+    return replace(made, whole=whole)
 
 
 def _shaft(capture: Capture, machine: Machine) -> Segment | None:

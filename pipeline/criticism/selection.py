@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.grams import Descent, Grams
@@ -259,9 +260,12 @@ def search(
         rungs.append(Rung(added, fitted, wide, scores))
         if len(rungs) == _MOST:
             break
-        chosen = _chosen(segments, fitted, [s for s in scores if s.passes], wide)
+        inside = {e.closer for e in fitted.model.effects} - {None}
+        passing = [s for s in scores if s.passes and s.candidate.effect.closer not in inside]
+        chosen = _chosen(segments, fitted, passing, wide)
         if chosen is None:
             break
+        chosen = renamed(segments, chosen, library)
         fitted, _ = _backward(segments, *chosen, base)
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.coupling import far_drag, passed_on
+from pipeline.criticism.coupling import closer, far_drag, passed_on
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
@@ -41,4 +41,5 @@ EFFECT = Effect(
         "presliding": "an angle on the load side: friction moves no far mass",
     },
     torque=_torque,
+    closer=closer,
 )

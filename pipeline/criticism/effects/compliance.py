@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.coupling import far_drag, passed_on
+from pipeline.criticism.coupling import closer, far_drag, passed_on
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
@@ -32,4 +32,5 @@ EFFECT = Effect(
         "backlash": "steps of torque of one sign only: a gap then stays closed, a spring does not",
     },
     torque=_torque,
+    closer=closer,
 )

@@ -1,0 +1,68 @@
+"""Effects that windows hardly part, told apart by a closer look at whole drive logs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from pipeline.criticism.descent import clipped, gauss_newton
+from pipeline.criticism.effect import Effect, Told, Whole
+from pipeline.criticism.model import Model, evaluate, values_of, zero
+from pipeline.criticism.operate import operate
+from pipeline.criticism.residuals import measured
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.system import Fitted, System
+
+
+def told_by_wholes(segments: Sequence[Segment], fitted: Fitted, effect: Effect) -> Told | None:
+    """What the closer look of an effect in the model says; None where it has none, or no logs."""
+    if effect.closer is None:
+        return None
+    model, values = fitted.model.without(effect.name), fitted.values
+    wholes = [_whole(s, model, fitted) for s in segments if s.whole is not None]
+    return effect.closer(wholes, values_of(effect, model.machine, values))
+
+
+def _whole(segment: Segment, model: Model, fitted: Fitted) -> Whole:
+    """One log at full rate, as a model without the effect sees it."""
+    signals = dict(segment.whole or {})
+    good = signals.pop("good") > 0
+    values = fitted.values
+    full = replace(segment, recorded=signals, weak=None)
+    x = operate(full, signals, model, values)
+    drag = evaluate(model, x, values).drag_nm
+    shaft = measured(full, signals, model, values)[-1] / (1.0 + values["gain_torque"])
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+    noise = segment.noise
+    u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
+    return Whole(x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap)
+
+
+def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
+    """The other effects that share an effect's closer look."""
+    if effect.closer is None:
+        return ()
+    return tuple(n for n, e in library.items() if e.closer is effect.closer and n != effect.name)
+
+
+def renamed(
+    segments: Sequence[Segment], chosen: tuple[Fitted, System], library: Mapping[str, Effect]
+) -> tuple[Fitted, System]:
+    """A fit whose last effect is the one that whole logs tell, of those that share its look."""
+    fitted, around = chosen
+    effect = fitted.model.effects[-1]
+    told = told_by_wholes(segments, fitted, effect)
+    if told is None or told.name not in (effect.name, *kin(effect, library)):
+        return chosen
+    truth = library[told.name]
+    model = fitted.model.without(effect.name).with_effects(truth)
+    own = f"{effect.name}."
+    values = {name: v for name, v in fitted.values.items() if not name.startswith(own)}
+    values |= zero(truth, model)
+    for p in truth.parameters_of(model.machine):
+        if own + p.name in fitted.values:
+            values[f"{truth.name}.{p.name}"] = fitted.values[own + p.name]
+    values |= {f"{truth.name}.{name}": value for name, (value, _) in told.values.items()}
+    start = replace(fitted, model=model, values=clipped(model, values))
+    return gauss_newton(segments, start, before=around)
