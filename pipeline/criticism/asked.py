@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import first_fit, gauss_newton, initial, rough_fit
 from pipeline.criticism.mains import Hum, hum_of, with_hum
 from pipeline.criticism.model import Model
@@ -49,6 +50,10 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
             break
         del shaped[scores[0].candidate.effect.name]
         fitted, around = gauss_newton(heard, begun(fitted, scores[0]), before=wide)
+    for effect in fitted.model.effects:
+        fitted, around = renamed(heard, (fitted, around), effect.name, {effect.name: effect})
+    settled = {effect.name: effect for effect in fitted.model.effects}
+    model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
     unheard = {k: v for effect in shaped.values() for k, v in initial(effect, model).items()}
     whole = replace(fitted, model=model, values={**fitted.values, **unheard})
     return Begun(heard, *gauss_newton(heard, whole), hum)

@@ -46,23 +46,38 @@ def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
     return tuple(n for n, e in library.items() if e.closer is effect.closer and n != effect.name)
 
 
+def _settled(effect: Effect, told: Told) -> Effect:
+    """The effect with what whole logs tell of it as known numbers, which no fit moves."""
+    parameters = tuple(
+        replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1]) if p.name in told.values else p
+        for p in effect.parameters
+    )
+    return replace(effect, parameters=parameters)
+
+
 def renamed(
-    segments: Sequence[Segment], chosen: tuple[Fitted, System], library: Mapping[str, Effect]
+    segments: Sequence[Segment],
+    chosen: tuple[Fitted, System],
+    name: str,
+    library: Mapping[str, Effect],
 ) -> tuple[Fitted, System]:
-    """A fit whose last effect is the one that whole logs tell, of those that share its look."""
+    """The fit with that one in an effect's place which whole logs tell, of those that share its
+    look, and with the numbers that these tell.
+    """
     fitted, around = chosen
-    effect = fitted.model.effects[-1]
+    effect = next(e for e in fitted.model.effects if e.name == name)
     told = told_by_wholes(segments, fitted, effect)
-    if told is None or told.name not in (effect.name, *kin(effect, library)):
+    if told is None or told.name not in (name, *kin(effect, library)):
         return chosen
-    truth = library[told.name]
-    model = fitted.model.without(effect.name).with_effects(truth)
-    own = f"{effect.name}."
-    values = {name: v for name, v in fitted.values.items() if not name.startswith(own)}
+    truth = _settled(library[told.name], told)
+    effects = tuple(truth if e.name == name else e for e in fitted.model.effects)
+    model = replace(fitted.model, effects=effects)
+    own = f"{name}."
+    values = {key: v for key, v in fitted.values.items() if not key.startswith(own)}
     values |= zero(truth, model)
     for p in truth.parameters_of(model.machine):
         if own + p.name in fitted.values:
             values[f"{truth.name}.{p.name}"] = fitted.values[own + p.name]
-    values |= {f"{truth.name}.{name}": value for name, (value, _) in told.values.items()}
+    values |= {f"{truth.name}.{key}": value for key, (value, _) in told.values.items()}
     start = replace(fitted, model=model, values=clipped(model, values))
     return gauss_newton(segments, start, before=around)

@@ -88,7 +88,7 @@ def _parameters(fitted: Fitted, around: System, held: HeldOut) -> dict[str, Mode
         edge = 1e-9 * max(abs(p.typical), 1e-30) * scale
         bound = min(abs(value - p.low * scale), abs(value - p.high * scale)) <= edge
         bound = bound and not p.choice
-        told[name] = ModelParameter(value, u.get(name, 0.0), p.unit, bound)
+        told[name] = ModelParameter(value, u.get(name, p.u), p.unit, bound)
     return told
 
 

@@ -17,17 +17,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
 
 import numpy as np
 
 from pipeline.criticism.effect import Array, Operating, Told, Values, Whole
 from pipeline.criticism.twist import Shaft, law_of_twist
 
-_WIDTH_S = 0.004
-_MOST = 23
-_LEAST = 7
-_DEGREE = 4
+_BLOCK_S = 0.75e-3
+# three blocks and a difference stay within the samples kept around a window
+_MOST = 15
 _SURE = 3.5
 _FEW = 6
 _NO_GAP_RAD = 2e-4
@@ -36,27 +34,58 @@ _NO_GAP_RAD = 2e-4
 def passed_on(x: Operating, share: float) -> Array:
     """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
 
-    `share` of the inertia is at the far end. Quartics over 4 ms [3] keep the encoder's rounding,
-    twice differenced, out of it and leave a resonance of some 100 Hz as it is.
+    `share` of the inertia is at the far end. Both parts are under the weights that means over a
+    block have once they are differenced twice, which keeps the encoder's rounding out of them; a
+    ringing of some 100 Hz stays as it is.
     """
-    near = (1.0 - share) * x.base["j_kgm2"]
-    torque: Array = _smooth(x.torque_nm, x.ts_s, 0) - near * _smooth(x.theta_rad, x.ts_s, 2)
-    return torque
+    block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
+    block -= 1 - block % 2
+    box = np.full(block, 1.0 / block)
+    kernel = np.convolve(np.convolve(box, box), box)
+    found = np.zeros(x.theta_rad.size)
+    if found.size < kernel.size + 2:
+        return found
+    means = np.convolve(x.theta_rad, box, mode="valid")
+    bend = means[2 * block :] - 2.0 * means[block:-block] + means[: -2 * block]
+    near = (1.0 - share) * x.base["j_kgm2"] / (block * x.ts_s) ** 2
+    inner = np.convolve(x.torque_nm, kernel, mode="valid")[1:-1] - near * bend
+    first = kernel.size // 2 + 1
+    found[first : first + inner.size] = inner
+    return found
 
 
 def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
     """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m].
 
     `between`: the transducer stands between the two parts, and reads S whatever holds the far end.
+    The twist is differenced as it is: the windows of the weak form smooth it.
     """
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
-    if not (x.held or between):
-        return -far * _smooth(twist_rad(), x.ts_s, 2)
-    acceleration = np.zeros(x.theta_rad.size)
-    acceleration[1:-1] = np.diff(x.theta_rad, 2) / x.ts_s**2
-    return -far * acceleration
+    moved = x.theta_rad if x.held or between else twist_rad()
+    drag = np.zeros(x.theta_rad.size)
+    drag[1:-1] = -far / x.ts_s**2 * np.diff(moved, 2)
+    return drag
+
+
+def side_of(through_nm: Array, least_nm: float) -> Array:
+    """Side of a gap [n], −1 to 1, that the torque passed on presses to.
+
+    Where it is less than `least_nm` the gap is crossed, if the torque comes back with the other
+    sign: slowly at first, at an even acceleration.
+    """
+    closed = np.flatnonzero(np.abs(through_nm) > least_nm)
+    if closed.size == 0:
+        return np.zeros(through_nm.size)
+    at = np.arange(through_nm.size)
+    place = np.searchsorted(closed, at, side="right")
+    last = closed[np.maximum(place - 1, 0)]
+    after = closed[np.minimum(place, closed.size - 1)]
+    passed = np.clip((at - last) / np.maximum(after - last, 1), 0.0, 1.0)
+    begin, end = np.sign(through_nm[last]), np.sign(through_nm[after])
+    side: Array = begin + (end - begin) * passed**2
+    return side
 
 
 def closer(wholes: Sequence[Whole], q: Values) -> Told | None:
@@ -88,6 +117,7 @@ def _shaft(one: Whole, between: bool, share: float) -> Shaft:
     x, inertia = one.x, one.x.base["j_kgm2"]
     driving = x.torque_nm - one.drag_nm
     u_both = math.hypot(one.u_shaft_nm, one.u_air_gap_nm)
+    u_shaft = one.u_shaft_nm
     return Shaft(
         x.ts_s,
         x.theta_rad,
@@ -96,27 +126,7 @@ def _shaft(one: Whole, between: bool, share: float) -> Shaft:
         0.0 if between else (1.0 - share) * inertia,
         share * inertia if between else inertia,
         one.u_theta_rad,
-        one.u_shaft_nm if between else u_both,
+        u_shaft if between else one.u_air_gap_nm,
+        u_shaft if between else u_both,
         one.good,
     )
-
-
-def _smooth(signal: Array, period_s: float, derivative: int) -> Array:
-    """A signal [n] or its derivative by a local quartic; zero where it has no room."""
-    width = max(min(2 * round(_WIDTH_S / period_s / 2) + 1, _MOST), _LEAST)
-    found = np.zeros(signal.size)
-    if signal.size < width:
-        return found
-    half = width // 2
-    inner = np.convolve(signal, _quartic(width, derivative), mode="valid")
-    found[half : signal.size - half] = inner / period_s**derivative
-    return found
-
-
-@cache
-def _quartic(width: int, derivative: int) -> Array:
-    """Weights [width], last sample first, of a local quartic's derivative at its middle [3]."""
-    at = np.arange(width) - width // 2
-    rows: Array = np.linalg.pinv(np.vander(at, _DEGREE + 1, increasing=True).astype(float))
-    weights: Array = math.factorial(derivative) * rows[derivative][::-1]
-    return weights

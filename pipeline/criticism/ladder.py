@@ -46,7 +46,7 @@ def parameters_of(rung: Rung, held: HeldOut) -> dict[str, tuple[float, float, st
     spread = uncertainties(rung.around, held, len(own)).tolist()
     u = {column.name: one for column, one in zip(own, spread, strict=True)}
     return {
-        name: (float(rung.fitted.values[name]), u.get(name, 0.0), p.unit)
+        name: (float(rung.fitted.values[name]), u.get(name, p.u), p.unit)
         for name, (_, p) in rung.fitted.model.parameters().items()
     }
 

@@ -265,7 +265,8 @@ def search(
         chosen = _chosen(segments, fitted, passing, wide)
         if chosen is None:
             break
-        chosen = renamed(segments, chosen, library)
+        newest = chosen[0].model.effects[-1].name
+        chosen = renamed(segments, chosen, newest, library)
         fitted, _ = _backward(segments, *chosen, base)
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))

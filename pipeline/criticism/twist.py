@@ -10,13 +10,14 @@ whatever happens in between: momentum does not care for impacts. Where the shaft
 twist(S) is S/k of a spring, and half the gap more to the side that S presses to, if there is one.
 So the angle is linear in 1/J, 1/k and the gap [1], without a model of flights and bounces.
 
-Noise of the angle, and of the torque twice integrated, is whitened [2]. A window that misses it by
+Noise of the angle, and of the torque twice integrated, is whitened [2]; what it does to the
+columns, where it would pass for a softness, is taken out of the normal matrix [5]. A window that misses it by
 χ²/n = q > 1, as one in which the load jumps, counts 1/q², so that it hardly counts [3];
 uncertainties are from the scatter of windows [4].
 
 References: [1] Nordin & Gutman, Automatica 38 (2002), dead zones; [2] Aitken, Proc. R. Soc.
 Edinb. 55 (1936), least squares; [3] Geman & McClure, Bull. Int. Stat. Inst. 52 (1987), weights
-that redescend; [4] Liang & Zeger, Biometrika 73 (1986), clusters.
+that redescend; [4] Liang & Zeger, Biometrika 73 (1986), clusters; [5] Fuller, Measurement Error Models (1987), ch. 3.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ _SHORTEST = 12
 _SURE = 5.0
 _FINE = 0.08
 _RANGE = 10.0
-_LEAST = 8
-_FREE_RAD = 1.0
+_LEAST = 10
 _STARTS_RAD = (0.0, 3e-4, 1e-3, 3e-3, 1e-2)
 _ROUNDS = 40
+_USUAL = .5
 _SETTLED = 1e-3
 
 
@@ -50,7 +51,7 @@ class Shaft:
 
     `through_nm` less `near_kgm2` θ″ is what the coupling passes on; `momentum_nm` is what turns
     `inertia_kgm2` (known to a few per cent). `kept` [n] are good samples, `u_*` the standard
-    deviations of a sample's noise.
+    deviations of a sample's noise; that of `through_nm` is in `momentum_nm` as well.
     """
 
     ts_s: float
@@ -60,7 +61,8 @@ class Shaft:
     near_kgm2: float
     inertia_kgm2: float
     u_theta_rad: float
-    u_torque_nm: float
+    u_through_nm: float
+    u_momentum_nm: float
     kept: NDArray[np.bool_]
 
 
@@ -81,12 +83,14 @@ class Law:
 
 @dataclass(frozen=True, slots=True)
 class _Window:
-    """Whitened columns [m, 3] of 1/J, 1/k and half the gap, and angle [m]; mean square torque
-    [(N·m)²], and whether it presses to both sides.
+    """Whitened columns [m, 3], less any parabola, of 1/J, 1/k and half the gap, and angle [m]; what noise adds to
+    their products on the average [3, 4]; mean square torque [(N·m)²], and whether it presses to
+    both sides.
     """
 
     columns: Array
     angle: Array
+    noise: Array
     power: float
     turns: bool
 
@@ -117,19 +121,26 @@ def _windows(shaft: Shaft) -> Iterable[_Window]:
     block, theta, through, turned, least = _smoothed(shaft)
     size = max(round(_WINDOW_S / (block * shaft.ts_s)), _SHORTEST)
     closed = _closed(through, least)
-    closed &= sliding_window_view(shaft.kept, 3 * block - 2).all(axis=1)[::block][: closed.size]
-    noise = _noise(shaft, block, size)
+    closed &= sliding_window_view(shaft.kept, 3 * block).all(axis=1)[::block][: closed.size]
+    noise = _Noise.of(shaft, block, size)
     for first in range(0, theta.size - size + 1, size // 2):
-        here = closed[first : first + size]
+        here = np.flatnonzero(closed[first : first + size])
         pressed = through[first : first + size][here]
         if pressed.size < _LEAST or np.ptp(pressed) < _RANGE * least:
             continue
         side = np.sign(pressed)
         own = [x[first : first + size][here] - x[first] for x in (turned, theta)]
-        lower = np.linalg.cholesky(noise[np.ix_(here, here)])
-        white = np.linalg.solve(lower, np.column_stack([own[0], pressed, side, own[1]]))
+        parabola = np.vander(here / size - 0.5, 3)
+        rest = np.linalg.qr(parabola, mode="complete")[0][:, 3:]
+        lower = np.linalg.cholesky(rest.T @ noise.error[np.ix_(here, here)] @ rest)
+        whiten = np.linalg.solve(lower, rest.T)
+        white = whiten @ np.column_stack([own[0], pressed, side, own[1]])
         yield _Window(
-            white[:, :3], white[:, 3], float(np.mean(pressed**2)), bool(np.ptp(side) > 0)
+            white[:, :3],
+            white[:, 3],
+            noise.products(whiten.T @ whiten, here),
+            float(np.mean(pressed**2)),
+            bool(np.ptp(side) > 0),
         )
 
 
@@ -147,14 +158,15 @@ def _smoothed(shaft: Shaft) -> tuple[int, Array, Array, Array, float]:
         period = block * shaft.ts_s
         box, kernel = _kernel(block)
         theta, through, turned = (
-            np.convolve(x, kernel, mode="valid")[::block]
+            np.convolve(x, kernel, mode="valid")[1::block]
             for x in (shaft.theta_rad, shaft.through_nm, whole)
         )
+        # the middle of three blocks is a sample after that of their weights
         means = np.convolve(shaft.theta_rad, box, mode="valid")[::block]
         bend = np.diff(means, 2)[: theta.size] / period**2
         through = through[: bend.size] - shaft.near_kgm2 * bend
         bent = shaft.near_kgm2 * shaft.u_theta_rad * math.sqrt(6.0 / block) / period**2
-        least = _SURE * math.hypot(bent, shaft.u_torque_nm * float(np.linalg.norm(kernel)))
+        least = _SURE * math.hypot(bent, shaft.u_through_nm * float(np.linalg.norm(kernel)))
         if least < _FINE * float(np.std(through)):
             break
     return block, theta[: bend.size], through, turned[: bend.size], least
@@ -173,48 +185,90 @@ def _closed(through: Array, least: float) -> NDArray[np.bool_]:
     return closed
 
 
-def _noise(shaft: Shaft, block: int, size: int) -> Array:
-    """Covariance [size, size] of a window's angle: its sensor's noise, the torque's twice
-    integrated, and any parabola.
+@dataclass(frozen=True, slots=True)
+class _Noise:
+    """Covariances [size, size] of what noise does in a window: of the equation's `error`, and
+    of momentum, torque passed on and angle.
     """
-    _, kernel = _kernel(block)
-    near = np.correlate(kernel, kernel, mode="full")[kernel.size - 1 :: block]
-    ahead = np.subtract.outer(np.arange(size), np.arange(size))
-    apart = np.minimum(np.abs(ahead), near.size)
-    angle = shaft.u_theta_rad**2 * np.append(near, 0.0)[apart]
-    twice = (block * shaft.ts_s) ** 2 * np.maximum(ahead, 0)
-    torque = (shaft.u_torque_nm / shaft.inertia_kgm2) ** 2 / block * twice @ twice.T
-    free = np.vander(np.arange(size) / size - 0.5, 3)
-    covariance: Array = angle + torque + _FREE_RAD**2 * free @ free.T
-    return covariance
+
+    error: Array
+    momentum: Array
+    momentum_torque: Array
+    torque: Array
+    torque_angle: Array
+
+    @classmethod
+    def of(cls, shaft: Shaft, block: int, size: int) -> _Noise:
+        """White noise of the samples through the weights of `_smoothed`."""
+        box, kernel = _kernel(block)
+        bend = np.convolve(np.convolve(box, box), box)
+        bend = np.convolve(bend, [1.0, -2.0, 1.0]) / shaft.ts_s**2
+        samples = (size + 2) * block
+        angle, torque = np.zeros((2, size, samples))
+        for place in range(size):
+            first = place * block
+            angle[place, first + 1 : first + 1 + kernel.size] = kernel
+            torque[place, first : first + bend.size] = -shaft.near_kgm2 * bend
+        lag = np.subtract.outer(np.arange(samples), np.arange(samples))
+        turned = shaft.ts_s**2 * angle @ np.maximum(lag, 0)
+        u_theta, u_through, u_momentum = (
+            u**2 for u in (shaft.u_theta_rad, shaft.u_through_nm, shaft.u_momentum_nm)
+        )
+        momentum = u_momentum * turned @ turned.T
+        own = u_theta * angle @ angle.T
+        return cls(
+            own + momentum / shaft.inertia_kgm2**2,
+            momentum,
+            u_through * turned @ angle.T,
+            u_through * angle @ angle.T + u_theta * torque @ torque.T,
+            u_theta * torque @ angle.T,
+        )
+
+    def products(self, inverse: Array, here: NDArray[np.int64]) -> Array:
+        """What noise adds to the whitened columns' products with columns and angle [3, 4]."""
+        among = np.ix_(here, here)
+        added = np.zeros((3, 4))
+        added[0, 0] = np.sum(inverse * self.momentum[among])
+        added[0, 1] = added[1, 0] = np.sum(inverse * self.momentum_torque[among])
+        added[1, 1] = np.sum(inverse * self.torque[among])
+        added[1, 3] = np.sum(inverse * self.torque_angle[among])
+        return added
 
 
 def _fitted(told: Sequence[_Window], inertia: float) -> tuple[Array, Array]:
     """Coefficients [3] of the columns, and their covariance [3, 3].
 
-    Weights that redescend have more than one end: a few gaps are begun with, and the end stays
-    that leaves most windows near their noise.
+    What noise explains is little beside what the coupling's damping does, which no column knows:
+    a window counts in full up to the median χ²/n of those in which the torque turns. Weights that
+    redescend have more than one end: a few gaps are begun with, and the end stays that leaves
+    most windows near their noise.
     """
     normal = np.array([one.columns.T @ one.columns for one in told])
     size = np.sqrt(np.einsum("ijj->j", normal))
     normal /= np.outer(size, size)
     slope = np.array([one.columns.T @ one.angle for one in told]) / size
+    turns = np.array([one.turns for one in told])
     power = np.array([one.angle @ one.angle for one in told])
     count = np.array([one.angle.size for one in told])
+    noise = np.array([one.noise for one in told])
+    clean = normal - noise[:, :, :3] / np.outer(size, size)
+    pull = slope - noise[:, :, 3] / size
     ends = []
     for gap in _STARTS_RAD:
         found = size * np.array([1.0 / inertia, 0.0, 0.5 * gap])
         for _ in range(_ROUNDS):
-            weight = np.maximum(_spreads(normal, slope, power, count, found), 1.0) ** -2.0
-            inverse = np.linalg.pinv(np.einsum("i,ijk->jk", weight, normal), hermitian=True)
-            before, found = found, inverse @ (weight @ slope)
+            spreads = _spreads(normal, slope, power, count, found)
+            usual = max(float(np.quantile(spreads[turns], _USUAL)), 1.0)
+            weight = np.maximum(spreads / usual, 1.0) ** -2.0
+            inverse = np.linalg.pinv(np.einsum("i,ijk->jk", weight, clean), hermitian=True)
+            before, found = found, inverse @ (weight @ pull)
             if np.abs(found - before).max() < _SETTLED * np.abs(found).max():
                 break
         spreads = np.maximum(_spreads(normal, slope, power, count, found), 1.0)
-        score = weight[:, None] * (slope - normal @ found)
+        score = weight[:, None] * (pull - clean @ found)
         # windows overlap by half: two of them tell as much as one
         spread = 2.0 * inverse @ (score.T @ score) @ inverse / np.outer(size, size)
-        ends.append((float((count * (1.0 - 1.0 / spreads)).sum()), found / size, spread))
+        ends.append((float((count * np.log(spreads)).sum()), found / size, spread))
     _, best, covariance = min(ends, key=lambda end: end[0])
     return best, covariance
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from pipeline.criticism.coupling import closer, far_drag, passed_on
+from pipeline.criticism.coupling import closer, far_drag, passed_on, side_of
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
@@ -14,7 +12,7 @@ def _torque(x: Operating, q: Values) -> Array:
     def twist() -> Array:
         through = passed_on(x, share)
         softness = q["twist_rad"] / x.machine.scales["torque_nm"]
-        found: Array = 0.5 * gap * np.tanh(through / q["torque_nm"]) + softness * through
+        found: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + softness * through
         return found
 
     return far_drag(x, share, q["between"] > 0.0, twist)
@@ -32,7 +30,7 @@ EFFECT = Effect(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
         Parameter("gap_rad", "rad", 0.005, 0.0002, low=0.0, high=0.3, scan=(0.0005, 0.005)),
         Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=0.3, scan=(0.003,)),
-        Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", low=0.003, high=0.1, scan=(0.02,)),
+        Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", scan=(0.01,), choice=True),
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),
