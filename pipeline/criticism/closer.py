@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from pipeline.criticism.descent import clipped, gauss_newton
-from pipeline.criticism.effect import Effect, Told, Whole
+from pipeline.criticism.effect import Effect, Parameter, Told, Whole
 from pipeline.criticism.model import Model, evaluate, values_of, zero
 from pipeline.criticism.operate import operate
 from pipeline.criticism.residuals import measured
@@ -48,11 +48,13 @@ def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
 
 def _settled(effect: Effect, told: Told) -> Effect:
     """The effect with what whole logs tell of it as known numbers, which no fit moves."""
-    parameters = tuple(
-        replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1]) if p.name in told.values else p
-        for p in effect.parameters
-    )
-    return replace(effect, parameters=parameters)
+    return replace(effect, parameters=tuple(_known(p, told) for p in effect.parameters))
+
+
+def _known(p: Parameter, told: Told) -> Parameter:
+    if p.name not in told.values:
+        return p
+    return replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1])
 
 
 def renamed(

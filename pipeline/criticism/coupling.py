@@ -6,11 +6,12 @@ The far angle is θ less the twist, so that with a load at the far end
     T_load = S − f J (θ″ − twist″) = [T − drags − J θ″] + f J twist″,
 
 while a dynamometer that holds the far end, or a transducer in the coupling, reads S itself,
-[T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S, of a spring or of a spring
-behind a gap: what `closer` tells from whole logs. A coasting shaft passes on next to nothing.
+[T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S, that
+of a spring or of a spring behind a gap, which `closer` tells from whole logs. A coasting shaft
+passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
-(2002), backlash as a dead zone of the twist; [3] Savitzky & Golay, Anal. Chem. 36 (1964).
+(2002), backlash as a dead zone of the twist.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ class Parameter:
     of a shape parameter, which has no influence while the amplitudes of its effect are zero; empty
     for an amplitude. A `choice` takes one of these values
     and is never fitted. `optional`: the parameters of one number above 0 form a term that the
-    effect can do without; without it they are zero. `u`: standard uncertainty, in its own unit, of a
-    value that a closer look told.
+    effect can do without; without it they are zero. `u`: standard uncertainty, in its own unit,
+    of a value that a closer look told.
     """
 
     name: str

@@ -11,13 +11,14 @@ twist(S) is S/k of a spring, and half the gap more to the side that S presses to
 So the angle is linear in 1/J, 1/k and the gap [1], without a model of flights and bounces.
 
 Noise of the angle, and of the torque twice integrated, is whitened [2]; what it does to the
-columns, where it would pass for a softness, is taken out of the normal matrix [5]. A window that misses it by
-χ²/n = q > 1, as one in which the load jumps, counts 1/q², so that it hardly counts [3];
-uncertainties are from the scatter of windows [4].
+columns, where it would pass for a softness, is taken out of the normal matrix [3]. A window that
+misses it by far, as one in which an unrecorded load jumps, hardly counts [4]; uncertainties are
+from the scatter of windows [5].
 
 References: [1] Nordin & Gutman, Automatica 38 (2002), dead zones; [2] Aitken, Proc. R. Soc.
-Edinb. 55 (1936), least squares; [3] Geman & McClure, Bull. Int. Stat. Inst. 52 (1987), weights
-that redescend; [4] Liang & Zeger, Biometrika 73 (1986), clusters; [5] Fuller, Measurement Error Models (1987), ch. 3.
+Edinb. 55 (1936), least squares; [3] Fuller, Measurement Error Models (1987), ch. 3;
+[4] Geman & McClure, Bull. Int. Stat. Inst. 52 (1987), weights that redescend; [5] Liang & Zeger,
+Biometrika 73 (1986), clusters.
 """
 
 from __future__ import annotations
@@ -38,10 +39,12 @@ _SHORTEST = 12
 _SURE = 5.0
 _FINE = 0.08
 _RANGE = 10.0
+_MOVES = 0.5
 _LEAST = 10
 _STARTS_RAD = (0.0, 3e-4, 1e-3, 3e-3, 1e-2)
 _ROUNDS = 40
-_USUAL = .5
+_USUAL = 0.25
+_ODD = 25.0
 _SETTLED = 1e-3
 
 
@@ -83,9 +86,9 @@ class Law:
 
 @dataclass(frozen=True, slots=True)
 class _Window:
-    """Whitened columns [m, 3], less any parabola, of 1/J, 1/k and half the gap, and angle [m]; what noise adds to
-    their products on the average [3, 4]; mean square torque [(N·m)²], and whether it presses to
-    both sides.
+    """Whitened columns [m, 3] of 1/J, 1/k and half the gap, and angle [m], less any parabola; what
+    noise adds to their products on the average [3, 4]; mean square torque [(N·m)²], and whether it
+    presses to both sides.
     """
 
     columns: Array
@@ -123,10 +126,11 @@ def _windows(shaft: Shaft) -> Iterable[_Window]:
     closed = _closed(through, least)
     closed &= sliding_window_view(shaft.kept, 3 * block).all(axis=1)[::block][: closed.size]
     noise = _Noise.of(shaft, block, size)
+    moves = max(_RANGE * least, _MOVES * float(np.std(through)))
     for first in range(0, theta.size - size + 1, size // 2):
         here = np.flatnonzero(closed[first : first + size])
         pressed = through[first : first + size][here]
-        if pressed.size < _LEAST or np.ptp(pressed) < _RANGE * least:
+        if pressed.size < _LEAST or np.ptp(pressed) < moves:
             continue
         side = np.sign(pressed)
         own = [x[first : first + size][here] - x[first] for x in (turned, theta)]
@@ -258,7 +262,7 @@ def _fitted(told: Sequence[_Window], inertia: float) -> tuple[Array, Array]:
         found = size * np.array([1.0 / inertia, 0.0, 0.5 * gap])
         for _ in range(_ROUNDS):
             spreads = _spreads(normal, slope, power, count, found)
-            usual = max(float(np.quantile(spreads[turns], _USUAL)), 1.0)
+            usual = float(np.clip(np.quantile(spreads[turns], _USUAL), 1.0, _ODD))
             weight = np.maximum(spreads / usual, 1.0) ** -2.0
             inverse = np.linalg.pinv(np.einsum("i,ijk->jk", weight, clean), hermitian=True)
             before, found = found, inverse @ (weight @ pull)

@@ -1,4 +1,4 @@
-"""The law of a coupling's twist from whole logs, against two masses integrated in steps of half a microsecond."""
+"""The law of a coupling's twist from whole logs, against two masses in steps of half a µs."""
 
 from __future__ import annotations
 
