@@ -35,7 +35,7 @@ EFFECT = Effect(
     ),
     signals=("torque_shaft_nm",),
     rivals={
-        "compliance": "an angle on the load side, or steps of one sign only: the gap stays closed",
+        "compliance": "a drive log whose torque changes its sign: only a gap opens then",
         "presliding": "an angle on the load side: friction moves no far mass",
     },
     torque=_torque,

