@@ -112,7 +112,8 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
         even_angle(found, noise, window)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
-    whole = {**found, "good": keep} if capture.meta.test == "drive" and len(channels) > 2 else None
+    logged = capture.meta.test == "drive" and len(channels) > 2
+    whole = {**found, "good": keep.astype(float)} if logged else None
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     made = segment_of(capture, "dq", "drive", period, found, noise, channels, weak, runs_rad=runs)

@@ -124,7 +124,8 @@ def _windows(shaft: Shaft) -> Iterable[_Window]:
     block, theta, through, turned, least = _smoothed(shaft)
     size = max(round(_WINDOW_S / (block * shaft.ts_s)), _SHORTEST)
     closed = _closed(through, least)
-    closed &= sliding_window_view(shaft.kept, 3 * block).all(axis=1)[::block][: closed.size]
+    kept = np.asarray(sliding_window_view(shaft.kept, 3 * block).all(axis=1))
+    closed &= kept[::block][: closed.size]
     noise = _Noise.of(shaft, block, size)
     moves = max(_RANGE * least, _MOVES * float(np.std(through)))
     for first in range(0, theta.size - size + 1, size // 2):
