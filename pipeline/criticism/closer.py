@@ -46,13 +46,13 @@ def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
     return tuple(n for n, e in library.items() if e.closer is effect.closer and n != effect.name)
 
 
-def _settled(effect: Effect, told: Told) -> Effect:
-    """The effect with what whole logs tell of it as known numbers, which no fit moves."""
+def settled(effect: Effect, told: Told) -> Effect:
+    """The effect with what whole logs tell of its shape as known numbers, which no fit moves."""
     return replace(effect, parameters=tuple(_known(p, told) for p in effect.parameters))
 
 
 def _known(p: Parameter, told: Told) -> Parameter:
-    if p.name not in told.values:
+    if p.name not in told.values or p.amplitude:
         return p
     return replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1])
 
@@ -71,7 +71,7 @@ def renamed(
     told = told_by_wholes(segments, fitted, effect)
     if told is None or told.name not in (name, *kin(effect, library)):
         return chosen
-    truth = _settled(library[told.name], told)
+    truth = settled(library[told.name], told)
     effects = tuple(truth if e.name == name else e for e in fitted.model.effects)
     model = replace(fitted.model, effects=effects)
     own = f"{name}."

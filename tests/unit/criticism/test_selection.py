@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.effect import Told
 from pipeline.criticism.judge import leave_out, remainder
 from pipeline.criticism.linearise import effect_columns
 from pipeline.criticism.model import Model, zero
@@ -199,6 +200,33 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
     offered = candidates(library, last.fitted)
     rivals = rivals_of(last.added[0], last.fitted, last.around, offered, segments)
     assert set(rivals) == {"windage", "brake"} - set(last.added)
+
+
+@pytest.mark.parametrize("told", ["brake", "windage", None])
+def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
+    """Two forms that are one: the look's word counts, and without it each is the other's rival."""
+
+    def look(wholes, q):
+        assert set(q) == {"drag_nm"}
+        return None if told is None else Told(told, {"drag_nm": (0.029, 0.001)})
+
+    windage = replace(LIBRARY["windage"], closer=look)
+    library = {**LIBRARY, "windage": windage, "brake": replace(windage, name="brake")}
+
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    last = search(segments, fitted(segments), library)[-1]
+    assert len(last.added) == 1
+    name = last.added[0]
+    offered = candidates(library, last.fitted)
+    rivals = rivals_of(name, last.fitted, last.around, offered, segments)
+    if told is None:
+        assert set(rivals) == {"windage", "brake"} - {name}
+        return
+    assert (name, rivals) == (told, ())
+    assert last.fitted.values[f"{told}.drag_nm"] == pytest.approx(0.03, rel=0.05)
 
 
 def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least():

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from numba import njit
 
+from pipeline.criticism.closer import settled
 from pipeline.criticism.coupling import closer, side_of
-from pipeline.criticism.effect import Whole
+from pipeline.criticism.effect import Told, Whole
+from pipeline.criticism.linearise import effect_columns
+from pipeline.criticism.model import Model
 from pipeline.criticism.registry import effects
 from pipeline.criticism.twist import Law, Shaft, law_of_twist
-from tests.unit.criticism.machines import BASE, operating
+from tests.unit.criticism.machines import BASE, machine, operating
 
 TS = 5e-5
 SHARE = 0.35
@@ -186,6 +189,14 @@ def test_the_two_share_one_look():
     library = effects()
     assert library["backlash"].closer is library["compliance"].closer is closer
     assert sum(effect.closer is not None for effect in library.values()) == 2
+
+
+def test_a_fit_leaves_the_shape_that_a_look_told_and_its_uncertainty():
+    known = settled(effects()["backlash"], Told("backlash", {"gap_rad": (0.003, 1e-4)}))
+    gap = next(p for p in known.parameters if p.name == "gap_rad")
+    assert gap.choice and gap.u == 1e-4
+    columns = effect_columns(known, Model(machine(), (known,)))
+    assert [c.name for c in columns] == ["backlash.share", "backlash.twist_rad"]
 
 
 def test_a_gap_is_crossed_slowly_at_first():
