@@ -9,8 +9,9 @@ from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import first_fit, gauss_newton, initial, rough_fit
 from pipeline.criticism.mains import Hum, hum_of, with_hum
 from pipeline.criticism.model import Model
+from pipeline.criticism.scores import candidates, score_all, widened
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.selection import begun, candidates, score_all, widened
+from pipeline.criticism.selection import begun
 from pipeline.criticism.system import Fitted, System
 
 

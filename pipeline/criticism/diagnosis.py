@@ -16,17 +16,10 @@ from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
+from pipeline.criticism.scores import Candidate, Score, candidates
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import segments
-from pipeline.criticism.selection import (
-    TIE,
-    Candidate,
-    Rung,
-    Score,
-    candidates,
-    loss_without,
-    search,
-)
+from pipeline.criticism.selection import TIE, Rung, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import own_columns

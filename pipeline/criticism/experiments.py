@@ -21,8 +21,8 @@ from pipeline.criticism.effect import Array, Effect
 from pipeline.criticism.floors import noise_floor
 from pipeline.criticism.linearise import Column, linearise
 from pipeline.criticism.planned import PLANNED, planned
+from pipeline.criticism.scores import Candidate
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.selection import Candidate
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.diagnosis import Separation
 

@@ -10,8 +10,9 @@ import numpy as np
 from pipeline.criticism.closer import kin, told_by_wholes
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.scores import Candidate
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.selection import TIE, Candidate, loss_without, material
+from pipeline.criticism.selection import TIE, loss_without, material
 from pipeline.criticism.system import Fitted, System, own_columns
 
 _NEAR = 0.5

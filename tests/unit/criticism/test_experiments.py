@@ -15,7 +15,7 @@ from pipeline.criticism.model import Model
 from pipeline.criticism.planned import PLANNED, planned
 from pipeline.criticism.registry import effects
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.selection import candidates, widened
+from pipeline.criticism.scores import candidates, widened
 from pipeline.criticism.system import Fitted, floors
 from tests.unit.criticism.machines import BASE, log, machine
 

@@ -15,14 +15,8 @@ from pipeline.criticism.linearise import effect_columns
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
-from pipeline.criticism.selection import (
-    Candidate,
-    candidates,
-    material,
-    score_all,
-    search,
-    widened,
-)
+from pipeline.criticism.scores import Candidate, candidates, score_all, widened
+from pipeline.criticism.selection import material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
