@@ -16,7 +16,7 @@ from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
-from pipeline.criticism.scores import Candidate, Score, candidates
+from pipeline.criticism.scores import LEAST_SHARE, Candidate, Score, candidates
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import TIE, Rung, loss_without, search
@@ -55,11 +55,10 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     start_fit = fit_of(found, asked)
     found = start_fit.segments
     rungs = search(found, start_fit.fitted, library)
-    last = rungs[-1]
-    offered = candidates(library, last.fitted)
     held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
-    residual = last.around.residual
-    left = remainder(last.around, found, residual)
+    rungs, left = trusted(found, rungs, held)
+    held, last = held[: len(rungs)], rungs[-1]
+    offered = candidates(library, last.fitted)
     sketch = None
     if not _explained(rungs, left):
         sketch = _unknown(found, rungs, left, f"{file_stem(campaign.motor_id)}_unknown")
@@ -121,6 +120,24 @@ def _excess(rung: Rung, channels: set[str]) -> float:
     spreads = around.grams(own).best().spreads
     inside = np.array([channel in channels for _, channel, _ in around.labels])
     return float((around.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())
+
+
+def trusted(
+    found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
+) -> tuple[tuple[Rung, ...], tuple[Remainder, ...]]:
+    """The ladder, and what is left over the floor at its end.
+
+    Where that is structure that nothing here explains, the last rungs go that took less than a
+    tenth of the held-out error: beside an unknown, their names would be guesses.
+    """
+    for count in range(len(rungs), 0, -1):
+        kept, around = tuple(rungs[:count]), rungs[count - 1].around
+        left = remainder(around, found, around.residual)
+        if count == 1 or _explained(kept, left):
+            break
+        if held[count - 1].total < (1.0 - LEAST_SHARE) * held[count - 2].total:
+            break
+    return kept, left
 
 
 def _explained(rungs: Sequence[Rung], left: Sequence[Remainder]) -> bool:

@@ -9,8 +9,9 @@ import pytest
 
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.diagnosis import trusted
 from pipeline.criticism.effect import Told
-from pipeline.criticism.judge import leave_out, remainder
+from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.linearise import effect_columns
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
@@ -162,6 +163,17 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
     (score,) = score_all(around, around.around, [Candidate(effect, (column,))])
     assert score.fall > score.price
     assert score.share == pytest.approx(expected, abs=0.2 * expected)
+
+
+@pytest.mark.parametrize(("after", "kept"), [(9.5, 1), (5.0, 2)])
+def test_beside_an_unknown_a_name_must_take_a_tenth_of_the_error(after, kept):
+    segments = tuple(with_drag(lambda _, theta: 0.3 * np.cos(3.0 * theta), n) for n in (5, 6))
+    (first,) = search(segments, fitted(segments), {})
+    second = replace(first, added=("windage",))
+    totals = [HeldOut(first.around.residual, total) for total in (10.0, after)]
+    rungs, left = trusted(segments, (first, second), totals)
+    assert len(rungs) == kept
+    assert {one.signal for one in left} >= {"torque_shaft_nm"}
 
 
 def test_an_unknown_drag_is_told_by_its_variable_and_curve():
