@@ -13,7 +13,7 @@ from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.grams import Grams
-from pipeline.criticism.judge import held_out_spreads, remainder
+from pipeline.criticism.judge import held_out_spreads
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.scores import (
     LEAST_SHARE,
@@ -49,9 +49,7 @@ class Rung:
 def search(
     segments: Sequence[Segment], fitted: Fitted, library: Mapping[str, Effect]
 ) -> tuple[Rung, ...]:
-    """The ladder: adds the best effect, refits, checks backwards, until nothing passes, or nothing
-    is left over the floor: what then still shows is the form of the effects that were found.
-    """
+    """The ladder: adds the best effect, refits, checks backwards, until nothing passes."""
     rungs: list[Rung] = []
     base = len(fitted.model.effects)
     for _ in range(_MOST):
@@ -60,7 +58,7 @@ def search(
         scores = score_all(wide, fitted, offered)
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
-        if len(rungs) == _MOST or (added and not remainder(wide, segments, wide.residual)):
+        if len(rungs) == _MOST:
             break
         inside = {e.closer for e in fitted.model.effects} - {None}
         passing = [s for s in scores if s.passes and s.candidate.effect.closer not in inside]
