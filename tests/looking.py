@@ -14,6 +14,7 @@ import select
 import shutil
 import subprocess
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -55,7 +56,7 @@ def browser_path() -> str:
     return str(found)
 
 
-class Program:
+class Program(ABC):
     """A program that a test looks through; a context that ends it and leaves nothing over."""
 
     _process: subprocess.Popen[bytes]
@@ -80,8 +81,9 @@ class Program:
     def _ask_to_end(self) -> None:
         self._process.terminate()
 
+    @abstractmethod
     def _tidy(self) -> None:
-        raise NotImplementedError
+        """Removes what the program left."""
 
 
 class Viewer(Program):
