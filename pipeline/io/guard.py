@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.records.errors import CaptureError
+from pipeline.records.errors import CaptureError, UsageError
 
 _MB = 2**20
 _TIMEOUT = b"Timeout"
@@ -32,6 +32,17 @@ class ReadLimits:
 
     seconds: float = 60.0
     memory_mb: int = 1024
+
+    def __post_init__(self) -> None:
+        """Refuses limits that no file could keep.
+
+        Raises:
+            UsageError: A time or a memory that is not above zero, or no number.
+        """
+        if not self.seconds > 0.0:
+            raise UsageError(f"read_seconds={self.seconds} is not above 0", "60 is usual")
+        if self.memory_mb <= 0:
+            raise UsageError(f"read_memory_mb={self.memory_mb} is not above 0", "1024 is usual")
 
     def time_s(self, size_bytes: int) -> float:
         """Longest time for a file of that size [s]."""

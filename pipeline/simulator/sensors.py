@@ -27,6 +27,20 @@ def to_grid(values: Array, step: float) -> Array:
     return rounded
 
 
+def first_order_lag(signal: Array, step: float) -> Array:
+    """What is left [n] of a signal behind a first-order lag that starts settled.
+
+    `step` is the sampling period over the time constant. Exact for a signal that runs straight
+    between its samples: one held between them would come half a period early.
+    """
+    from scipy.signal import lfilter
+
+    kept = math.exp(-step)
+    mean = -math.expm1(-step) / step
+    late: Array = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
+    return late
+
+
 @dataclass(frozen=True, slots=True)
 class Session:
     """One motor on one station with its instruments as they really are, and its randomness."""
@@ -128,12 +142,9 @@ class Session:
 
     def torque(self, torque: Array, t_s: Array) -> Array:
         """Shaft torque [n] by the transducer, with lag, gain, offset."""
-        from pipeline.simulator.motion import lagged
-
         lag = self.fault("torque_lag")
         if lag > 0.0 and torque.size > 1:
-            blend = 1.0 - math.exp(-(t_s[1] - t_s[0]) / lag)
-            torque = lagged(np.ascontiguousarray(torque), blend)
+            torque = first_order_lag(torque, (t_s[1] - t_s[0]) / lag)
         gain = self.instruments.torque * (1.0 + self.fault("torque_scale"))
         sigma = self.bench.torque_noise_rel * self.motor.torque_rated_nm
         seen = gain * torque + self.fault("torque_offset") + self.noise(torque.size, sigma, t_s)

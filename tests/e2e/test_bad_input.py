@@ -198,3 +198,14 @@ def test_a_typo_in_an_option_is_usage(bench: Path, tmp_path: Path) -> None:
     assert main(["run", *words, "crosscheck.kt_vs_ke.alowance=0.1"]) == 2
     assert main(["run", *words, "fit.nothing.x=1"]) == 2
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("word", ["read_seconds=-5", "read_memory_mb=0", "workers=-1"])
+def test_impossible_limits_are_a_mistake_of_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], word: str
+) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "one.csv").write_text(STEP + "t_s,vab_v,ia_a\n" + ROWS)
+    assert main(["run", f"input={tmp_path / 'in'}", f"output={tmp_path / 'out'}", word]) == 2
+    assert word in capsys.readouterr().err.replace(".0", "")
+    assert not list((tmp_path / "out").rglob("*.json"))

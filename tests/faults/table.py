@@ -1,7 +1,7 @@
 """The figures of `docs/fleet.md`, measured: `python -m tests.faults.table [NAME ...]`.
 
-Each name is one row or some rows; without any all are measured, an hour or so. What was measured
-before stays under `reports/faults` until its row is measured again.
+Each name is one row or some rows; without any all are measured, an hour or so. Rows that are not
+measured stay as they stand in the document.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from tests.faults.fuzz import fuzz
 from tests.faults.kills import full_disk, kill_runs
 
 DOCUMENT = ROOT / "docs" / "fleet.md"
-KEPT = ROOT / "reports" / "faults"
 BEGIN, END = "<!-- figures -->", "<!-- end of figures -->"
 HEAD = "| what | asked | measured |\n| --- | --- | --- |\n"
 Row = tuple[str, str, str]
@@ -172,16 +171,15 @@ TRIALS: dict[str, Callable[[Path], list[Row]]] = {
 }
 
 
-def render() -> None:
-    """Writes every row that has been measured into the document, between its marks."""
-    rows: list[Row] = []
-    for name in TRIALS:
-        path = KEPT / f"{name}.json"
-        rows += json.loads(path.read_bytes()) if path.is_file() else []
-    lines = "".join(f"| {what} | {asked} | {said} |\n" for what, asked, said in rows)
+def render(measured: list[Row]) -> None:
+    """Writes rows into the document, between its marks, in place of those of the same name."""
     before, _, rest = DOCUMENT.read_text().partition(BEGIN)
-    after = rest.partition(END)[2]
-    DOCUMENT.write_text(f"{before}{BEGIN}\n\n{HEAD}{lines}\n{END}{after}")
+    table, _, after = rest.partition(END)
+    lines = [line for line in table.splitlines() if line.startswith("|")][2:]
+    said = {line.split("|")[1].strip(): line for line in lines}
+    said |= {what: f"| {what} | {asked} | {words} |" for what, asked, words in measured}
+    rows = "".join(f"{line}\n" for line in said.values())
+    DOCUMENT.write_text(f"{before}{BEGIN}\n\n{HEAD}{rows}\n{END}{after}")
 
 
 def main() -> int:
@@ -189,13 +187,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(TRIALS))
     os.environ["PYTHONPATH"] = str(ROOT)
-    KEPT.mkdir(parents=True, exist_ok=True)
     for name in parser.parse_args().names or TRIALS:
         with tempfile.TemporaryDirectory() as scratch:
-            rows = TRIALS[name](Path(scratch))
-        (KEPT / f"{name}.json").write_text(json.dumps(rows))
-        render()
-    render()
+            render(TRIALS[name](Path(scratch)))
     return 0
 
 
