@@ -26,7 +26,7 @@ from pipeline.criticism.model import (
     zero,
 )
 from pipeline.criticism.operate import operate
-from pipeline.criticism.residuals import RIPPLES, measured, predicted, residual
+from pipeline.criticism.residuals import RIPPLES, TORQUE_RIPPLES, measured, predicted, residual
 from pipeline.criticism.segment import Segment, projected, row_index
 
 _CHUNK = 32
@@ -134,6 +134,7 @@ _VOLTAGE_BASE = (
     "ripple_edge",
     "ripple_shift",
     "ripple_torque",
+    "ripple_held",
 )
 _NEEDS: dict[str, tuple[str, ...]] = {
     "dq": (*_VOLTAGE_BASE, "psi_wb", "j_kgm2", "b_nm_s_rad"),
@@ -149,7 +150,7 @@ _NEEDS: dict[str, tuple[str, ...]] = {
 }
 
 
-_BETWEEN = ("j_kgm2", *RIPPLES)
+_BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
 
@@ -165,7 +166,7 @@ class _Sampler:
         self.start = predicted(segment, self.x, pieces, model, values)
         self.here = measured(segment, segment.recorded, model, values) - self.start
         # a hook's own column does without the small terms between samples
-        self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES, 0.0)}
+        self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES + TORQUE_RIPPLES, 0.0)}
 
     def change(self, column: Column) -> Array | None:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""

@@ -12,6 +12,7 @@ Woodson & Melcher, Electromechanical Dynamics (1968), ch. 3 (torque from co-ener
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -52,12 +53,13 @@ BASE: tuple[Constant, ...] = (
     Constant("j_kgm2", "kg·m²", "inertia that the shaft torque does not see", hook="motion"),
     Constant("b_nm_s_rad", "N·m·s/rad", "viscous friction", hook="torque"),
     Constant("ripple_slope", "1", "T_s, mean current before the sample", 0.3, hook="hold"),
-    Constant("ripple_mean", "1", "R (ω_e T_s)² ψ/L, ripple of the current", 0.08, hook="hold"),
+    Constant("ripple_mean", "1", "(ω_e T_s)² ψ/L, ripple of the current", 0.08, hook="hold"),
     Constant(
         "ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", 0.08, hook="hold"
     ),
     Constant("ripple_shift", "1", "T_s dω_e/dt ψ, angle against voltage", 0.15, hook="hold"),
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", 0.3, hook="hold"),
+    Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", 0.08, hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
     Constant("gain_current", "1", "gain of the current sensors", 0.01, hook="gain"),
     Constant("gain_voltage", "1", "gain of the bench's voltmeters", 0.01, hook="gain"),
@@ -168,22 +170,37 @@ def mean_current(x: Operating, values: Values) -> Operating:
     """Where the drops of a sample period act: at its mean current, not at the sampled one.
 
     A voltage that is held in the stationary frame while the rotor turns makes the flux follow
-    chords instead of arcs; the current ripples by ψ(ω_e T_s)²/L, and its mean lies a part of the
-    period off. Both parts are nuisances of the fit.
+    chords instead of arcs; the current ripples, and its mean lies a part of the period off. Both
+    parts are nuisances of the fit.
     """
     if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
         return x
-    turn, current = x.machine.pole_pairs * x.omega_rad_s * x.ts_s, x.i_a
-    slope = np.zeros(turn.shape, dtype=complex)
+    current = x.i_a
+    slope = np.zeros(current.shape, dtype=complex)
     slope[1:-1] = 0.5 * (current[2:] - current[:-2])
-    ripple = values["ripple_mean"] * turn**2 * (values["psi_wb"] / values["ld_h"] + current)
-    mean = current - values["ripple_slope"] * slope - ripple
+    _, below = ripple(x, values["ripple_mean"], values)
+    mean = current - values["ripple_slope"] * slope - below
+    turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
     return replace(
         x,
         id_a=mean.real,
         iq_a=mean.imag,
         eps_rad=x.eps_rad - values["ripple_slope"] * turn,
     )
+
+
+def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]:
+    """Flux linkage [n, Wb] and current [n, A] that a period's means are below the samples.
+
+    A voltage v that is held while the rotor turns by ω_e T_s in a period makes the flux ripple by
+    v T_s ω_e T_s; `part` of that is the mean's distance from the sample: 1/12 where the voltage
+    changes, −1/24 half a period from there.
+    """
+    turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
+    flux = part * turn * (turn * base_flux(x, values) - 1j * x.ts_s * values["r_ohm"] * x.i_a)
+    # what no capture tells stands at zero
+    l_d, l_q = values["ld_h"] or math.inf, values["lq_h"] or math.inf
+    return flux, flux.real / l_d + 1j * flux.imag / l_q
 
 
 def evaluate(model: Model, x: Operating, values: Values) -> Pieces:

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Values
-from pipeline.criticism.model import Model, Pieces, air_gap_torque, evaluate, values_of
+from pipeline.criticism.model import Model, Pieces, air_gap_torque, evaluate, ripple, values_of
 from pipeline.criticism.operate import angle_error, current_slope, operate
 from pipeline.criticism.segment import Segment
 
-RIPPLES = ("ripple_edge", "ripple_shift", "ripple_torque")
+RIPPLES = ("ripple_edge", "ripple_shift")
+TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 
 
 def residual(
@@ -137,8 +138,8 @@ def _shaft_torque(
     Of a coasting shaft the acceleration that its drags leave unexplained [rad/s²].
     """
     shaft = air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
-    if segment.kind == "dq" and values["ripple_torque"]:
-        shaft = shaft + _late_torque(x, pieces, segment.ts_s, values)
+    if segment.kind == "dq" and any(values[name] for name in TORQUE_RIPPLES):
+        shaft = shaft + _between(segment, x, pieces, values)
     finer = x.theta_rad.size // segment.size
     if finer > 1:
         shaft = _averaged(shaft, finer)
@@ -223,7 +224,7 @@ def _rotor_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Value
         psi, drop = _ahead(psi), _ahead(drop)
     omega, turn, shrink = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
     voltage: Complex = drop + slope + 1j * omega * psi
-    if segment.kind == "dq" and any(values[name] for name in RIPPLES[:2]):
+    if segment.kind == "dq" and any(values[name] for name in RIPPLES):
         shrink = shrink - values["ripple_edge"] * turn**2
         lag = values["ripple_shift"] * 1j * psi * np.gradient(turn) / period
         voltage = shrink * voltage - lag
@@ -246,10 +247,16 @@ def _pace(
     return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn, shrink
 
 
-def _late_torque(x: Operating, pieces: Pieces, period: float, values: Values) -> Array:
-    """Torque [N·m] of what the current moves in a part of a sample period [n]."""
-    moved = values["ripple_torque"] * period * _central(x.i_a, period)
-    torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(pieces.psi_wb) * moved).imag
+def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Array:
+    """Torque [n, N·m] of what current and flux do between samples.
+
+    The current moves on for a part of a period; and while a held voltage turns, both are off their
+    means. A free shaft is turned by the means; what a transducer tells of a held one is its own.
+    """
+    flux, current = ripple(x, values["ripple_held" if x.held else "ripple_mean"], values)
+    current = values["ripple_torque"] * segment.ts_s * _central(x.i_a, segment.ts_s) - current
+    moved = np.conj(pieces.psi_wb) * current - np.conj(flux) * x.i_a
+    torque: Array = 1.5 * x.machine.pole_pairs * moved.imag
     return torque
 
 

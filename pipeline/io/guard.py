@@ -38,6 +38,7 @@ class ReadLimits:
 
         Raises:
             UsageError: A time or a memory that is not above zero, or no number.
+
         """
         if not self.seconds > 0.0:
             raise UsageError(f"read_seconds={self.seconds} is not above 0", "60 is usual")

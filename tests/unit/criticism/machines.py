@@ -21,6 +21,7 @@ BASE = {
     "ripple_edge": 0.0,
     "ripple_shift": 0.0,
     "ripple_torque": 0.0,
+    "ripple_held": 0.0,
     "bench_angle_rad": 0.0,
     **dict.fromkeys(GAINS, 0.0),
 }

@@ -63,6 +63,60 @@ def test_a_column_is_the_change_of_the_whole_residual(name):
         assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)
 
 
+def one_period(turn: float) -> tuple[np.ndarray, float]:
+    """Currents [n] through one period in which the inverter holds its voltage while the machine
+    turns by `turn` at steady speed, and that speed: integrated, and begun so that it closes.
+    """
+    b, ts, steps = BASE, 5e-5, 4000
+    omega_e, h = turn / ts, ts / steps
+    held = 0.31 * (-6 + 10j) + 1j * omega_e * (9.4e-3 + 2.1e-4 * -6 + 1j * 2.9e-4 * 10)
+
+    def through(current: complex, volt: complex, psi_pm: float) -> np.ndarray:
+        psi, found = b["ld_h"] * current.real + 1j * b["lq_h"] * current.imag, []
+        for k in range(steps):
+            now = psi.real / b["ld_h"] + 1j * psi.imag / b["lq_h"]
+            found.append(now)
+            v = volt * np.exp(-1j * omega_e * ((k + 0.5) * h - 0.5 * ts))
+            slope = v - b["r_ohm"] * now - 1j * omega_e * (psi + psi_pm)
+            # the midpoint's current
+            mid = psi + 0.5 * h * slope
+            now = mid.real / b["ld_h"] + 1j * mid.imag / b["lq_h"]
+            psi = psi + h * (v - b["r_ohm"] * now - 1j * omega_e * (mid + psi_pm))
+        return np.array([*found, psi.real / b["ld_h"] + 1j * psi.imag / b["lq_h"]])
+
+    def parts(z: complex) -> np.ndarray:
+        return np.array([z.real, z.imag])
+
+    forced = parts(through(0j, held, b["psi_wb"])[-1])
+    free = np.column_stack([parts(through(z, 0j, 0.0)[-1]) for z in (1 + 0j, 1j)])
+    start = np.linalg.solve(np.eye(2) - free, forced)
+    return through(complex(*start), held, b["psi_wb"]), omega_e / 7.0
+
+
+@pytest.mark.parametrize(("place", "part"), [(0, 1 / 12), (2000, -1 / 24)])
+def test_a_free_shaft_is_turned_by_the_mean_of_a_period(place, part):
+    """Currents sampled where the voltage changes, or half a period from there."""
+    current, omega = one_period(0.2)
+    psi = BASE["psi_wb"] + BASE["ld_h"] * current.real + 1j * BASE["lq_h"] * current.imag
+    mean = np.mean(10.5 * (np.conj(psi) * current).imag[:-1])
+    signals = {name: np.zeros(400) for name in log().recorded}
+    signals |= {
+        "id_a": np.full(400, current[place].real),
+        "iq_a": np.full(400, current[place].imag),
+        "theta_mech_rad": omega * np.arange(400) * 5e-5,
+        "torque_shaft_nm": np.full(400, mean - BASE["b_nm_s_rad"] * omega),
+    }
+    segment = replace(log(), recorded=signals)
+    told = [
+        residual(segment, PLAIN, {**BASE, "ripple_mean": share})[2, 100:300].mean()
+        for share in (0.0, part)
+    ]
+    assert abs(told[0]) > 4e-4 * mean
+    assert abs(told[1]) < 0.02 * abs(told[0])
+    held = replace(segment, test="torque_map")
+    assert residual(held, PLAIN, {**BASE, "ripple_mean": part})[2, 200] == pytest.approx(told[0])
+
+
 def test_the_noise_floor_is_the_scatter_over_seeds():
     """chi²/n of a sound machine is 1 in every signal, over 6 logs of fresh noise."""
     total: dict[str, list[float]] = {}
