@@ -101,8 +101,16 @@ def widened(
     offered: Sequence[Candidate],
     before: System | None = None,
 ) -> System:
-    """The system around a fit with the candidates' columns behind its own, in order."""
+    """The system around a fit with the candidates' columns behind its own, in order.
+
+    The candidates' may stay as they were in `before`. Its own are made anew: what the station's
+    priors alone hold apart, such as a gain and the effect of that name, columns that are made in
+    two places would seem to tell apart.
+    """
     columns = [c for candidate in offered for c in candidate.columns]
+    if before is not None:
+        own = {column.key for column in own_columns(fitted.model)}
+        before = before.along([n for n, c in enumerate(before.columns) if c.key not in own])
     return system(segments, fitted, columns, before)
 
 

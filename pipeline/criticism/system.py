@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -150,6 +150,13 @@ class System:
             self.pull[along],
             float(elsewhere.sum()),
         )
+
+    def along(self, places: Sequence[int]) -> System:
+        """The same system with some of its columns."""
+        columns = tuple(self.columns[n] for n in places)
+        penalty, pull = self.penalty[places], self.pull[places]
+        matrix = self.matrix[:, places]
+        return replace(self, columns=columns, matrix=matrix, penalty=penalty, pull=pull)
 
     def after(self, places: NDArray[np.int64], step: Array) -> Array:
         """The residual [R] after a step along some columns, to first order."""
