@@ -16,7 +16,7 @@ from pipeline.criticism.selection import TIE, loss_without, material
 from pipeline.criticism.system import Fitted, System, own_columns
 
 _NEAR = 0.5
-_MOST = 3
+_MOST = 6
 
 
 def rivals_of(
