@@ -22,7 +22,7 @@ _MODEL_BENCH = 2e-5
 _OFFSET = 0.5
 _ZERO = 2e-3
 _ROUGH = 0.05
-_FORM = 0.02
+FORM = 0.02
 _LINE = 0.03
 _JUMP = 8.0
 _WHEN = 0.25
@@ -64,12 +64,16 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
 
 
 def form_tolerance(
-    segment: Segment, model: Model, values: Values, added: Sequence[Effect]
+    segment: Segment,
+    model: Model,
+    values: Values,
+    added: Sequence[Effect],
+    share: float = FORM,
 ) -> Array:
     """What the forms of the effects that were added may be wrong by [groups], as weak samples.
 
-    No formula of an effect is better than a fiftieth of what the effect does. Error below that,
-    where a found effect acts, tells of its form and names no further effect.
+    No formula of an effect is better than a fiftieth of what the effect does, or another `share`.
+    Error below that, where a found effect acts, tells of its form and names no further effect.
     """
     group, _, valid, groups = row_index(segment)
     total = np.zeros(len(groups))
@@ -79,7 +83,7 @@ def form_tolerance(
         power = projected(segment, without - here)[valid] ** 2
         count = np.bincount(group[valid], minlength=len(groups))
         total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
-    floor: Array = _FORM * np.sqrt(total)
+    floor: Array = share * np.sqrt(total)
     return floor
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine
+from pipeline.criticism.floors import form_tolerance
 from pipeline.criticism.grams import Grams
 from pipeline.criticism.judge import held_out_spreads
 from pipeline.criticism.optional import trimmed
@@ -34,6 +35,7 @@ _REFITS = 3
 _ROUNDS = 2
 _HELD = 0.5
 _CLOSE = 0.7
+_KIN = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ def search(
             break
         inside = {e.closer for e in fitted.model.effects} - {None}
         passing = [s for s in scores if s.passes and s.candidate.effect.closer not in inside]
-        chosen = _chosen(segments, fitted, passing, wide)
+        chosen = _chosen(segments, fitted, passing, wide, fitted.model.effects[base:])
         if chosen is None:
             break
         newest = chosen[0].model.effects[-1].name
@@ -76,14 +78,18 @@ def search(
 
 
 def _chosen(
-    segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score], wide: System
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    passing: Sequence[Score],
+    wide: System,
+    found: Sequence[Effect],
 ) -> tuple[Fitted, System] | None:
     """The first few candidates refitted, the next few where none of these keeps its promise.
 
     The fit that stays is finished with columns of its own.
     """
     for first in range(0, min(len(passing), _ROUNDS * _REFITS), _REFITS):
-        best = _refit_best(segments, fitted, passing[first : first + _REFITS], wide)
+        best = _refit_best(segments, fitted, passing[first : first + _REFITS], wide, found)
         if best is not None:
             named = [effect.name for effect in best[0].model.effects]
             return trimmed(segments, *gauss_newton(segments, best[0]), named)
@@ -91,12 +97,17 @@ def _chosen(
 
 
 def _refit_best(
-    segments: Sequence[Segment], fitted: Fitted, passing: Sequence[Score], wide: System
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    passing: Sequence[Score],
+    wide: System,
+    found: Sequence[Effect],
 ) -> tuple[Fitted, System] | None:
     """Refits with the best candidates, those close to the best fall, and takes the best.
 
     A candidate must keep the promise of its score: the misfit falls by more than its price, and
-    with captures predicted from all the others by half of it at least.
+    with captures predicted from all the others by half of it at least, even where effects `found`
+    of its own kind have forms that are a little wrong.
     """
     own = len(own_columns(fitted.model))
     before = held_out_spreads(wide, own, segments)
@@ -111,18 +122,50 @@ def _refit_best(
         cost = tried[1].misfit + score.price + unsought
         if not material(tried[0], effect) or cost >= min(least, wide.misfit):
             continue
-        if _holds(wide, before, tried[1], segments, _HELD * score.price):
+        doubt = _doubt(segments, fitted, wide, effect, found)
+        if _holds(wide, before, tried[1], segments, _HELD * score.price, doubt):
             best, least = tried, cost
     return best
 
 
+def _doubt(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    wide: System,
+    effect: Effect,
+    found: Sequence[Effect],
+) -> Array:
+    """What is left of χ²/n [G], as a factor, where the found effects of an effect's own kind (flux,
+    drop, drag) have forms that are wrong by a twentieth.
+
+    Saturation that takes up what the formula of cross-saturation leaves is not there.
+    """
+    kind = [one for one in found if one.hook == effect.hook != "sensor"]
+    if not kind:
+        return np.ones(len(wide.labels))
+    model, values = fitted.model, fitted.values
+    wrong = np.concatenate([form_tolerance(s, model, values, kind, _KIN) for s in segments])
+    noise = np.bincount(wide.group, wide.whiten**-2, len(wide.labels)) / np.maximum(
+        wide.counts, 1.0
+    )
+    left: Array = noise / np.maximum(noise + wrong**2, 1e-300)
+    return left
+
+
 def _holds(
-    wide: System, before: Array, tried: System, segments: Sequence[Segment], least: float
+    wide: System,
+    before: Array,
+    tried: System,
+    segments: Sequence[Segment],
+    least: float,
+    doubt: Array,
 ) -> bool:
     """Whether the misfit of captures predicted from all the others falls by `least`, and with it a
-    share of some signal's power; `before` are their χ²/n without the candidate.
+    share of some signal's power; `before` are their χ²/n without the candidate, of which `doubt`
+    [G] counts.
     """
-    after = held_out_spreads(tried, len(tried.columns), segments)
+    after = doubt * held_out_spreads(tried, len(tried.columns), segments)
+    before = doubt * before
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
     fall = wide.misfit_of(before) + cost - tried.misfit_of(after) - left
     priors = cost > WORTH and left < (1.0 - LEAST_SHARE) * cost
