@@ -126,6 +126,21 @@ def test_a_chunk_that_unpacks_to_gigabytes_is_refused_in_little_memory(
     assert peak < 80 * 2**20
 
 
+def test_a_chunk_over_the_limit_is_refused_even_if_it_tells_the_truth() -> None:
+    """64 MiB and a byte, and not so small when packed that its ratio gives it away."""
+    noise = np.random.default_rng(3).bytes(2**17)
+    plain = noise + bytes(2**26 + 1 - len(noise))
+    assert refusal(chunked(zstandard.compress(plain), len(plain), 0)).code == "limit"
+
+
+def test_a_chunk_is_held_against_its_own_checksum() -> None:
+    """A file without a checksum of its whole data section, as many writers make them."""
+    plain = b"\x80" + struct.pack("<Q", 5) + b"12345"
+    packed, crc = zstandard.compress(plain), zlib.crc32(plain)
+    assert "checksum" in str(refusal(chunked(packed, len(plain), crc ^ 1)))
+    assert read(chunked(packed, len(plain), crc)) == []
+
+
 def test_an_lz4_bomb_is_refused() -> None:
     packed = lz4.frame.compress(bytes(2**26))
     assert refusal(chunked(packed, 1000, 0, b"lz4")).code == "corrupt"
