@@ -17,7 +17,7 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.scores import Candidate, candidates, score_all, widened
-from pipeline.criticism.selection import material, search
+from pipeline.criticism.selection import _doubt, material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
@@ -71,6 +71,44 @@ def test_two_effects_are_found_whatever_their_order():
     assert np.hypot(values["unbalance.sin_nm"], values["unbalance.cos_nm"]) == pytest.approx(
         0.02, rel=0.03
     )
+
+
+def test_a_fits_own_columns_are_made_where_it_stands():
+    """Those of candidates may stay from the rung before, 3 % of ψ away."""
+    segments = (log(noise=1.0),)
+    here = fitted(segments)
+    away = replace(here, values={**here.values, "psi_wb": 1.03 * here.values["psi_wb"]})
+    offered = candidates(LIBRARY, here)
+    before = widened(segments, away, offered)
+    around, fresh = widened(segments, here, offered, before), widened(segments, here, offered)
+    own = len(own_columns(here.model))
+    assert np.array_equal(around.matrix[:, :own], fresh.matrix[:, :own])
+    assert not np.allclose(around.matrix[:, :own], before.matrix[:, :own], rtol=1e-3, atol=0.0)
+    kept, made = (s.matrix[:, own:] / s.whiten[:, None] for s in (around, before))
+    assert kept == pytest.approx(made, rel=1e-9, abs=1e-12 * np.abs(made).max())
+
+
+def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error():
+    """A twentieth of what windage does, window by window, joins the floor for a drag only."""
+
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    last = search(segments, fitted(segments), LIBRARY)[-1]
+    (windage,) = last.fitted.model.effects
+    doubt = _doubt(segments, last.fitted, last.around, effects()["iron_eddy"], (windage,))
+    omega = np.gradient(log().recorded["theta_mech_rad"], 5e-5)
+    place = last.around.labels.index((0, "torque_shaft_nm", 0))
+    mine = last.around.group == place
+    plain = segments[0].weak.project(drag(omega, 0.0)[None])[0, :, 0]
+    wrong = 0.05 * np.sqrt(np.mean(plain[last.around.window[mine]] ** 2))
+    noise = np.mean(last.around.whiten[mine] ** -2.0)
+    assert doubt[place] == pytest.approx(noise / (noise + wrong**2), rel=0.1)
+    assert doubt[place] < 0.9
+    assert doubt[last.around.labels.index((0, "vd_v", 0))] == 1.0
+    delay = effects()["sample_delay"]
+    assert (_doubt(segments, last.fitted, last.around, delay, (windage,)) == 1.0).all()
 
 
 def test_a_drag_of_the_wrong_sign_is_no_friction():

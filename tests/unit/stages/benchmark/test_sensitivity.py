@@ -84,6 +84,15 @@ def test_shipped_sensitivities_are_of_this_programme(motor: str) -> None:
         assert at_star == pytest.approx(needed_noncentrality(), rel=1e-3)
 
 
+@pytest.mark.parametrize("motor", MOTORS)
+def test_three_gains_are_one_tie_whatever_their_size(motor: str) -> None:
+    """Drive logs alone have no second reading of a voltage, a current or a torque."""
+    gains = ("voltage_scale", "current_scale", "torque_scale")
+    for one in gains:
+        others = set(gains) - {one}
+        assert set(shipped(motor).rivals(one, 0.02, ("drive_0", "drive_1"))) == others
+
+
 def test_what_no_supplied_test_excites_leaves_no_trace() -> None:
     found = shipped("gimbal-5208")
     still = ("resistance_ab", "current_step_q_2", "lcr", "heat_run_0")
