@@ -62,9 +62,9 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         names,
         parameters,
         (*_errors(found, around, held), *run_errors(simulated)),
-        held.total if math.isfinite(held.total) else 0.0,
+        held.total,
         tuple(_where(maps)),
-        told_hum(begun.hum),
+        (*told_hum(begun.hum), *held.notes),
         maps,
         moved,
         bare,
@@ -111,7 +111,7 @@ def _bare(
         Move(name, one.unit, one.value, one.u, after[name].value, after[name].u)
         for name, one in before.items()
     )
-    return (held.total if math.isfinite(held.total) else None), moved
+    return held.total, moved
 
 
 def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[SignalError]:

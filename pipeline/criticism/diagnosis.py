@@ -75,7 +75,11 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
         sketch if verdict == "unknown" else None,
         left,
-        (*told_hum(start_fit.hum), *(_wanted(library[name]) for name in unseen)),
+        (
+            *told_hum(start_fit.hum),
+            *held[0].notes,
+            *(_wanted(library[name]) for name in unseen),
+        ),
     )
 
 
@@ -239,7 +243,7 @@ def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tupl
 
 def _drop(held: Sequence[HeldOut], place: int) -> float:
     """Share of the removable held-out error, from first to last rung, that one step took."""
-    totals = [math.log(max(h.total, 1e-300)) for h in held if math.isfinite(h.total)]
+    totals = [math.log(max(h.total, 1e-300)) for h in held]
     if place + 1 >= len(totals) or totals[0] <= totals[-1]:
         return 0.0
     return (totals[place] - totals[place + 1]) / (totals[0] - totals[-1])

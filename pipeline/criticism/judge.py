@@ -25,13 +25,21 @@ _MATERIAL_BENCH = 1e-2
 @dataclass(frozen=True, slots=True)
 class HeldOut:
     """Residual [R] of every row as predicted without its own capture; NaN where that capture
-    alone carries a constant and so is always in the fit. `total` is 1 at the noise floor. `steps`
-    [own columns] are how far the parameters move without a capture, by its number.
+    alone carries a constant and so is always in the fit. `total` is 1 at the noise floor, that of
+    the fit itself where no row could be predicted. `steps` [own columns] are how far the parameters
+    move without a capture, by its number.
     """
 
     residual: Array
     total: float
     steps: Mapping[int, Array] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What whoever reads `total` must know."""
+        if np.isfinite(self.residual).any():
+            return ()
+        return ("no capture can be predicted from the others: errors are those of the fit",)
 
 
 def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> HeldOut:
@@ -62,9 +70,10 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
         left[mine] = around.residual[mine] + matrix[mine] @ step
         steps[number] = np.zeros(own)
         steps[number][places] = step
-    told = (left / around.soft)[np.isfinite(left)]
-    total = math.sqrt(float((told**2).mean())) if told.size else math.nan
-    return HeldOut(left, total, steps)
+    predicted = np.isfinite(left)
+    told = np.where(predicted, left, around.residual) / around.soft
+    told = told[predicted] if predicted.any() else told
+    return HeldOut(left, math.sqrt(float((told**2).mean())), steps)
 
 
 def uncertainties(around: System, held: HeldOut, own: int) -> Array:

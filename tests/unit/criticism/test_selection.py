@@ -150,6 +150,18 @@ def test_a_capture_left_out_is_predicted_from_the_others():
     assert held.total == pytest.approx(1.0, abs=0.6)
 
 
+def test_one_capture_alone_has_the_error_of_its_fit_and_says_so():
+    start = fitted((log(noise=1.0),))
+    around = system((log(noise=1.0),), start)
+    held = leave_out(around, len(own_columns(start.model)))
+    assert not np.isfinite(held.residual).any()
+    rms = np.sqrt(np.mean((around.residual / around.soft) ** 2))
+    assert held.total == pytest.approx(rms, rel=1e-12)
+    assert "of the fit" in held.notes[0]
+    two = tuple(log(noise=1.0, seed=n) for n in (5, 6))
+    assert leave_out(system(two, fitted(two)), len(own_columns(start.model))).notes == ()
+
+
 def test_zero_of_an_effect_takes_the_trial_shape():
     model = Model(machine(), ())
     values = zero(effects()["stribeck"], model)
