@@ -138,7 +138,7 @@ def _doubt(
     """What is left of χ²/n [G], as a factor, where the found effects of an effect's own kind (flux,
     drop, drag) have forms that are wrong by a twentieth.
 
-    Saturation that takes up what the formula of cross-saturation leaves is not there.
+    Windage that takes up what the formula of Stribeck friction leaves is not there.
     """
     kind = [one for one in found if one.hook == effect.hook != "sensor"]
     if not kind:
