@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+_NEIGHBOURS = 2
 _SAMPLED = (
     "id_a",
     "iq_a",
@@ -134,6 +135,23 @@ class Operating:
         """Cosine and sine of `order` times the electrical angle [n], computed once an angle."""
         waves: tuple[Any, Any] = self.once(self.eps_rad, order, lambda: _waves(order, self.eps_rad))
         return waves
+
+    def shaft_waves(self, order: int) -> tuple[Array, Array]:
+        """Cosine and sine of `order` times the shaft angle [n], as a sample's torque has them.
+
+        A free shaft's torque is told by the second difference of its angle, which is a mean under a
+        triangle of two samples: sinc² of the half turn of the wave in one.
+        """
+        name = ("shaft", order, self.held)
+        waves: tuple[Array, Array] = self.once(self.theta_rad, name, lambda: self._turned(order))
+        return waves
+
+    def _turned(self, order: int) -> tuple[Array, Array]:
+        angle = order * self.theta_rad
+        if self.held or not self.inverter or angle.size < _NEIGHBOURS:
+            return np.cos(angle), np.sin(angle)
+        seen = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** 2
+        return seen * np.cos(angle), seen * np.sin(angle)
 
     def one_sample(self) -> Operating:
         """The first sample alone [1]."""

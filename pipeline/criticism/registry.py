@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import pkgutil
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -45,6 +46,8 @@ def _load(path: Path) -> Effect:
     if spec is None or spec.loader is None:
         raise UsageError(f"{path.name} cannot be loaded", "is it a Python file?")
     module = importlib.util.module_from_spec(spec)
+    # by its name it is known in another process too
+    sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):

@@ -14,6 +14,9 @@ from pipeline.records.constants import Constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
 _TABLES = ("flux_map", "holding_current")
+# orders a turn that a slow turn is searched for, and harmonics of the cogging order
+_HIGHEST = 400
+_HARMONICS = 3
 
 
 def machine_of(campaign: Campaign, start: Constants) -> Machine:
@@ -46,7 +49,8 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
         "flux_wb": psi,
     }
     bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
-    orders = torque_orders(campaign.of("cogging")) or holding_orders(
+    highest = _HARMONICS * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
+    orders = torque_orders(campaign.of("cogging"), max(highest, _HIGHEST)) or holding_orders(
         campaign.of("holding_current"), bases
     )
     return Machine(
@@ -140,8 +144,9 @@ def _period(capture: Capture) -> float:
     return float(np.median(np.diff(capture.arrays("t_s")["t_s"])))
 
 
-def torque_orders(captures: Iterable[Capture], highest: int = 400) -> tuple[int, ...]:
-    """Orders a turn that stand out of every slow turn's torque spectrum.
+def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple[int, ...]:
+    """Orders a turn that stand out of every slow turn's torque spectrum, up to `highest`, or to 400
+    where samples are too few for that.
 
     The torque is averaged in even bins of angle over whole turns; an order counts where its
     amplitude is 6 times the spectrum's median (of a Rayleigh floor 1e-7 of orders pass that), in
@@ -152,7 +157,10 @@ def torque_orders(captures: Iterable[Capture], highest: int = 400) -> tuple[int,
         if not capture.has("theta_mech_rad", "torque_shaft_nm"):
             continue
         signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        here = _standing_out(signals["theta_mech_rad"], signals["torque_shaft_nm"], highest)
+        both = signals["theta_mech_rad"], signals["torque_shaft_nm"]
+        here = _standing_out(*both, highest)
+        if here is None and highest > _HIGHEST:
+            here = _standing_out(*both, _HIGHEST)
         if here is not None:
             found = here if found is None else found & here
     return tuple(sorted(found or ()))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.each import on_each
 from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.floors import form_tolerance, noise_floor
 from pipeline.criticism.grams import Grams, misfit_of, pseudo_inverse
@@ -19,7 +18,6 @@ from pipeline.criticism.segment import Segment
 from pipeline.criticism.size import base_scales
 
 _SEED = 20260302
-_THREADS = 2
 # how far a constant may move before columns are computed anew
 _STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
 # the equation of a coasting shaft is drags over J
@@ -174,24 +172,15 @@ class System:
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:
     """Noise floor of every segment."""
     seeds = range(_SEED, _SEED + len(segments))
-    return _each(lambda s, seed: noise_floor(s, model, values, seed), segments, seeds)
+    return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
 
 
 def tolerances(
     segments: Sequence[Segment], fitted: Fitted, added: Sequence[Effect]
 ) -> tuple[Array, ...]:
     """What the forms of the effects found may be wrong by, of every segment."""
-    model, values = fitted.model, fitted.values
-    nothing = range(len(segments))
-    return _each(lambda s, _: form_tolerance(s, model, values, added), segments, nothing)
-
-
-def _each(
-    work: Callable[[Segment, Any], Any], segments: Sequence[Segment], along: Iterable[Any]
-) -> tuple[Any, ...]:
-    """`work` on every segment, on two threads (numpy leaves the interpreter), in order."""
-    with ThreadPoolExecutor(max_workers=_THREADS) as pool:
-        return tuple(pool.map(work, segments, along))
+    what = fitted.model, fitted.values, tuple(added)
+    return on_each(form_tolerance, segments, [what] * len(segments))
 
 
 def system(
@@ -211,8 +200,8 @@ def system(
     known = _kept(before, fitted, chord)
     new = [column for column in columns if column.key not in known]
     none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
-    floor = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
-    rows = _each(lambda s, both: linearise(s, model, values, new, *both), segments, floor)
+    floor = zip(fitted.sigma, fitted.tolerance or none, strict=True)
+    rows = on_each(linearise, segments, [(model, values, new, *both) for both in floor])
     whiten = np.concatenate([r.whiten for r in rows])
     fresh = {column.key: n for n, column in enumerate(new)}
     made = np.concatenate([r.columns for r in rows])

@@ -15,6 +15,7 @@ from pipeline.records.constants import Constants
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.settings import CompareSettings
 from pipeline.stages.campaigns import campaigns, start_constants
+from pipeline.stages.mate import mate
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +36,17 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     """
     watch, output = Stopwatch(), Path(settings.output)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
-    with watch.stage("read"), ThreadPoolExecutor(1) as aside:
-        asked = settings.input, settings.source, settings.motor, limits
-        read = aside.submit(campaigns, *asked)
-        import_module(needs)
-        found, findings = read.result()
-    spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
-    told = [judge(one, spec, start_constants(one), output, watch) for one in found]
+    with mate(settings.effects_path) as second:
+        with watch.stage("read"), ThreadPoolExecutor(1) as aside:
+            asked = settings.input, settings.source, settings.motor, limits
+            read = aside.submit(campaigns, *asked)
+            import_module(needs)
+            found, findings = read.result()
+        spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
+        told = []
+        for one in found:
+            with second.campaign():
+                told.append(judge(one, spec, start_constants(one), output, watch))
     refused = any(finding.severity == "refused" for finding in findings)
     undecided = not told or any(one.undecided for one in told)
     return Outcome(

@@ -15,8 +15,8 @@ def _torque(x: Operating, q: Values) -> Array:
         if value == 0.0:
             continue
         wave, order = name.split("_")[:2]
-        angle = int(order) * x.theta_rad
-        drag += value * (np.sin(angle) if wave == "sin" else np.cos(angle))
+        cosine, sine = x.shaft_waves(int(order))
+        drag += value * (sine if wave == "sin" else cosine)
     return drag
 
 

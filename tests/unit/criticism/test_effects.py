@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -161,15 +162,27 @@ def test_torque_comes_from_the_co_energy_of_the_linear_machine():
         ),
     ],
 )
-def test_a_drag_is_its_formula(name, values, closed):
-    x = ready(operating())
+def test_a_drag_of_a_held_shaft_is_its_formula(name, values, closed):
+    x = ready(replace(operating(), held=True))
     assert LIBRARY[name].torque(x, values) == pytest.approx(closed(x), abs=1e-14)
+
+
+@pytest.mark.parametrize("step_rad", [0.2, 1.5, 2.6])
+def test_a_free_shaft_s_second_difference_tells_the_mean_of_its_cogging(step_rad):
+    """θ'' = sin kθ at a steady pace, integrated twice: its second difference over T² is the drag
+    that the model has at the sample.
+    """
+    order, n = 528, 60
+    theta = step_rad / order * np.arange(n)
+    bend = -np.sin(order * theta) / step_rad**2  # ∬ sin over (samples)²
+    told = np.diff(bend, 2)
+    x = replace(operating(n), theta_rad=theta, held=False)
+    drag = LIBRARY["cogging"].torque(x, {f"sin_{order}_nm": 0.3})
+    assert drag[1:-1] == pytest.approx(0.3 * told, abs=1e-12)
 
 
 def test_cogging_orders_are_multiples_of_poles_or_slots():
     """Order 13 stands out of this slow turn as well, but no magnet on a slot can make it."""
-    from dataclasses import replace
-
     assert cogging.orders(replace(machine(), torque_orders=(12, 13, 14, 84))) == (12, 14, 84)
 
 
