@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
-from pipeline.criticism.grams import Descent, Grams
+from pipeline.criticism.grams import Descent, Grams, misfit_of
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.model import zero
 from pipeline.criticism.segment import Segment
@@ -45,7 +45,8 @@ class Score:
 
     `fall` is the fall of misfit, `price` what its parameters and the search cost, `step` its own
     parameters, `moves` how the model's own move with it, `share` the part of the removable excess
-    of the channel it helps most, `size` the largest of its amplitudes over its negligible size.
+    of the channel it helps most, `size` the largest of its amplitudes over its negligible size,
+    `quiet` the part of the fall in signals that have nothing over their floor to take a share of.
     """
 
     candidate: Candidate
@@ -55,11 +56,18 @@ class Score:
     moves: Mapping[str, float]
     share: float
     size: float
+    quiet: float = 0.0
 
     @property
     def passes(self) -> bool:
-        """Whether it is worth its price, large enough to matter and helps enough."""
-        return self.fall > self.price and self.size >= 1.0 and self.share >= LEAST_SHARE
+        """Whether it is worth its price, large enough to matter and helps enough.
+
+        Below the floor an effect of a closer look is not told from noise of the angle's sensor that
+        runs through a drive's speed loop, and so is in torque and angle alike.
+        """
+        below = self.quiet > self.price and self.candidate.effect.closer is None
+        helps = self.share >= LEAST_SHARE or below
+        return self.fall > self.price and self.size >= 1.0 and helps
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +196,8 @@ def _score(
     share = _share(around, candidate.effect, before, after)
     names = (around.columns[n].name for n in own)
     moves = dict(zip(names, end.step[: own.size].tolist(), strict=True))
-    return Score(candidate, fall, 0.0, mine, moves, share, max(sizes, default=math.inf))
+    quiet = quiet_fall(around, before.spreads, after.spreads)
+    return Score(candidate, fall, 0.0, mine, moves, share, max(sizes, default=math.inf), quiet)
 
 
 def _outside(value: float, parameter: Parameter) -> bool:
@@ -216,6 +225,19 @@ def _share(around: System, effect: Effect, before: Standing, after: Standing) ->
     error = min(max(shares), power_share(around, before.spreads, after.spreads))
     cost = before.prior_cost
     return max(error, 1.0 - after.prior_cost / cost if cost > WORTH else 0.0)
+
+
+def quiet_fall(around: System, before: Array, after: Array) -> float:
+    """Fall of misfit between two sets of χ²/n [G], in signals without an excess that counts."""
+    fall = 0.0
+    channel = np.array([name for _, name, _ in around.labels])
+    for name in dict.fromkeys(channel.tolist()):
+        mine = channel == name
+        counts = around.counts[mine]
+        excess = float(counts @ np.log(np.maximum(before[mine], 1.0)))
+        if excess <= min(WORTH, _CLEAR * float(counts.sum())):
+            fall += misfit_of(counts, before[mine]) - misfit_of(counts, after[mine])
+    return fall
 
 
 def power_share(around: System, before: Array, after: Array) -> float:

@@ -23,6 +23,7 @@ from pipeline.criticism.scores import (
     Score,
     candidates,
     power_share,
+    quiet_fall,
     score_all,
     widened,
 )
@@ -161,15 +162,16 @@ def _holds(
     doubt: Array,
 ) -> bool:
     """Whether the misfit of captures predicted from all the others falls by `least`, and with it a
-    share of some signal's power; `before` are their χ²/n without the candidate, of which `doubt`
-    [G] counts.
+    share of some signal's power, or by as much in signals that are below their floor; `before` are
+    their χ²/n without the candidate, of which `doubt` [G] counts.
     """
     after = doubt * held_out_spreads(tried, len(tried.columns), segments)
     before = doubt * before
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
     fall = wide.misfit_of(before) + cost - tried.misfit_of(after) - left
     priors = cost > WORTH and left < (1.0 - LEAST_SHARE) * cost
-    return fall > least and (priors or power_share(wide, before, after) >= LEAST_SHARE)
+    helps = priors or power_share(wide, before, after) >= LEAST_SHARE
+    return fall > least and (helps or quiet_fall(wide, before, after) > least)
 
 
 def begun(fitted: Fitted, score: Score) -> Fitted:
