@@ -261,6 +261,8 @@ def _other(score: Score) -> RankedEffect:
         f"{effect.words}; {effect.signature}",
         effect.experiment,
         {},
+        size=score.size if math.isfinite(score.size) else None,
+        shortfall=score.shortfall,
     )
 
 

@@ -65,9 +65,26 @@ class Score:
         Below the floor an effect of a closer look is not told from noise of the angle's sensor that
         runs through a drive's speed loop, and so is in torque and angle alike.
         """
-        below = self.quiet > self.price and self.candidate.effect.closer is None
+        below = self._below_floor and self.candidate.effect.closer is None
         helps = self.share >= LEAST_SHARE or below
         return self.fall > self.price and self.size >= 1.0 and helps
+
+    @property
+    def _below_floor(self) -> bool:
+        return self.quiet > self.price
+
+    @property
+    def shortfall(self) -> str:
+        """What it lacks to be named; of one that passes, that a refit did not bear it out."""
+        if self.fall <= self.price:
+            return "not worth its parameters"
+        if self.size < 1.0:
+            return f"seen, at {self.size:.2g} of the least size that matters"
+        if self.passes:
+            return "did not hold on captures held out"
+        if self._below_floor:
+            return "what it would explain lies below the noise floor"
+        return "takes too small a share of what is over the noise floor"
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,8 @@ class RankedEffect:
     """One effect's evidence. `score`: fall of −2 log likelihood less the price of its parameters.
 
     `held_out_drop`: share of the removable held-out error that goes with it. `parameters`: value
-    and standard uncertainty by name, where it was fitted.
+    and standard uncertainty by name, where it was fitted. Of an effect that is not called for,
+    `size` is its largest amplitude over the least that matters, `shortfall` why it is not named.
     """
 
     effect: str
@@ -43,6 +44,13 @@ class RankedEffect:
     experiment: str
     parameters: Mapping[str, tuple[float, float, str]]
     separation: tuple[Separation, ...] = ()
+    size: float | None = None
+    shortfall: str = ""
+
+    @property
+    def slight(self) -> bool:
+        """Whether the captures show it, too small to matter."""
+        return self.score > 0.0 and self.size is not None and self.size < 1.0
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -59,6 +67,8 @@ class RankedEffect:
                 for name, (value, u, unit) in self.parameters.items()
             },
             "separation": [one.document() for one in self.separation],
+            "size": self.size,
+            "shortfall": self.shortfall,
         }
 
 

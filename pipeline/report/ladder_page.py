@@ -183,6 +183,7 @@ def _ranked(one: RankedEffect) -> dict[str, str]:
         "confused_with": ", ".join(one.confused_with),
         "explanation": one.explanation,
         "experiment": one.experiment,
+        "shortfall": one.shortfall,
     }
 
 

@@ -65,6 +65,8 @@ def _lines(result: Diagnosis) -> list[str]:
             for one in ranked.separation
             if one.power is not None
         )
+    if result.verdict in ("adequate", "missing"):
+        told.extend(f"  {one.effect} is {one.shortfall}" for one in result.ranking if one.slight)
     if result.unknown is not None:
         told.append(f"  left over in {result.unknown.signal}: {result.unknown.shape}")
     if result.unknown is not None and result.unknown.sketch:

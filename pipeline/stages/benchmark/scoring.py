@@ -32,7 +32,8 @@ class Judged:
     `exact`: all that is hidden named and nothing else. `found`, `hidden`: how many of the hidden
     effects were named. `flagged`: structure left over was reported. `sketch`: the unknown was
     put down to the right variable. `floor`: held-out error of the last rung is at most 1.05 of
-    its floor.
+    its floor. `slight`: of what is told as seen but too small to matter, whether the clearest is
+    hidden there, or a rival that these captures cannot exclude; None where nothing is told.
     """
 
     case: Case
@@ -43,6 +44,7 @@ class Judged:
     flagged: bool
     sketch: bool | None
     floor: bool | None
+    slight: bool | None = None
 
     @property
     def points(self) -> int:
@@ -74,6 +76,7 @@ def judged(case: Case, document: Mapping[str, Any]) -> Judged:
         flagged=document["verdict"] == "unknown" or bool(document.get("remainder")),
         sketch=_sketch(case, document),
         floor=_floor(document),
+        slight=_slight(case, document),
     )
 
 
@@ -116,6 +119,17 @@ def _sketch(case: Case, document: Mapping[str, Any]) -> bool | None:
         return None
     told = document.get("unknown") or {}
     return bool(set(told.get("variables", ())) & set(OUTSIDE_VARIABLES[case.outside]))
+
+
+def _slight(case: Case, document: Mapping[str, Any]) -> bool | None:
+    told = [
+        ranked["effect"]
+        for ranked in document["ranking"]
+        if (ranked.get("size") or 1.0) < 1.0 and ranked["score"] > 0.0
+    ]
+    if document["verdict"] != "adequate" or not told:
+        return None
+    return any(told[0] in (true, *case.accepted.get(true, ())) for true in case.truth)
 
 
 def _floor(document: Mapping[str, Any]) -> bool | None:

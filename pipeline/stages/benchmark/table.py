@@ -134,10 +134,20 @@ def _sizes(rows: list[Judged]) -> list[Line]:
         made.append(_line(f"{line}: right", here, _right, least=right))
         made.append(_line(f"{line}: wrong with confidence", here, _wrong, most=wrong))
         made.append(_line(f"{line}: unknown", here, lambda row: row.mark == "unknown"))
+        made.append(_line(f"{line}: right, or told as too small to matter", here, _seen))
+        made.append(_line(f"{line}: another told as too small to matter", here, _misread))
         if line.endswith("a*"):
             big = [row for row in here if row.case.of_typical >= MATTERS]
             made.append(_line(f"{line} and over 1 % of typical: right", big, _right))
     return made
+
+
+def _seen(row: Judged) -> bool:
+    return row.right or bool(row.slight)
+
+
+def _misread(row: Judged) -> bool:
+    return row.slight is False
 
 
 def _nulls(rows: list[Judged]) -> list[Line]:
@@ -148,6 +158,8 @@ def _nulls(rows: list[Judged]) -> list[Line]:
     for line in dict.fromkeys(r.case.line for r in rows if r.case.family == "null"):
         here = _of(rows, "null", line)
         made.append(_line(f"nothing hidden, {line}: not called adequate", here, _not_right))
+    quiet = [row for row in _of(rows, "null") if row.right]
+    made.append(_line("nothing hidden: an effect told as too small to matter", quiet, _misread))
     return made
 
 

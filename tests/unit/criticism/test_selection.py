@@ -16,7 +16,7 @@ from pipeline.criticism.linearise import effect_columns
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
-from pipeline.criticism.scores import Candidate, candidates, score_all, widened
+from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
 from pipeline.criticism.selection import _doubt, material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
@@ -34,6 +34,13 @@ def fitted(segments):
     return gauss_newton(segments, start)[0]
 
 
+def cautious(segments, times):
+    """A fit whose noise floors are some times what the sensors' noise makes."""
+    model = Model(machine(), ())
+    sigma = tuple(times * one for one in floors(segments, model, BASE))
+    return gauss_newton(segments, Fitted(model, dict(BASE), sigma))[0]
+
+
 def with_drag(drag, seed=5):
     """The log with a further drag of speed and angle [N·m] at its shaft."""
     segment = log(noise=1.0, seed=seed)
@@ -48,6 +55,39 @@ def test_a_sound_machine_is_left_alone():
     rungs = search(segments, fitted(segments), LIBRARY)
     assert [rung.added for rung in rungs] == [()]
     assert rungs[0].fitted.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+
+
+def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none():
+    def drag(omega, _):
+        return 0.02 * omega * np.abs(omega) / 250.0**2
+
+    hidden, none = ((with_drag(one), with_drag(one, 6)) for one in (drag, lambda *_: 0.0))
+    rungs = search(hidden, cautious(hidden, 3.0), LIBRARY)
+    assert rungs[0].around.spreads(rungs[0].around.residual).max() < 1.0
+    assert rungs[-1].added == ("windage",)
+    assert search(none, cautious(none, 3.0), LIBRARY)[-1].added == ()
+
+
+@pytest.mark.parametrize(
+    ("what", "told"),
+    [
+        ({"fall": 10.0}, "not worth its parameters"),
+        ({"size": 0.25, "share": 0.5}, "seen, at 0.25 of the least size that matters"),
+        ({"share": 0.05}, "takes too small a share of what is over the noise floor"),
+        ({"share": 0.5}, "did not hold on captures held out"),
+        ({"quiet": 40.0}, "did not hold on captures held out"),
+        (
+            {"quiet": 40.0, "effect": "compliance"},
+            "what it would explain lies below the noise floor",
+        ),
+    ],
+)
+def test_what_an_effect_lacks_is_said(what, told):
+    effect = effects()[what.pop("effect", "windage")]
+    known = {"fall": 60.0, "share": 0.0, "size": 2.0, "quiet": 0.0, **what}
+    score = Score(Candidate(effect, ()), price=15.0, step={}, moves={}, **known)
+    assert score.shortfall == told
+    assert score.passes == (told == "did not hold on captures held out")
 
 
 def test_windage_is_found_with_its_size():

@@ -50,6 +50,15 @@ def document(
     }
 
 
+def slight(*told: tuple[str, float, float | None]) -> dict[str, Any]:
+    """An `adequate` with effects (name, score, size over the least that matters) in its ranking."""
+    ranking = [
+        {"effect": name, "score": score, "size": size, "confused_with": [], "parameters": {}}
+        for name, score, size in told
+    ]
+    return {**document("adequate"), "ranking": ranking}
+
+
 PLAIN = case(truth=("windage",), accepted={"windage": ()})
 TIED = case("tie", truth=("windage",), accepted={"windage": ("iron_eddy",)})
 PAIR = case("set", truth=("windage", "cogging"), accepted={"windage": (), "cogging": ()})
@@ -246,3 +255,27 @@ def test_size_of_an_effect_of_another_form() -> None:
     said = {"windage": {"drag_nm": {"value": 1.02 * 1e-7 * speed**2, "u": 1e-9}}}
     (found,) = compared(hidden, document("missing", "windage", parameters=said))
     assert (found.error, found.covered) == (pytest.approx(0.02), None)
+
+
+@pytest.mark.parametrize(
+    ("of", "told", "expected"),
+    [
+        (PLAIN, [("windage", 40.0, 0.2), ("cogging", 3.0, 0.1)], True),
+        (PLAIN, [("cogging", 40.0, 0.2), ("windage", 3.0, 0.1)], False),
+        (TIED, [("iron_eddy", 40.0, 0.2)], True),
+        (PLAIN, [("windage", -3.0, 0.2)], None),
+        (PLAIN, [("compliance", 40.0, 12.0), ("windage", 20.0, 0.3)], True),
+        (NULL, [("windage", 40.0, 0.2)], False),
+        (NULL, [("windage", 40.0, None)], None),
+    ],
+)
+def test_what_is_seen_and_too_small_is_marked_by_the_clearest(of, told, expected):
+    assert judged(of, slight(*told)).slight is expected
+
+
+def test_a_slight_effect_is_missed_and_has_its_own_line():
+    pairs = [(PLAIN, slight(("windage", 40.0, 0.2))), (PLAIN, slight(("cogging", 40.0, 0.2)))]
+    shares = {line.what: (line.count, line.total) for line in lines(pairs)}
+    assert shares["2 a*: right"] == (0, 2)
+    assert shares["2 a*: right, or told as too small to matter"] == (1, 2)
+    assert shares["2 a*: another told as too small to matter"] == (1, 2)
