@@ -53,7 +53,8 @@ BASE: tuple[Constant, ...] = (
     Constant("j_kgm2", "kg·m²", "inertia that the shaft torque does not see", hook="motion"),
     Constant("b_nm_s_rad", "N·m·s/rad", "viscous friction", hook="torque"),
     Constant("ripple_slope", "1", "T_s, mean current before the sample", 0.3, hook="hold"),
-    Constant("ripple_mean", "1", "(ω_e T_s)² ψ/L, ripple of the current", 0.08, hook="hold"),
+    # between -1/24 and 1/12, as the log samples between two changes of the voltage or at them
+    Constant("ripple_mean", "1", "(ω_e T_s)² ψ/L, ripple of the current", 0.04, 0.02, hook="hold"),
     Constant(
         "ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", 0.08, hook="hold"
     ),

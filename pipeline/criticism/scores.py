@@ -28,6 +28,8 @@ _CLEAR = 0.5
 _GLANCE = ((1.0,), 3)
 THOROUGH = ((1.0, 0.0), 20)
 _PROMISING = 0.3
+# prices that evidence below the floor must be worth: noise that is not white is down there as well
+_BELOW = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ class Score:
 
     @property
     def _below_floor(self) -> bool:
-        return self.quiet > self.price
+        return self.quiet > _BELOW * self.price
 
     @property
     def shortfall(self) -> str:
