@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import gammaincc
 
 from pipeline.criticism.asked import fit_of
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
@@ -22,8 +23,9 @@ from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import TIE, Rung, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import own_columns
+from pipeline.criticism.system import Fitted, own_columns
 from pipeline.criticism.unknown import unknown_structure
+from pipeline.criticism.wander import SIZE, wandering
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -36,6 +38,7 @@ from pipeline.records.diagnosis import (
 )
 from pipeline.records.naming import file_stem
 
+_WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
 _SEEN = 3.0
 _EXPLAINED = 0.5
 _AS_GOOD = 0.1
@@ -54,10 +57,13 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         return _insufficient(campaign, model, library)
     start_fit = fit_of(found, asked)
     found = start_fit.segments
-    rungs = search(found, start_fit.fitted, library)
-    held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
-    rungs, left = trusted(found, rungs, held)
-    held, last = held[: len(rungs)], rungs[-1]
+    rungs, held, left = _climbed(found, start_fit.fitted, library)
+    steady = _explained(rungs, left)
+    told = None if steady else wandering(found, rungs[-1].fitted)
+    if told is not None:
+        found = told
+        rungs, held, left = _climbed(found, gauss_newton(found, start_fit.fitted)[0], library)
+    last = rungs[-1]
     offered = candidates(library, last.fitted)
     sketch = None
     if not _explained(rungs, left):
@@ -77,10 +83,21 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         left,
         (
             *told_hum(start_fit.hum),
+            *(() if told is None else (_WANDER,)),
             *held[0].notes,
             *(_wanted(library[name]) for name in unseen),
         ),
     )
+
+
+def _climbed(
+    found: Sequence[Segment], start: Fitted, library: dict[str, Effect]
+) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...]]:
+    """The ladder as far as it is trusted, its held-out errors, and what is left at its end."""
+    rungs = search(found, start, library)
+    held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
+    rungs, left = trusted(found, rungs, held)
+    return rungs, held[: len(rungs)], left
 
 
 def _enough(found: Sequence[Segment]) -> bool:

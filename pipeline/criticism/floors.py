@@ -177,13 +177,14 @@ def channel_scale(segment: Segment, channel: str, model: Model, values: Values) 
 
 def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
     """Whitened weak samples of an offset of each channel's sensor, of its prior size, and of the
-    mains lines that it may have.
+    mains lines and the wander that it may have.
     """
+    made = [] if segment.lines is None else [line[valid] * whiten for line in segment.lines]
     if segment.offsets is not None:
-        return [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
+        own = [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
+        return own + made
     if segment.weak is None:
         return []
-    made = [] if segment.lines is None else [line[valid] * whiten for line in segment.lines]
     for place, channel in enumerate(segment.channels):
         names = ("vab_v",) if segment.kind == "open" else (channel,)
         prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)

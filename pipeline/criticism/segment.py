@@ -33,9 +33,9 @@ class Segment:
     numbers the parts of a capture that are held out one by one where there is no other capture to
     predict it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the
     capture may have; `runs_rad` the angles turned between reversals, of which the column `run`
-    numbers the one at hand; `lines` [K, C, W, M] are weak samples of the mains lines that there
-    may be; `whole` are the columns of a drive log before it was thinned, with `good`, the samples
-    that were recorded well.
+    numbers the one at hand; `lines` [K, C, W, M] are weak samples of the mains lines, and of the
+    wander of sensors, that there may be; `whole` are the columns of a drive log before it was
+    thinned, with `good`, the samples that were recorded well.
     """
 
     capture: str

@@ -1,0 +1,79 @@
+"""Slow wander of the instruments in time: taken as noise where it explains all that is left.
+
+A random walk of a voltage, current or torque is a sum of sines of independent size, of which the
+slowest few hold nearly all. What repeats with the machine's state, at every step of a torque map or
+at every turn, is no such sum.
+
+Reference: Papoulis & Pillai, Probability, Random Variables and Stochastic Processes, 4th ed.
+(2002), section 11.2, the Karhunen-Loève expansion of a Wiener process.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.each import on_each
+from pipeline.criticism.effect import Array, Values
+from pipeline.criticism.judge import remainder
+from pipeline.criticism.model import Model
+from pipeline.criticism.residuals import residual
+from pipeline.criticism.segment import Segment
+from pipeline.criticism.system import Fitted
+
+SIZE = 4.0
+"""Standard deviation at a capture's end, in standard deviations of the sensor's noise."""
+
+_TERMS = 8
+_WANDERS = ("v", "i", "torque")
+
+
+def wandering(segments: Sequence[Segment], fitted: Fitted) -> tuple[Segment, ...] | None:
+    """The segments, knowing the wander that their instruments may have; None where that, and the
+    fit made anew with it, leaves anything over the floor.
+    """
+    told = with_wander(segments, fitted.model, fitted.values)
+    _, around = gauss_newton(told, fitted)
+    return None if remainder(around, told, around.residual) else told
+
+
+def with_wander(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Segment, ...]:
+    """The segments, each knowing what a wander of its sensors does to its residuals."""
+    return on_each(wanders, segments, [(model, values)] * len(segments))
+
+
+def wanders(segment: Segment, model: Model, values: Values) -> Segment:
+    """A segment with the slowest sines of a random walk of each of its sensors."""
+    if segment.weak is None:
+        return segment
+    here = residual(segment, model, values)
+    made = [] if segment.lines is None else [segment.lines]
+    for name, sigma in segment.noise.items():
+        if sigma > 0.0 and name.startswith(_WANDERS):
+            made.append(
+                np.stack(
+                    [
+                        segment.weak.project(
+                            residual(segment, model, values, _moved(segment, name, walk)) - here
+                        )
+                        for walk in SIZE * sigma * slowest(segment.size)
+                    ]
+                )
+            )
+    return replace(segment, lines=np.concatenate(made)) if made else segment
+
+
+def slowest(size: int) -> Array:
+    """The slowest sines [8, n] of a random walk that ends at a standard deviation of one."""
+    time = (np.arange(size) + 0.5) / size
+    rates = (np.arange(_TERMS)[:, None] + 0.5) * math.pi
+    sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates
+    return sines
+
+
+def _moved(segment: Segment, name: str, walk: Array) -> dict[str, Array]:
+    return {**segment.recorded, name: segment.recorded[name] + walk}
