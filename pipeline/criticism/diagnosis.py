@@ -59,7 +59,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     found = start_fit.segments
     rungs, held, left = _climbed(found, start_fit.fitted, library)
     steady = _explained(rungs, left)
-    told = None if steady else wandering(found, rungs[-1].fitted)
+    told = None if steady else wandering(found, rungs[-1].fitted, left)
     if told is not None:
         found = told
         rungs, held, left = _climbed(found, gauss_newton(found, start_fit.fitted)[0], library)

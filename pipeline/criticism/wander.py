@@ -24,18 +24,26 @@ from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted
+from pipeline.records.diagnosis import Remainder
 
 SIZE = 4.0
 """Standard deviation at a capture's end, in standard deviations of the sensor's noise."""
 
 _TERMS = 8
+_TESTS = 2
 _WANDERS = ("v", "i", "torque")
 
 
-def wandering(segments: Sequence[Segment], fitted: Fitted) -> tuple[Segment, ...] | None:
+def wandering(
+    segments: Sequence[Segment], fitted: Fitted, left: Sequence[Remainder]
+) -> tuple[Segment, ...] | None:
     """The segments, knowing the wander that their instruments may have; None where that, and the
-    fit made anew with it, leaves anything over the floor.
+    fit made anew with it, leaves anything over the floor, or where what is `left` is in captures of
+    one test: instruments wander whatever is done, and a machine that warms up changes slowly too.
     """
+    captures = {one.capture for one in left}
+    if len({segment.test for segment in segments if segment.capture in captures}) < _TESTS:
+        return None
     told = with_wander(segments, fitted.model, fitted.values)
     _, around = gauss_newton(told, fitted)
     return None if remainder(around, told, around.residual) else told

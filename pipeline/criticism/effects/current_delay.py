@@ -10,8 +10,10 @@ from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Valu
 def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
         return r.i_a
-    slope = np.gradient(r.i_a, r.ts_s) + 1j * r.omega_e_rad_s * r.i_a
-    return r.i_a + q["delay_s"] * slope
+    # the rotor has turned on since; a turn to first order alone would lengthen the current
+    turned = np.exp(1j * r.omega_e_rad_s * q["delay_s"])
+    now: Complex = turned * (r.i_a + q["delay_s"] * np.gradient(r.i_a, r.ts_s))
+    return now
 
 
 EFFECT = Effect(
