@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.criticism.effect import Recorded
 from pipeline.criticism.effects import cogging
 from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of, zero
 from pipeline.criticism.registry import chosen, effects
@@ -179,6 +180,21 @@ def test_a_free_shaft_s_second_difference_tells_the_mean_of_its_cogging(step_rad
     x = replace(operating(n), theta_rad=theta, held=False)
     drag = LIBRARY["cogging"].torque(x, {f"sin_{order}_nm": 0.3})
     assert drag[1:-1] == pytest.approx(0.3 * told, abs=1e-12)
+
+
+def test_a_late_current_is_turned_back_and_not_lengthened():
+    """A phase current that is logged τ late stands ω τ behind in the rotor frame, as long as ever;
+    of a ramp besides, what it rose since.
+    """
+    n, ts, tau = 50, 1e-4, 3e-5
+    omega = np.full(n, 2500.0)
+    true = (3.0 + 40.0 * np.arange(n) * ts) * np.exp(0.4j)
+    late = (3.0 + 40.0 * (np.arange(n) * ts - tau)) * np.exp(0.4j) * np.exp(-1j * omega * tau)
+    zero = np.zeros(n)
+    seen = Recorded(late, zero, zero, omega, ts, True, "drive")
+    assert LIBRARY["current_delay"].current(seen, {"delay_s": tau}) == pytest.approx(
+        true, rel=1e-12
+    )
 
 
 def test_cogging_orders_are_multiples_of_poles_or_slots():
