@@ -39,6 +39,10 @@ from pipeline.records.diagnosis import (
 from pipeline.records.naming import file_stem
 
 _WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
+_STATELESS = (
+    "no state of the machine predicts what is left in captures it was not fitted to: see the "
+    "remainder, and whether anything was changed between the captures"
+)
 _SEEN = 3.0
 _EXPLAINED = 0.5
 _AS_GOOD = 0.1
@@ -57,17 +61,18 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         return _insufficient(campaign, model, library)
     start_fit = fit_of(found, asked)
     found = start_fit.segments
+    stem = f"{file_stem(campaign.motor_id)}_unknown"
     rungs, held, left = _climbed(found, start_fit.fitted, library)
-    steady = _explained(rungs, left)
-    told = None if steady else wandering(found, rungs[-1].fitted, left)
-    if told is not None:
-        found = told
+    sketch = _unknown(found, rungs, left, stem)
+    calm = None
+    if sketch is None and not _explained(rungs, left):
+        calm = wandering(found, rungs[-1].fitted, left)
+    if calm is not None:
+        found = calm
         rungs, held, left = _climbed(found, gauss_newton(found, start_fit.fitted)[0], library)
+        sketch = _unknown(found, rungs, left, stem)
     last = rungs[-1]
     offered = candidates(library, last.fitted)
-    sketch = None
-    if not _explained(rungs, left):
-        sketch = _unknown(found, rungs, left, f"{file_stem(campaign.motor_id)}_unknown")
     missing = last.added
     ranking = _ranking(rungs, held, offered, library, found)
     unseen = _unseen(campaign, library, last, offered)
@@ -83,7 +88,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         left,
         (
             *told_hum(start_fit.hum),
-            *(() if told is None else (_WANDER,)),
+            *(() if calm is None else (_WANDER,)),
+            *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
             *(_wanted(library[name]) for name in unseen),
         ),
@@ -130,6 +136,11 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
 def _unknown(
     found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder], name: str
 ) -> UnknownStructure | None:
+    """What the structure depends on that no effect explains; None where there is none, or where
+    nothing that the machine does predicts it.
+    """
+    if _explained(rungs, left):
+        return None
     last = rungs[-1]
     signals = list(dict.fromkeys(r.signal for r in left))
     return unknown_structure(found, last.fitted, signals, last.around, name)[0]

@@ -13,6 +13,7 @@ from pipeline.criticism.descent import clipped
 from pipeline.criticism.effect import Array
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.ports import Port, ports, refined
+from pipeline.criticism.scores import LEAST_SHARE
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.sketch import Pursuit, expression
 from pipeline.criticism.system import Fitted, System, own_columns, system
@@ -54,7 +55,9 @@ def unknown_structure(
 
     Ports are held against each other by the misfit they remove from whole captures that they
     were not fitted to; of those that do as well the one of fewest variables is told, and the
-    others are named beside it. Also returns the misfit (−2 log likelihood) it removes.
+    others are named beside it. None is where the best takes less than a tenth of what is over the
+    floor: instruments that wander follow no state of the machine. Also returns the misfit
+    (−2 log likelihood) it removes.
     `before`: a system around the same fit, whose columns are used again. `name`: of the effect.
     """
     found, wide = _ranked(segments, fitted, _hooks(signals), before)
@@ -109,6 +112,7 @@ def _ranked(
     left, base = wide.after(own, none.step), none.misfit
     carried = _carried(wide, own, left)
     reference = _held_out(wide, own, left, np.zeros(own.size), carried)
+    excess = float(wide.counts @ np.log(np.maximum(wide.spreads(left), 1.0)))
     price = math.log(wide.size)
     found = []
     first = own.size
@@ -126,7 +130,7 @@ def _ranked(
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
         held = reference - _held_out(wide, chosen, after, ridge, carried)
-        if held > _TIE:
+        if held > max(_TIE, LEAST_SHARE * excess):
             found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 

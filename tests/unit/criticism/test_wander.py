@@ -1,0 +1,86 @@
+"""Instruments that wander, told from effects by what a slow random walk can make."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.judge import remainder
+from pipeline.criticism.model import Model
+from pipeline.criticism.system import Fitted, floors
+from pipeline.criticism.unknown import unknown_structure
+from pipeline.criticism.wander import SIZE, slowest, wandering
+from tests.unit.criticism.machines import BASE, log, machine
+
+
+def walked(seed: int, test: str, size: float = 3.0):
+    """A log whose voltages, currents and torque walk by `size` times their noise to its end."""
+    segment = log(noise=1.0, seed=seed)
+    rng = np.random.default_rng([seed, 7])
+    n = segment.size
+    moved = {
+        name: column + size * segment.noise[name] * rng.standard_normal(n).cumsum() / np.sqrt(n)
+        for name, column in segment.recorded.items()
+        if name.startswith(("v", "i", "torque"))
+    }
+    return replace(
+        segment, test=test, capture=f"{test}.mcap", recorded={**segment.recorded, **moved}
+    )
+
+
+def around(segments):
+    model = Model(machine(), ())
+    start = Fitted(model, dict(BASE), floors(segments, model, BASE))
+    fitted, system = gauss_newton(segments, start)
+    return fitted, remainder(system, segments, system.residual)
+
+
+def test_the_slowest_sines_have_the_variance_of_a_random_walk():
+    sines = slowest(2000)
+    time = (np.arange(2000) + 0.5) / 2000
+    assert (sines**2).sum(axis=0) == pytest.approx(time, abs=0.03)
+    gram = sines @ sines.T / 2000
+    assert gram - np.diag(np.diag(gram)) == pytest.approx(np.zeros((8, 8)), abs=1e-6)
+
+
+def test_wander_in_captures_of_two_tests_leaves_nothing():
+    segments = (walked(5, "torque_map"), walked(6, "drive"))
+    fitted, left = around(segments)
+    assert len({one.capture for one in left}) == 2
+    told = wandering(segments, fitted, left)
+    assert told is not None
+    assert told[0].lines.shape[0] == 5 * 8
+
+
+def test_in_captures_of_one_test_it_may_be_the_machine():
+    segments = (walked(5, "drive"), replace(walked(6, "drive"), capture="drive_1.mcap"))
+    fitted, left = around(segments)
+    assert left
+    assert wandering(segments, fitted, left) is None
+
+
+def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
+    """What tells the two apart, since a drag in logs as short as these is slow as well."""
+
+    def dragged(segment):
+        omega = np.gradient(log().recorded["theta_mech_rad"], segment.ts_s)
+        torque = segment.recorded["torque_shaft_nm"] - 0.2 * np.sin(omega / 60.0)
+        return replace(segment, recorded={**segment.recorded, "torque_shaft_nm": torque})
+
+    pairs = ((5, "torque_map"), (6, "drive"), (8, "heat_run"))
+    walks = tuple(walked(seed, test) for seed, test in pairs)
+    drags = tuple(dragged(walked(seed, test, 0.0)) for seed, test in pairs)
+    for segments, told in ((walks, False), (drags, True)):
+        fitted, left = around(segments)
+        assert left
+        sketch, _ = unknown_structure(segments, fitted, sorted({one.signal for one in left}))
+        assert (sketch is not None) is told
+
+
+def test_a_walk_far_beyond_the_noise_stays_a_remainder():
+    segments = (walked(5, "torque_map", 60 * SIZE), walked(6, "drive", 60 * SIZE))
+    fitted, left = around(segments)
+    assert wandering(segments, fitted, left) is None
