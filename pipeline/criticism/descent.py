@@ -23,6 +23,7 @@ from pipeline.criticism.system import Fitted, System, floors, system
 
 _ITERATIONS = 12
 _REACH = 1.0
+_LEAST = 0.1
 _SHORT = 8
 _SILENT = 1e4
 _CONVERGED = 1.0
@@ -114,10 +115,12 @@ def _damped(fitted: Fitted, around: System) -> Best:
 
 def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:
     """Inverse variance [P] of one step, not of where it ends: what the captures hardly know does
-    not leap out of the range in which the equations are near their tangent [1].
+    not leap out of the range in which the equations are near their tangent [1]. Viscous friction
+    may be next to nothing, and must not stay there for that.
     """
     machine = fitted.model.machine
     reach = {name: _REACH * abs(fitted.values[name]) for name in PHYSICAL}
+    reach["b_nm_s_rad"] = max(reach["b_nm_s_rad"], _LEAST * base_scales(machine)["b_nm_s_rad"])
     for name, (_, p) in fitted.model.parameters().items():
         if p.amplitude:
             reach[name] = 3.0 * max(abs(fitted.values[name]), p.typical * machine.scale(p))

@@ -337,3 +337,15 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
     assert not judged("compliance", share=0.3, twist_rad=1e-4, between=0.0)
     assert not judged("compliance", share=0.01, twist_rad=0.005, between=0.0)
     assert judged("torque_lag", lag_s=1e-3, late=-0.4)
+
+
+@pytest.mark.parametrize("start", [1e-13, -1e-13])
+def test_viscous_friction_comes_back_from_next_to_nothing(start):
+    """A rough fit may leave it there; steps of its own size then held it, and the equation of the
+    coasting shaft was given up.
+    """
+    segments = (log(noise=1.0), log(noise=1.0, seed=6))
+    model = Model(machine(), ())
+    near = Fitted(model, {**BASE, "b_nm_s_rad": start}, floors(segments, model, BASE))
+    found = gauss_newton(segments, near)[0]
+    assert found.values["b_nm_s_rad"] == pytest.approx(BASE["b_nm_s_rad"], rel=0.05)
