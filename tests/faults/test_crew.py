@@ -8,7 +8,10 @@ import signal
 import time
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,7 @@ import pytest
 from pipeline.io.guard import ReadLimits, reading
 from pipeline.records.errors import CaptureError, MachineError
 from pipeline.stages.fleet.crew import Crew
-from pipeline.stages.fleet.pools import local_pool
+from pipeline.stages.fleet.pools import Pool, local_pool
 
 pytestmark = pytest.mark.workers
 LIMITS = ReadLimits(seconds=1.0, memory_mb=200)
@@ -146,3 +149,19 @@ def drive(folder: str, pipe: object) -> None:
 
 def own_number(_: object) -> int:
     return os.getpid()
+
+
+@contextmanager
+def stillborn(workers: int) -> Iterator[Pool]:
+    """Workers that die before they begin anything, as under a script without a main guard."""
+    with ProcessPoolExecutor(workers, get_context("spawn"), os._exit, (1,)) as executor:
+        yield Pool(executor, (BrokenExecutor,))
+
+
+def test_workers_that_never_begin_are_not_waited_for(tmp_path: Path) -> None:
+    with (
+        Crew(stillborn, 2, tmp_path / "crumbs") as crew,
+        pytest.raises(MachineError, match="no worker process could begin") as caught,
+    ):
+        crew.work_through(read, [Reads(("a",), str(tmp_path)), Reads(("b",), str(tmp_path))])
+    assert "__main__" in str(caught.value)

@@ -25,6 +25,15 @@ from pipeline.stages.fleet.task import LOGGER, Report, perform
 RERUN = "what was finished is kept: run the same command again to go on"
 
 
+PATIENCE = 3
+"""Rounds in which every worker dies before it begins anything, until nobody is waited for."""
+
+START = (
+    "is there memory for a process? A script of your own needs its work under "
+    "`if __name__ == '__main__':`, and cannot come from standard input"
+)
+
+
 class Task(Protocol):
     """Something to do that names itself and can leave out a file that kills its reader."""
 
@@ -71,11 +80,12 @@ class Crew:
         """`function` of each task, in their order; a MachineError stands for one that failed.
 
         `done(index, value)` is called as results come. Raises the PipelineError of a task: a full
-        disk would meet the next one too.
+        disk would meet the next one too; and MachineError where no worker ever begins a task.
         """
         results: list[Any] = [None] * len(tasks)
         left = list(range(len(tasks)))
         suspects: list[tuple[int, LastWords | None]] = []
+        idle = 0
 
         def finish(index: int, value: Any) -> None:
             results[index] = value
@@ -83,23 +93,38 @@ class Crew:
                 done(index, value)
 
         while left:
-            again = []
-            for index, end in self._round(self._gathered(), function, tasks, left):
-                if isinstance(end, LastWords):
-                    if end.begun:
-                        suspects.append((index, end))
-                    else:
-                        again.append(index)
-                elif end.error is None:
-                    finish(index, end.value)
-                else:
-                    suspects.append((index, None))
-            if again or any(words is not None for _, words in suspects):
-                self._gathered(anew=True)
-            left = sorted(again)
+            again = self._through(function, tasks, left, finish, suspects)
+            idle = idle + 1 if len(again) == len(left) else 0
+            if idle == PATIENCE:
+                raise MachineError("no worker process could begin its work", START)
+            left = again
         for index, words in sorted(suspects, key=lambda suspect: suspect[0]):
             finish(index, self._alone(function, tasks[index], words, index))
         return results
+
+    def _through(
+        self,
+        function: Callable[[Any], Any],
+        tasks: Sequence[Any],
+        left: Sequence[int],
+        finish: Done,
+        suspects: list[tuple[int, LastWords | None]],
+    ) -> list[int]:
+        """Gives out the tasks that are `left`; those that none began, by number, are left again."""
+        again = []
+        for index, end in self._round(self._gathered(), function, tasks, left):
+            if isinstance(end, LastWords):
+                if end.begun:
+                    suspects.append((index, end))
+                else:
+                    again.append(index)
+            elif end.error is None:
+                finish(index, end.value)
+            else:
+                suspects.append((index, None))
+        if again or any(words is not None for _, words in suspects):
+            self._gathered(anew=True)
+        return sorted(again)
 
     def _gathered(self, *, anew: bool = False) -> Pool:
         """The workers at work; `anew` where one of them has died and taken the others along."""
