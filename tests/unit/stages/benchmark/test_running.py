@@ -153,7 +153,7 @@ def test_the_command_prints_what_there_is(tmp_path: Path) -> None:
     words = page.read_text()
     assert words.startswith("before\n")
     assert words.endswith("after\n")
-    assert "old" not in words
+    assert "\nold\n" not in words
     assert "2026-01-01" in words
 
 
