@@ -39,7 +39,7 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     }
     near = rough_fit(segments, model.without(*shaped))
     hum = hum_of(segments, near.model, near.values)
-    heard = with_hum(segments, hum)
+    heard = with_hum(segments, hum, near.model, near.values)
     fitted, around = first_fit(heard, near)
     if not shaped:
         return Begun(heard, fitted, around, hum)

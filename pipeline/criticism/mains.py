@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ import numpy as np
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, clock
 
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 _BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
@@ -73,9 +73,15 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
     )
 
 
-def with_hum(segments: Sequence[Segment], heard: Sequence[Hum]) -> tuple[Segment, ...]:
-    """The segments, each knowing the lines that its channels may have."""
-    return tuple(_humming(segment, heard) for segment in segments)
+def with_hum(
+    segments: Sequence[Segment], heard: Sequence[Hum], model: Model, values: Values
+) -> tuple[Segment, ...]:
+    """The segments, each knowing the lines that its channels may have.
+
+    Sensors of current pick up what those of voltage do, counted in their own noise; the model says
+    what becomes of that: its share of a torque grows with the current.
+    """
+    return tuple(_humming(segment, heard, model, values) for segment in segments)
 
 
 def told_hum(heard: Sequence[Hum]) -> tuple[str, ...]:
@@ -89,19 +95,39 @@ def told_hum(heard: Sequence[Hum]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _humming(segment: Segment, heard: Sequence[Hum]) -> Segment:
+def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Values) -> Segment:
     weak = segment.weak
     mine = [h for h in heard if h.kind == segment.kind and h.signal in segment.channels]
     if weak is None or not mine:
         return segment
-    time = np.arange(segment.size) * segment.ts_s
-    lines = np.zeros((2 * len(mine), len(segment.channels), weak.starts.size, weak.orders.size))
-    for number, hum in enumerate(mine):
-        turn = 2.0 * math.pi * hum.freq_hz * time
-        waves = math.sqrt(2.0) * hum.rms * np.stack([np.cos(turn), np.sin(turn)])
+    lines = []
+    for hum in mine:
+        both = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
         place = segment.channels.index(hum.signal)
-        lines[2 * number : 2 * number + 2, place] = weak.project(waves)
-    return replace(segment, lines=lines)
+        both[:, place] = weak.project(hum.rms * _waves(segment, hum.freq_hz))
+        lines.append(both)
+    here = residual(segment, model, values)
+    for name, rms, freq in _in_currents(segment, mine):
+        moved = [segment.recorded[name] + wave for wave in rms * _waves(segment, freq)]
+        there = [residual(segment, model, values, {**segment.recorded, name: m}) for m in moved]
+        lines.append(np.stack([weak.project(one - here) for one in there]))
+    return replace(segment, lines=np.concatenate(lines))
+
+
+def _in_currents(segment: Segment, mine: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:
+    """Name, rms [A] and frequency of what the current sensors may have of a voltage's lines."""
+    sensed = [h for h in mine if segment.noise.get(h.signal, 0.0) > 0.0 and "_v" in h.signal]
+    for freq in sorted({h.freq_hz for h in sensed}):
+        times = max(h.rms / segment.noise[h.signal] for h in sensed if h.freq_hz == freq)
+        for name, sigma in segment.noise.items():
+            if sigma > 0.0 and name.startswith("i"):
+                yield name, times * sigma, freq
+
+
+def _waves(segment: Segment, freq_hz: float) -> Array:
+    """Cosine and sine [2, n] of a line over a segment, of an rms of one."""
+    turn = 2.0 * math.pi * freq_hz * clock(segment)
+    return math.sqrt(2.0) * np.stack([np.cos(turn), np.sin(turn)])
 
 
 def _spectrum(signal: Array) -> Array:

@@ -101,6 +101,12 @@ def segment_of(
     )
 
 
+def clock(segment: Segment) -> Array:
+    """Time [n, s] of every sample; a log that was thinned to its windows has its own in `t_s`."""
+    even: Array = segment.ts_s * np.arange(segment.size, dtype=np.float64)
+    return segment.recorded.get("t_s", even)
+
+
 def projected(segment: Segment, sampled: Array) -> Array:
     """Weak samples [C, W, M] of sampled channels [C, n]; a table is its own projection."""
     if segment.weak is None:

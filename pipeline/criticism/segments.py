@@ -184,6 +184,7 @@ def _open(capture: Capture, machine: Machine) -> Segment | None:
     shaft_angle(found, period, machine)
     window = window_of(period, keep.size)
     noise = prepared(found, period)[0]
+    found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, found["theta_mech_rad"]))

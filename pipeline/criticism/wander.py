@@ -22,7 +22,7 @@ from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.judge import remainder
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, clock
 from pipeline.criticism.system import Fitted
 from pipeline.records.diagnosis import Remainder
 
@@ -68,16 +68,16 @@ def wanders(segment: Segment, model: Model, values: Values) -> Segment:
                         segment.weak.project(
                             residual(segment, model, values, _moved(segment, name, walk)) - here
                         )
-                        for walk in SIZE * sigma * slowest(segment.size)
+                        for walk in SIZE * sigma * slowest(clock(segment))
                     ]
                 )
             )
     return replace(segment, lines=np.concatenate(made)) if made else segment
 
 
-def slowest(size: int) -> Array:
+def slowest(time_s: Array) -> Array:
     """The slowest sines [8, n] of a random walk that ends at a standard deviation of one."""
-    time = (np.arange(size) + 0.5) / size
+    time = (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), 1e-300)
     rates = (np.arange(_TERMS)[:, None] + 0.5) * math.pi
     sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates
     return sines
