@@ -64,10 +64,13 @@ class Score:
     def passes(self) -> bool:
         """Whether it is worth its price, large enough to matter and helps enough.
 
-        Below the floor an effect of a closer look is not told from noise of the angle's sensor that
-        runs through a drive's speed loop, and so is in torque and angle alike.
+        Below the floor only what the machine itself does is named. A sensor's error is a common
+        factor of which any form that is a little wrong elsewhere asks for some; and an effect of a
+        closer look is not told from noise of the angle's sensor, which runs through a drive's speed
+        loop and so is in torque and angle alike.
         """
-        below = self._below_floor and self.candidate.effect.closer is None
+        effect = self.candidate.effect
+        below = self._below_floor and effect.hook != "sensor" and effect.closer is None
         helps = self.share >= LEAST_SHARE or below
         return self.fall > self.price and self.size >= 1.0 and helps
 

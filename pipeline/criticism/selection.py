@@ -108,10 +108,11 @@ def _refit_best(
 
     A candidate must keep the promise of its score: the misfit falls by more than its price, and
     with captures predicted from all the others by half of it at least, even where effects `found`
-    of its own kind have forms that are a little wrong.
+    of its own kind have forms that are a little wrong; below the floor any of them.
     """
     own = len(own_columns(fitted.model))
     before = held_out_spreads(wide, own, segments)
+    any_wrong = _doubt(segments, fitted, wide, found)
     close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
     least = math.inf
@@ -123,29 +124,29 @@ def _refit_best(
         cost = tried[1].misfit + score.price + unsought
         if not material(tried[0], effect) or cost >= min(least, wide.misfit):
             continue
-        doubt = _doubt(segments, fitted, wide, effect, found)
-        if _holds(wide, before, tried[1], segments, _HELD * score.price, doubt):
+        doubts = _doubt(segments, fitted, wide, _kin(effect, found)), any_wrong
+        if _holds(wide, before, tried[1], segments, _HELD * score.price, doubts):
             best, least = tried, cost
     return best
 
 
+def _kin(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
+    """The found effects of an effect's own kind: flux, drop or drag."""
+    return [one for one in found if one.hook == effect.hook != "sensor"]
+
+
 def _doubt(
-    segments: Sequence[Segment],
-    fitted: Fitted,
-    wide: System,
-    effect: Effect,
-    found: Sequence[Effect],
+    segments: Sequence[Segment], fitted: Fitted, wide: System, found: Sequence[Effect]
 ) -> Array:
-    """What is left of χ²/n [G], as a factor, where the found effects of an effect's own kind (flux,
-    drop, drag) have forms that are wrong by a twentieth.
+    """What is left of χ²/n [G], as a factor, where these effects have forms that are wrong by a
+    twentieth.
 
     Windage that takes up what the formula of Stribeck friction leaves is not there.
     """
-    kind = [one for one in found if one.hook == effect.hook != "sensor"]
-    if not kind:
+    if not found:
         return np.ones(len(wide.labels))
     model, values = fitted.model, fitted.values
-    wrong = np.concatenate([form_tolerance(s, model, values, kind, _KIN) for s in segments])
+    wrong = np.concatenate([form_tolerance(s, model, values, found, _KIN) for s in segments])
     noise = np.bincount(wide.group, wide.whiten**-2, len(wide.labels)) / np.maximum(
         wide.counts, 1.0
     )
@@ -159,19 +160,20 @@ def _holds(
     tried: System,
     segments: Sequence[Segment],
     least: float,
-    doubt: Array,
+    doubts: tuple[Array, Array],
 ) -> bool:
     """Whether the misfit of captures predicted from all the others falls by `least`, and with it a
     share of some signal's power, or by as much in signals that are below their floor; `before` are
-    their χ²/n without the candidate, of which `doubt` [G] counts.
+    their χ²/n without the candidate, of which the first of the `doubts` [G] counts, below the floor
+    the second.
     """
-    after = doubt * held_out_spreads(tried, len(tried.columns), segments)
-    before = doubt * before
+    after = held_out_spreads(tried, len(tried.columns), segments)
+    kin, below = doubts
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
-    fall = wide.misfit_of(before) + cost - tried.misfit_of(after) - left
+    fall = wide.misfit_of(kin * before) + cost - tried.misfit_of(kin * after) - left
     priors = cost > WORTH and left < (1.0 - LEAST_SHARE) * cost
-    helps = priors or power_share(wide, before, after) >= LEAST_SHARE
-    return fall > least and (helps or quiet_fall(wide, before, after) > least)
+    helps = priors or power_share(wide, kin * before, kin * after) >= LEAST_SHARE
+    return fall > least and (helps or quiet_fall(wide, below * before, below * after) > least)
 
 
 def begun(fitted: Fitted, score: Score) -> Fitted:

@@ -17,7 +17,7 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
-from pipeline.criticism.selection import _doubt, material, search
+from pipeline.criticism.selection import _doubt, _kin, material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, log, machine
@@ -137,7 +137,7 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     segments = (with_drag(drag), with_drag(drag, 6))
     last = search(segments, fitted(segments), LIBRARY)[-1]
     (windage,) = last.fitted.model.effects
-    doubt = _doubt(segments, last.fitted, last.around, effects()["iron_eddy"], (windage,))
+    doubt = _doubt(segments, last.fitted, last.around, (windage,))
     omega = np.gradient(log().recorded["theta_mech_rad"], 5e-5)
     place = last.around.labels.index((0, "torque_shaft_nm", 0))
     mine = last.around.group == place
@@ -148,7 +148,9 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     assert doubt[place] < 0.9
     assert doubt[last.around.labels.index((0, "vd_v", 0))] == 1.0
     delay = effects()["sample_delay"]
-    assert (_doubt(segments, last.fitted, last.around, delay, (windage,)) == 1.0).all()
+    assert _kin(effects()["iron_eddy"], (windage, delay)) == [windage]
+    assert _kin(delay, (windage, delay)) == []
+    assert (_doubt(segments, last.fitted, last.around, ()) == 1.0).all()
 
 
 def test_a_drag_of_the_wrong_sign_is_no_friction():
