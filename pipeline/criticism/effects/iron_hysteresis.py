@@ -20,7 +20,7 @@ EFFECT = Effect(
     tests=("torque_map",),
     experiment="a torque map with d current; a slow turn without the magnet",
     reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
-    parameters=(Parameter("drag_nm", "N·m", 0.01, 0.001, "torque_nm", low=0.0, high=1.0),),
+    parameters=(Parameter("drag_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0),),
     signals=("torque_shaft_nm",),
     rivals={
         "coulomb_friction": "an open-circuit comparison against a rotor without magnet",
