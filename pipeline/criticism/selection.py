@@ -173,7 +173,8 @@ def _holds(
     fall = wide.misfit_of(kin * before) + cost - tried.misfit_of(kin * after) - left
     priors = cost > WORTH and left < (1.0 - LEAST_SHARE) * cost
     helps = priors or power_share(wide, kin * before, kin * after) >= LEAST_SHARE
-    return fall > least and (helps or quiet_fall(wide, below * before, below * after) > least)
+    quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
+    return fall > least and (helps or quiet > least)
 
 
 def begun(fitted: Fitted, score: Score) -> Fitted:
