@@ -114,6 +114,19 @@ def test_saturation_bends_the_flux_by_its_rational_curve(bend):
     assert flux.real == pytest.approx(-BASE["ld_h"] * size * d * (0.05 * d + lost_d), rel=1e-6)
 
 
+@pytest.mark.parametrize(("bend", "d_bend"), [(0.0, 0.0), (1.5, 0.0), (0.0, 2.0), (1.5, 2.0)])
+def test_cross_saturation_bends_on_both_axes(bend, d_bend):
+    """ψ_q = −√(L_d L_q) i_max (odd s_d + even s_d²)/(1 + b_d s_d²) · 2 s_q/(1 + b s_q²)²."""
+    x = operating()
+    q = {"odd": 0.2, "even": -0.1, "bend": bend, "d_bend": d_bend}
+    size = machine().scales["current_a"]
+    d, s = x.id_a / size, x.iq_a / size
+    beside = (0.2 * d - 0.1 * d**2) / (1.0 + d_bend * d**2)
+    closed = -math.sqrt(BASE["ld_h"] * BASE["lq_h"]) * size * beside * 2 * s
+    flux, _ = effect_flux(LIBRARY["cross_saturation"], x, q)
+    assert flux.imag == pytest.approx(closed / (1.0 + bend * s**2) ** 2, rel=1e-10)
+
+
 def test_torque_comes_from_the_co_energy_of_the_linear_machine():
     x = ready(operating())
     ld, lq, psi = BASE["ld_h"], BASE["lq_h"], BASE["psi_wb"]

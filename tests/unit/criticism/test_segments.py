@@ -7,7 +7,9 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.segments import segments
+from pipeline.criticism.size import machine_of
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.constants import Constants
 from tests.unit.criticism.machines import machine
 
 
@@ -35,3 +37,17 @@ def test_a_capture_that_lacks_its_equations_signals_is_left_out():
     table = pl.DataFrame({"t_s": [0.0, 1.0, 2.0], "id_a": [0.0, 1.0, 2.0]})
     capture = Capture("x.csv", "0", "verified", CaptureMeta("m", "torque_map"), (table,))
     assert segments(Campaign("m", (capture,)), machine()) == ()
+
+
+def test_harmonics_of_a_high_cogging_order_are_found_too():
+    """24 slots and 11 pole pairs make order 264; its second harmonic was past the search's end."""
+    t = np.arange(40_000) * 1e-3
+    theta = 2 * np.pi * t / 20.0
+    wave = 0.01 * np.sin(264 * theta) + 0.002 * np.sin(528 * theta)
+    torque = wave + np.random.default_rng(2).normal(0, 1e-5, t.size)
+    table = pl.DataFrame({"t_s": t, "theta_mech_rad": theta, "torque_shaft_nm": torque})
+    meta = CaptureMeta("m", "cogging", pole_pairs=11, slots=24)
+    found = machine_of(
+        Campaign("m", (Capture("cog.mcap", "0", "verified", meta, (table,)),)), Constants()
+    )
+    assert {264, 528} <= set(found.torque_orders)

@@ -77,6 +77,10 @@ def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none
         ({"share": 0.5}, "did not hold on captures held out"),
         ({"quiet": 40.0}, "did not hold on captures held out"),
         (
+            {"quiet": 40.0, "effect": "sample_delay"},
+            "what it would explain lies below the noise floor",
+        ),
+        (
             {"quiet": 40.0, "effect": "compliance"},
             "what it would explain lies below the noise floor",
         ),

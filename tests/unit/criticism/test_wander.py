@@ -9,10 +9,11 @@ import pytest
 
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.judge import remainder
+from pipeline.criticism.linearise import linearise
 from pipeline.criticism.model import Model
 from pipeline.criticism.system import Fitted, floors
 from pipeline.criticism.unknown import unknown_structure
-from pipeline.criticism.wander import SIZE, slowest, wandering
+from pipeline.criticism.wander import SIZE, slowest, wandering, wanders
 from tests.unit.criticism.machines import BASE, log, machine
 
 
@@ -44,6 +45,20 @@ def test_the_slowest_sines_have_the_variance_of_a_random_walk():
     assert (sines**2).sum(axis=0) == pytest.approx(time, abs=0.03)
     gram = np.trapezoid(sines[:, None] * sines[None], time)
     assert gram - np.diag(np.diag(gram)) == pytest.approx(np.zeros((8, 8)), abs=1e-6)
+
+
+def test_a_walk_of_its_size_is_all_but_noise_once_it_is_known():
+    """χ²/n of the torque before and after, over twenty walks; the faster tail of a walk is left."""
+    model, over, known = Model(machine(), ()), [], []
+    for seed in range(20):
+        segment = walked(seed, "drive", 4.0)
+        sigma = floors((segment,), model, BASE)[0]
+        for one, found in ((segment, over), (wanders(segment, model, BASE), known)):
+            rows = linearise(one, model, BASE, [], sigma, np.zeros(sigma.size))
+            mine = [n for n, (channel, k) in enumerate(rows.groups) if channel[0] == "t" and k == 0]
+            found.append(float((rows.residual[np.isin(rows.group, mine)] ** 2).mean()))
+    assert np.median(over) > 100.0
+    assert np.median(known) < 10.0
 
 
 def test_wander_in_captures_of_two_tests_leaves_nothing():
