@@ -37,6 +37,7 @@ _ROUNDS = 2
 _HELD = 0.5
 _CLOSE = 0.7
 _KIN = 0.05
+_BESIDE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +109,8 @@ def _refit_best(
 
     A candidate must keep the promise of its score: the misfit falls by more than its price, and
     with captures predicted from all the others by half of it at least, even where effects `found`
-    of its own kind have forms that are a little wrong; below the floor any of them.
+    of its own kind have forms that are a little wrong; below the floor any of them, and beside one of
+    its own kind by three prices, since what a form leaves there is of that size.
     """
     own = len(own_columns(fitted.model))
     before = held_out_spreads(wide, own, segments)
@@ -124,8 +126,10 @@ def _refit_best(
         cost = tried[1].misfit + score.price + unsought
         if not material(tried[0], effect) or cost >= min(least, wide.misfit):
             continue
-        doubts = _doubt(segments, fitted, wide, _kin(effect, found)), any_wrong
-        if _holds(wide, before, tried[1], segments, _HELD * score.price, doubts):
+        kin = _kin(effect, found)
+        doubts = _doubt(segments, fitted, wide, kin), any_wrong
+        least = _HELD * score.price, (_BESIDE if kin else _HELD) * score.price
+        if _holds(wide, before, tried[1], segments, least, doubts):
             best, least = tried, cost
     return best
 
@@ -159,13 +163,13 @@ def _holds(
     before: Array,
     tried: System,
     segments: Sequence[Segment],
-    least: float,
+    least: tuple[float, float],
     doubts: tuple[Array, Array],
 ) -> bool:
-    """Whether the misfit of captures predicted from all the others falls by `least`, and with it a
-    share of some signal's power, or by as much in signals that are below their floor; `before` are
-    their χ²/n without the candidate, of which the first of the `doubts` [G] counts, below the floor
-    the second.
+    """Whether the misfit of captures predicted from all the others falls by the first of `least`,
+    and with it a share of some signal's power, or by the second in signals that are below their
+    floor; `before` are their χ²/n without the candidate, of which the first of the `doubts` [G]
+    counts, below the floor the second.
     """
     after = held_out_spreads(tried, len(tried.columns), segments)
     kin, below = doubts
@@ -174,7 +178,7 @@ def _holds(
     priors = cost > WORTH and left < (1.0 - LEAST_SHARE) * cost
     helps = priors or power_share(wide, kin * before, kin * after) >= LEAST_SHARE
     quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
-    return fall > least and (helps or quiet > least)
+    return fall > least[0] and (helps or quiet > least[1])
 
 
 def begun(fitted: Fitted, score: Score) -> Fitted:
