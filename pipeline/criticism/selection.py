@@ -109,8 +109,8 @@ def _refit_best(
 
     A candidate must keep the promise of its score: the misfit falls by more than its price, and
     with captures predicted from all the others by half of it at least, even where effects `found`
-    of its own kind have forms that are a little wrong; below the floor any of them, and beside one of
-    its own kind by three prices, since what a form leaves there is of that size.
+    of its own kind have forms that are a little wrong; below the floor any of them, and beside one
+    of its own kind by three prices, since what a form leaves there is of that size.
     """
     own = len(own_columns(fitted.model))
     before = held_out_spreads(wide, own, segments)
@@ -128,8 +128,8 @@ def _refit_best(
             continue
         kin = _kin(effect, found)
         doubts = _doubt(segments, fitted, wide, kin), any_wrong
-        least = _HELD * score.price, (_BESIDE if kin else _HELD) * score.price
-        if _holds(wide, before, tried[1], segments, least, doubts):
+        promised = _HELD * score.price, (_BESIDE if kin else _HELD) * score.price
+        if _holds(wide, before, tried[1], segments, promised, doubts):
             best, least = tried, cost
     return best
 
