@@ -19,7 +19,7 @@ import numpy as np
 
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.model import Model
-from pipeline.criticism.residuals import residual
+from pipeline.criticism.residuals import disturbed, residual
 from pipeline.criticism.segment import Segment, clock
 
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
@@ -106,11 +106,9 @@ def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Value
         place = segment.channels.index(hum.signal)
         both[:, place] = weak.project(hum.rms * _waves(segment, hum.freq_hz))
         lines.append(both)
-    here = residual(segment, model, values)
     for name, rms, freq in _in_currents(segment, mine):
-        moved = [segment.recorded[name] + wave for wave in rms * _waves(segment, freq)]
-        there = [residual(segment, model, values, {**segment.recorded, name: m}) for m in moved]
-        lines.append(np.stack([weak.project(one - here) for one in there]))
+        waves = rms * _waves(segment, freq)
+        lines.append(disturbed(segment, weak, model, values, name, waves))
     return replace(segment, lines=np.concatenate(lines))
 
 

@@ -17,6 +17,7 @@ from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Value
 from pipeline.criticism.model import Model, Pieces, air_gap_torque, evaluate, ripple, values_of
 from pipeline.criticism.operate import angle_error, current_slope, operate
 from pipeline.criticism.segment import Segment
+from pipeline.numerics.projection import Projection
 
 RIPPLES = ("ripple_edge", "ripple_shift")
 TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
@@ -30,6 +31,18 @@ def residual(
     x = operate(segment, signals, model, values)
     pieces = evaluate(model, x, values)
     return measured(segment, signals, model, values) - predicted(segment, x, pieces, model, values)
+
+
+def disturbed(
+    segment: Segment, weak: Projection, model: Model, values: Values, name: str, waves: Array
+) -> Array:
+    """What additions to one sensor, waves [K, n] in its unit, do to the weak samples
+    [K, C, W, M].
+    """
+    here, column = residual(segment, model, values), segment.recorded[name]
+    moved = ({**segment.recorded, name: column + wave} for wave in waves)
+    there = [residual(segment, model, values, recorded) for recorded in moved]
+    return np.stack([weak.project(one - here) for one in there])
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:

@@ -21,7 +21,7 @@ from pipeline.criticism.each import on_each
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.judge import remainder
 from pipeline.criticism.model import Model
-from pipeline.criticism.residuals import residual
+from pipeline.criticism.residuals import disturbed
 from pipeline.criticism.segment import Segment, clock
 from pipeline.criticism.system import Fitted
 from pipeline.records.diagnosis import Remainder
@@ -58,20 +58,13 @@ def wanders(segment: Segment, model: Model, values: Values) -> Segment:
     """A segment with the slowest sines of a random walk of each of its sensors."""
     if segment.weak is None:
         return segment
-    here = residual(segment, model, values)
+    sines = SIZE * slowest(clock(segment))
     made = [] if segment.lines is None else [segment.lines]
-    for name, sigma in segment.noise.items():
-        if sigma > 0.0 and name.startswith(_WANDERS):
-            made.append(
-                np.stack(
-                    [
-                        segment.weak.project(
-                            residual(segment, model, values, _moved(segment, name, walk)) - here
-                        )
-                        for walk in SIZE * sigma * slowest(clock(segment))
-                    ]
-                )
-            )
+    made += [
+        disturbed(segment, segment.weak, model, values, name, sigma * sines)
+        for name, sigma in segment.noise.items()
+        if sigma > 0.0 and name.startswith(_WANDERS)
+    ]
     return replace(segment, lines=np.concatenate(made)) if made else segment
 
 
@@ -81,7 +74,3 @@ def slowest(time_s: Array) -> Array:
     rates = (np.arange(_TERMS)[:, None] + 0.5) * math.pi
     sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates
     return sines
-
-
-def _moved(segment: Segment, name: str, walk: Array) -> dict[str, Array]:
-    return {**segment.recorded, name: segment.recorded[name] + walk}
