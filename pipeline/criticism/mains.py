@@ -14,8 +14,10 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.model import Model
@@ -29,6 +31,10 @@ _STANDS_OUT = 20.0
 _SEEN = 4.0
 _CAPTURES = 3
 _SLIDE = 0.03
+_PARTS = 8
+_STEADY = 0.5
+# residuals reach over their neighbours: those beside a gap in the log are of no equation
+_EDGE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,15 +59,14 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
     """
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
     for segment in segments:
-        duration = segment.size * segment.ts_s
-        if segment.weak is None or duration * LINES_HZ[0] < _CYCLES:
+        spectrum = _Spectrum.of(segment)
+        if segment.weak is None or spectrum.duration_s * LINES_HZ[0] < _CYCLES:
             continue
         lines = [f for f in LINES_HZ if 2.2 * f * segment.ts_s < 1.0 and not _turns_at(segment, f)]
         left = residual(segment, model, values)
         for channel, one in zip(segment.channels, left, strict=True):
-            power = _spectrum(one)
-            for freq in lines:
-                powers[segment.kind, channel, freq].append(_stands_out(power, freq, duration))
+            for freq, seen in zip(lines, spectrum.lines(one, lines), strict=True):
+                powers[segment.kind, channel, freq].append(seen)
     ratios = {
         key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
     }
@@ -128,20 +133,74 @@ def _waves(segment: Segment, freq_hz: float) -> Array:
     return math.sqrt(2.0) * np.stack([np.cos(turn), np.sin(turn)])
 
 
-def _spectrum(signal: Array) -> Array:
-    """Mean squares [bins] of the lines of a signal [n]."""
-    window = np.hanning(signal.size + 2)[1:-1]
-    power: Array = 2.0 * (np.abs(np.fft.rfft(window * signal)) / window.sum()) ** 2
-    return power
+@dataclass(frozen=True, slots=True)
+class _Spectrum:
+    """Where a segment's samples stand on an even clock of `bins` periods: `runs` without a gap,
+    `place` [n] of every sample; `weight` [n] is a Hann window over each run.
+    """
 
+    ts_s: float
+    bins: int
+    runs: tuple[slice, ...]
+    place: NDArray[np.int64]
+    weight: Array
 
-def _stands_out(power: Array, freq_hz: float, duration_s: float) -> tuple[float, float]:
-    """Mean square of the line at a frequency, and of what lies beside it."""
-    middle = round(freq_hz * duration_s)
-    beside = middle + np.array(_BESIDE)
-    beside = beside[(beside > 0) & (beside < power.size)]
-    level = float(np.median(power[beside]))
-    return float(power[middle - 1 : middle + 2].max()), max(level, 1e-300)
+    @classmethod
+    def of(cls, segment: Segment) -> _Spectrum:
+        """Of the segment's own clock."""
+        time = clock(segment)
+        place = np.rint((time - time[0]) / segment.ts_s).astype(np.int64)
+        ends = [0, *(np.flatnonzero(np.diff(place) > 1) + 1).tolist(), place.size]
+        weight = np.zeros(place.size)
+        for first, last in pairwise(ends):
+            inner = slice(first + _EDGE * (first > 0), last - _EDGE * (last < place.size))
+            weight[inner] = np.hanning(max(inner.stop - inner.start, 0) + 2)[1:-1]
+        runs = tuple(slice(*both) for both in pairwise(ends))
+        return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight)
+
+    @property
+    def duration_s(self) -> float:
+        """From the first sample to the last [s]."""
+        return self.bins * self.ts_s
+
+    def lines(self, signal: Array, freqs_hz: Sequence[float]) -> list[tuple[float, float]]:
+        """Mean square of each line in a signal [n], and of what lies beside it.
+
+        What is not of one size and phase from beginning to end is no line, whatever its spectrum.
+        """
+        flat = self.weight * self._about_its_mean(signal)
+        whole = np.zeros(self.bins)
+        whole[self.place] = flat
+        power = 2.0 * (np.abs(np.fft.rfft(whole)) / self.weight.sum()) ** 2
+        told = []
+        for freq in freqs_hz:
+            middle = round(freq * self.duration_s)
+            beside = middle + np.array(_BESIDE)
+            beside = beside[(beside > 0) & (beside < power.size)]
+            level = max(float(np.median(power[beside])), 1e-300)
+            top = middle - 1 + int(np.argmax(power[middle - 1 : middle + 2]))
+            line = float(power[top])
+            if line > _STANDS_OUT * level and self._share(flat, top) < _STEADY:
+                line = level
+            told.append((line, level))
+        return told
+
+    def _about_its_mean(self, signal: Array) -> Array:
+        """A signal [n] less the mean of each run, of which a comb of runs would make lines."""
+        level = np.empty_like(signal)
+        for run in self.runs:
+            level[run] = float(np.average(signal[run], weights=self.weight[run] + 1e-12))
+        return signal - level
+
+    def _share(self, flat: Array, line: int) -> float:
+        """Share of a line's power, summed over eight parts of a recording, that one sine has."""
+        wave = flat * np.exp(-2j * np.pi * line / self.bins * self.place)
+        part = np.minimum(self.place * _PARTS // self.bins, _PARTS - 1)
+        size = np.bincount(part, self.weight, _PARTS)
+        seen = np.bincount(part, wave.real, _PARTS) + 1j * np.bincount(part, wave.imag, _PARTS)
+        there = size > 0.0
+        power = float((np.abs(seen[there]) ** 2 / size[there]).sum())
+        return float(np.abs(seen.sum()) ** 2 / size.sum()) / max(power, 1e-300)
 
 
 def _turns_at(segment: Segment, freq_hz: float) -> bool:
@@ -149,9 +208,10 @@ def _turns_at(segment: Segment, freq_hz: float) -> bool:
     theta = segment.recorded.get("theta_mech_rad")
     if theta is None or segment.kind in ("terminal", "lcr"):
         return False
-    speed = np.gradient(theta, segment.ts_s) / (2.0 * math.pi)
+    time = clock(segment)
+    speed = np.gradient(theta, time) / (2.0 * math.pi)
     mean = float(np.abs(speed.mean()))
-    duration = segment.size * segment.ts_s
+    duration = float(time[-1] - time[0])
     if mean * duration < 0.5 or float(speed.std()) > _SLIDE * mean:
         return False
     order = freq_hz / mean
