@@ -14,10 +14,24 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
+from pipeline.criticism.size import base_scales
 
 _AT = 1e-9
-# a resistance or inductance below zero stands for an effect that is not in the model
-BASE_LIMITS = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
+_LEAST_INERTIA = 1e-3
+
+
+def limits_of(model: Model) -> dict[str, tuple[float, float]]:
+    """Lowest and highest value [unit of the name] of what has bounds.
+
+    A resistance or inductance below zero stands for an effect that is not in the model, and so does
+    an inertia next to nothing.
+    """
+    limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
+    limits["j_kgm2"] = (_LEAST_INERTIA * base_scales(model.machine)["j_kgm2"], np.inf)
+    for name, (_, p) in model.parameters().items():
+        scale = model.machine.scale(p)
+        limits[name] = (p.low * scale, p.high * scale)
+    return limits
 
 
 class Step(Protocol):
@@ -38,11 +52,7 @@ def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Va
     `best` gives the best step along some of the columns. The others take up what a parameter at
     its bound would have done.
     """
-    limits = dict(BASE_LIMITS)
-    limits |= {
-        name: (p.low * model.machine.scale(p), p.high * model.machine.scale(p))
-        for name, (_, p) in model.parameters().items()
-    }
+    limits = limits_of(model)
     live = np.arange(len(columns))
     step = np.zeros(len(columns))
     while live.size:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -104,7 +105,8 @@ def _bare(
         return None, ()
     gone = [e.name for e in fitted.model.effects if e.name not in names]
     values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
-    plain, around = gauss_newton(found, Fitted(without, values, fitted.sigma))
+    begun = replace(fitted, model=without, values=values, tolerance=())
+    plain, around = gauss_newton(found, begun)
     held = leave_out(around, len(own_columns(without)), found)
     before = _parameters(plain, around, held)
     moved = tuple(

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.bounds import BASE_LIMITS, Best, bounded_step
+from pipeline.criticism.bounds import Best, bounded_step, limits_of
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.floors import rough_floor
 from pipeline.criticism.linearise import Column
@@ -22,7 +22,6 @@ from pipeline.criticism.size import base_scales
 from pipeline.criticism.system import Fitted, System, floors, system
 
 _ITERATIONS = 12
-_REACH = 1.0
 _LEAST = 0.1
 _SHORT = 8
 _SILENT = 1e4
@@ -52,12 +51,8 @@ def initial(effect: Effect, model: Model) -> dict[str, float]:
 def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
     """Values moved inside their bounds."""
     inside = dict(values)
-    inside["j_kgm2"] = max(values["j_kgm2"], 1e-3 * base_scales(model.machine)["j_kgm2"])
-    for name, (low, high) in BASE_LIMITS.items():
+    for name, (low, high) in limits_of(model).items():
         inside[name] = min(max(values[name], low), high)
-    for name, (_, p) in model.parameters().items():
-        scale = model.machine.scale(p)
-        inside[name] = min(max(values[name], p.low * scale), p.high * scale)
     return inside
 
 
@@ -115,12 +110,12 @@ def _damped(fitted: Fitted, around: System) -> Best:
 
 def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:
     """Inverse variance [P] of one step, not of where it ends: what the captures hardly know does
-    not leap out of the range in which the equations are near their tangent [1]. Viscous friction
-    may be next to nothing, and must not stay there for that.
+    not leap out of the range in which the equations are near their tangent [1]. What a missing
+    effect has brought next to nothing, as an encoder off its centre does J, must not stay there.
     """
     machine = fitted.model.machine
-    reach = {name: _REACH * abs(fitted.values[name]) for name in PHYSICAL}
-    reach["b_nm_s_rad"] = max(reach["b_nm_s_rad"], _LEAST * base_scales(machine)["b_nm_s_rad"])
+    scales = base_scales(machine)
+    reach = {name: max(abs(fitted.values[name]), _LEAST * scales[name]) for name in PHYSICAL}
     for name, (_, p) in fitted.model.parameters().items():
         if p.amplitude:
             reach[name] = 3.0 * max(abs(fitted.values[name]), p.typical * machine.scale(p))
@@ -145,16 +140,17 @@ def rough_fit(segments: Sequence[Segment], model: Model) -> Fitted:
     values = start_values(model, model.machine)
     few = [sparse(segment) for segment in segments]
     rough = tuple(rough_floor(segment, model, values) for segment in few)
-    near, _ = gauss_newton(few, Fitted(model, values, rough))
+    near, _ = gauss_newton(few, Fitted(model, values, rough, values))
     return near
 
 
 def first_fit(segments: Sequence[Segment], near: Fitted) -> tuple[Fitted, System]:
     """Fits a model from a rough fit, every equation by its noise floor."""
     floor = floors(segments, near.model, near.values)
-    ends = [gauss_newton(segments, replace(near, sigma=floor))]
+    begun = replace(near, sigma=floor, near=near.values)
+    ends = [gauss_newton(segments, begun)]
     if len(segments) <= _SHORT:
-        ends += [_one_side_first(segments, replace(near, sigma=floor), side) for side in _SIDES]
+        ends += [_one_side_first(segments, begun, side) for side in _SIDES]
     return min(ends, key=lambda end: end[1].misfit)
 
 

@@ -193,8 +193,8 @@ def _planned_rows(
     """Columns [R, P] over the noise of a test that was not done."""
     made = []
     for number, segment in enumerate(planned(test, fitted, segments)):
-        sigma = noise_floor(segment, fitted.model, fitted.values, _SEED + number)
-        none = np.zeros(sigma.size)
-        rows = linearise(segment, fitted.model, fitted.values, columns, sigma, none)
+        model, values = fitted.model, fitted.values
+        sigma = noise_floor(segment, model, values, _SEED + number)
+        rows = linearise(segment, model, values, columns, sigma, np.zeros(sigma.size), values)
         made.append(rows.columns)
     return np.concatenate(made) if made else None

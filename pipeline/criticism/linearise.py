@@ -79,12 +79,13 @@ def linearise(
     columns: Sequence[Column],
     sigma: Array,
     tolerance: Array,
+    near: Values,
 ) -> Rows:
-    """Whitened residual and columns of one segment at `values`."""
+    """Whitened residual and columns of one segment at `values`, reading errors as at `near`."""
     group, window, valid, groups = row_index(segment)
     sampler = _Sampler(segment, model, dict(values))
     here = sampler.here
-    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, values)[valid])
+    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near)[valid])
     whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
     kept = np.zeros((int(valid.sum()), len(columns)))
     pending: list[tuple[int, Array]] = []

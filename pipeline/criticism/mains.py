@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Values
+from pipeline.criticism.floors import channel_scale
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import disturbed, residual
 from pipeline.criticism.segment import Segment, clock
@@ -33,6 +34,7 @@ _CAPTURES = 3
 _SLIDE = 0.03
 _PARTS = 8
 _STEADY = 0.5
+_LARGEST = 0.01
 # residuals reach over their neighbours: those beside a gap in the log are of no equation
 _EDGE = 4
 
@@ -65,7 +67,8 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
         lines = [f for f in LINES_HZ if 2.2 * f * segment.ts_s < 1.0 and not _turns_at(segment, f)]
         left = residual(segment, model, values)
         for channel, one in zip(segment.channels, left, strict=True):
-            for freq, seen in zip(lines, spectrum.lines(one, lines), strict=True):
+            most = (_LARGEST * channel_scale(segment, channel, model, values)) ** 2
+            for freq, seen in zip(lines, spectrum.lines(one, lines, most), strict=True):
                 powers[segment.kind, channel, freq].append(seen)
     ratios = {
         key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
@@ -163,10 +166,13 @@ class _Spectrum:
         """From the first sample to the last [s]."""
         return self.bins * self.ts_s
 
-    def lines(self, signal: Array, freqs_hz: Sequence[float]) -> list[tuple[float, float]]:
+    def lines(
+        self, signal: Array, freqs_hz: Sequence[float], most: float
+    ) -> list[tuple[float, float]]:
         """Mean square of each line in a signal [n], and of what lies beside it.
 
-        What is not of one size and phase from beginning to end is no line, whatever its spectrum.
+        What is not of one size and phase from beginning to end is no line, whatever its spectrum,
+        nor what is more than `most`.
         """
         flat = self.weight * self._about_its_mean(signal)
         whole = np.zeros(self.bins)
@@ -180,7 +186,8 @@ class _Spectrum:
             level = max(float(np.median(power[beside])), 1e-300)
             top = middle - 1 + int(np.argmax(power[middle - 1 : middle + 2]))
             line = float(power[top])
-            if line > _STANDS_OUT * level and self._share(flat, top) < _STEADY:
+            one_sine = line / (line + _PARTS * level)
+            if line > most or self._share(flat, top) < _STEADY * one_sine:
                 line = level
             told.append((line, level))
         return told
@@ -193,7 +200,10 @@ class _Spectrum:
         return signal - level
 
     def _share(self, flat: Array, line: int) -> float:
-        """Share of a line's power, summed over eight parts of a recording, that one sine has."""
+        """Share of a line's power, summed over eight parts of a recording, that one sine has.
+
+        About line / (line + 8 level) where there is one, an eighth where there is none.
+        """
         wave = flat * np.exp(-2j * np.pi * line / self.bins * self.place)
         part = np.minimum(self.place * _PARTS // self.bins, _PARTS - 1)
         size = np.bincount(part, self.weight, _PARTS)

@@ -30,13 +30,16 @@ ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 class Fitted:
     """A model with the values that fit best.
 
-    `sigma` is each segment's noise floor by group, `tolerance` what the forms of effects found
-    may be wrong by, none where it is empty.
+    `sigma` is each segment's noise floor by group, as it is at the values `near`; reading errors
+    count by these too, lest a fit should win by making J small and so all that a coasting shaft may
+    be out by large. `tolerance` is what the forms of effects found may be wrong by, none where it
+    is empty.
     """
 
     model: Model
     values: dict[str, float]
     sigma: tuple[Array, ...]
+    near: Values
     tolerance: tuple[Array, ...] = ()
 
 
@@ -201,7 +204,8 @@ def system(
     new = [column for column in columns if column.key not in known]
     none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
     floor = zip(fitted.sigma, fitted.tolerance or none, strict=True)
-    rows = on_each(linearise, segments, [(model, values, new, *both) for both in floor])
+    each = [(model, values, new, *both, fitted.near) for both in floor]
+    rows = on_each(linearise, segments, each)
     whiten = np.concatenate([r.whiten for r in rows])
     fresh = {column.key: n for n, column in enumerate(new)}
     made = np.concatenate([r.columns for r in rows])

@@ -30,7 +30,7 @@ def state(name, size, others, segments):
     values = {**dict.fromkeys(c.name for c in _base()), **BASE}
     values = {k: 0.0 if v is None else v for k, v in values.items()}
     values[f"{name}.{parameter.name}"] = size
-    fitted = Fitted(model, values, floors(segments, model, values))
+    fitted = Fitted(model, values, floors(segments, model, values), values)
     offered = candidates({other: ALL[other] for other in others}, fitted)
     return effect, fitted, widened(segments, fitted, offered), offered
 
@@ -97,7 +97,7 @@ def test_a_planned_test_obeys_the_model_it_is_planned_with(test):
     values = {c.name: BASE.get(c.name, 0.0) for c in _base()}
     values["coulomb_friction.torque_nm"] = 0.01
     segments = (log(),)
-    fitted = Fitted(model, values, floors(segments, model, values))
+    fitted = Fitted(model, values, floors(segments, model, values), values)
     for segment in planned(test, fitted, segments):
         left = residual(segment, model, values)
         assert segment.weak is not None

@@ -63,7 +63,7 @@ def missed(segment, heard):
     """χ²/n of vq_v where the lines `heard` are known."""
     sigma = noise_floor(segment, PLAIN, BASE, 1)
     (known,) = with_hum([segment], heard, PLAIN, BASE)
-    rows = linearise(known, PLAIN, BASE, [], sigma, np.zeros(sigma.size))
+    rows = linearise(known, PLAIN, BASE, [], sigma, np.zeros(sigma.size), BASE)
     mine = [n for n, (channel, _) in enumerate(rows.groups) if channel == "vq_v"]
     return float((rows.residual[np.isin(rows.group, mine)] ** 2).mean())
 

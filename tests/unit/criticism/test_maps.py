@@ -85,7 +85,7 @@ def test_cells_of_one_variable_hold_equal_shares_and_the_sense_has_two():
 def test_a_map_of_a_fit_knows_speed_and_current_of_its_windows():
     """The closed-form log: speed and mean current of every window, and the residual in volts."""
     segment, model = log(noise=1.0), Model(machine(), ())
-    fitted = Fitted(model, dict(BASE), floors([segment], model, BASE))
+    fitted = Fitted(model, dict(BASE), floors([segment], model, BASE), BASE)
     around = system([segment], fitted)
     errors = {e.signal: e for e in window_errors([segment], around, around.residual)}
     assert set(errors) == {"vd_v", "vq_v", "torque_shaft_nm"}
@@ -110,7 +110,8 @@ def test_a_harmonic_shows_over_the_electrical_angle_with_its_size():
     theta = segment.recorded["theta_mech_rad"]
     segment.recorded["torque_shaft_nm"] -= 0.01 * np.sin(12 * theta)
     maps = {
-        (m.signal, m.x.variable): m for m in angle_maps([segment], Fitted(plain, dict(BASE), ()))
+        (m.signal, m.x.variable): m
+        for m in angle_maps([segment], Fitted(plain, dict(BASE), (), BASE))
     }
     seen = maps["torque_shaft_nm", "theta_mech_rad"]
     middle = 0.5 * (np.array(seen.x.edges[1:]) + np.array(seen.x.edges[:-1]))
@@ -120,7 +121,7 @@ def test_a_harmonic_shows_over_the_electrical_angle_with_its_size():
     model = plain.with_effects(effect)
     names = [f"cogging.{p.name}" for p in effect.parameters_of(model.machine)]
     values = {**BASE, **dict.fromkeys(names, 0.0), "cogging.sin_12_nm": 0.01}
-    left = angle_maps([segment], Fitted(model, values, ()))
+    left = angle_maps([segment], Fitted(model, values, (), values))
     after = next(
         m for m in left if (m.signal, m.x.variable) == ("torque_shaft_nm", "theta_mech_rad")
     )

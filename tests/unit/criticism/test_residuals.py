@@ -54,10 +54,10 @@ def test_a_column_is_the_change_of_the_whole_residual(name):
     columns = effect_columns(effect, PLAIN)
     model = PLAIN.with_effects(effect)
     start = {**BASE, **zero(effect, model)}
-    before = linearise(segment, PLAIN, BASE, columns, sigma, strict)
+    before = linearise(segment, PLAIN, BASE, columns, sigma, strict, BASE)
     for n, column in enumerate(columns):
         moved = {**start, column.name: start[column.name] + column.step}
-        after = linearise(segment, model, moved, [], sigma, strict)
+        after = linearise(segment, model, moved, [], sigma, strict, BASE)
         expected = (after.residual - before.residual) / column.step
         size = np.abs(expected).max()
         assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)

@@ -30,7 +30,7 @@ LIBRARY = {
 
 def fitted(segments):
     model = Model(machine(), ())
-    start = Fitted(model, dict(BASE), floors(segments, model, BASE))
+    start = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
     return gauss_newton(segments, start)[0]
 
 
@@ -38,7 +38,7 @@ def cautious(segments, times):
     """A fit whose noise floors are some times what the sensors' noise makes."""
     model = Model(machine(), ())
     sigma = tuple(times * one for one in floors(segments, model, BASE))
-    return gauss_newton(segments, Fitted(model, dict(BASE), sigma))[0]
+    return gauss_newton(segments, Fitted(model, dict(BASE), sigma, BASE))[0]
 
 
 def with_drag(drag, seed=5):
@@ -252,7 +252,7 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
         labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
         penalty=np.zeros(1 + len(own_columns(model))),
         pull=np.zeros(1 + len(own_columns(model))),
-        around=Fitted(model, dict(BASE), ()),
+        around=Fitted(model, dict(BASE), (), BASE),
         tests=("drive", "drive"),
         made_at=BASE,
     )
@@ -337,7 +337,7 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
 
     def judged(name: str, **values: float) -> bool:
         full = {f"{name}.{k}": v for k, v in values.items()}
-        return material(Fitted(Model(machine(), (library[name],)), full, ()), library[name])
+        return material(Fitted(Model(machine(), (library[name],)), full, (), full), library[name])
 
     assert judged("compliance", share=0.3, twist_rad=0.005, between=0.0)
     assert not judged("compliance", share=0.3, twist_rad=1e-4, between=0.0)
@@ -352,6 +352,6 @@ def test_viscous_friction_comes_back_from_next_to_nothing(start):
     """
     segments = (log(noise=1.0), log(noise=1.0, seed=6))
     model = Model(machine(), ())
-    near = Fitted(model, {**BASE, "b_nm_s_rad": start}, floors(segments, model, BASE))
+    near = Fitted(model, {**BASE, "b_nm_s_rad": start}, floors(segments, model, BASE), BASE)
     found = gauss_newton(segments, near)[0]
     assert found.values["b_nm_s_rad"] == pytest.approx(BASE["b_nm_s_rad"], rel=0.05)

@@ -34,7 +34,7 @@ def walked(seed: int, test: str, size: float = 3.0):
 
 def around(segments):
     model = Model(machine(), ())
-    start = Fitted(model, dict(BASE), floors(segments, model, BASE))
+    start = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
     fitted, system = gauss_newton(segments, start)
     return fitted, remainder(system, segments, system.residual)
 
@@ -54,7 +54,7 @@ def test_a_walk_of_its_size_is_all_but_noise_once_it_is_known():
         segment = walked(seed, "drive", 4.0)
         sigma = floors((segment,), model, BASE)[0]
         for one, found in ((segment, over), (wanders(segment, model, BASE), known)):
-            rows = linearise(one, model, BASE, [], sigma, np.zeros(sigma.size))
+            rows = linearise(one, model, BASE, [], sigma, np.zeros(sigma.size), BASE)
             mine = [n for n, (channel, k) in enumerate(rows.groups) if channel[0] == "t" and k == 0]
             found.append(float((rows.residual[np.isin(rows.group, mine)] ** 2).mean()))
     assert np.median(over) > 100.0
