@@ -109,6 +109,7 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     orders = electrical_orders(machine) if turned > 0.1 else ()
     noise, runs = prepared(found, period)
     if capture.meta.test == "torque_map":
+        noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
         even_angle(found, noise, window)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)

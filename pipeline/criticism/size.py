@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.noise import rounding_step
 from pipeline.criticism.orders import holding_orders
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
@@ -17,6 +18,7 @@ _TABLES = ("flux_map", "holding_current")
 # orders a turn that a slow turn is searched for, and harmonics of the cogging order
 _HIGHEST = 400
 _HARMONICS = 3
+_SAME_STEP = 0.02
 
 
 def machine_of(campaign: Campaign, start: Constants) -> Machine:
@@ -54,8 +56,26 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
         campaign.of("holding_current"), bases
     )
     return Machine(
-        pole_pairs, int(str(slots)) if slots else None, scales, orders, stated_u(campaign)
+        pole_pairs,
+        int(str(slots)) if slots else None,
+        scales,
+        orders,
+        stated_u(campaign),
+        encoder_step(campaign),
     )
+
+
+def encoder_step(campaign: Campaign) -> float:
+    """The step of the encoder in drive logs [rad], 0 where there is none that they agree on.
+
+    A log at many speeds shows it; at one speed an angle may move by nearly whole steps a sample,
+    and look finer or coarser than it is.
+    """
+    logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
+    found = [rounding_step(c.arrays("theta_mech_rad")["theta_mech_rad"]) for c in logs]
+    step = float(np.median(found)) if found else 0.0
+    agree = all(abs(one - step) <= _SAME_STEP * step for one in found)
+    return step if agree else 0.0
 
 
 def stated_u(campaign: Campaign) -> dict[str, float]:
