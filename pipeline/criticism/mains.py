@@ -35,6 +35,7 @@ _SLIDE = 0.03
 _PARTS = 8
 _STEADY = 0.5
 _LARGEST = 0.01
+_EVEN = 0.02
 # residuals reach over their neighbours: those beside a gap in the log are of no equation
 _EDGE = 4
 
@@ -57,14 +58,21 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
 
     The mains are there if the power of a line is 20 times that beside it in three captures of one
     signal. Then every signal has the line in which it stands out in half of the captures that could
-    show it: where an order of the turning shaft comes too near, none could.
+    show it: where an order of the turning shaft comes too near, or the rate of a map's levels, none
+    could.
     """
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
     for segment in segments:
         spectrum = _Spectrum.of(segment)
         if segment.weak is None or spectrum.duration_s * LINES_HZ[0] < _CYCLES:
             continue
-        lines = [f for f in LINES_HZ if 2.2 * f * segment.ts_s < 1.0 and not _turns_at(segment, f)]
+        lines = [
+            f
+            for f in LINES_HZ
+            if 2.2 * f * segment.ts_s < 1.0
+            and not _turns_at(segment, f)
+            and not spectrum.repeats_at(f)
+        ]
         left = residual(segment, model, values)
         for channel, one in zip(segment.channels, left, strict=True):
             most = (_LARGEST * channel_scale(segment, channel, model, values)) ** 2
@@ -165,6 +173,20 @@ class _Spectrum:
     def duration_s(self) -> float:
         """From the first sample to the last [s]."""
         return self.bins * self.ts_s
+
+    def repeats_at(self, freq_hz: float) -> bool:
+        """Whether the runs come at a rate of which this is a multiple: what the first moments after
+        every step of a test are alike in is a line there.
+        """
+        starts = self.place[[run.start for run in self.runs]]
+        if starts.size < _CAPTURES:
+            return False
+        gaps = np.diff(starts)
+        usual = float(np.median(gaps))
+        if np.mean(np.abs(gaps - usual) < _EVEN * usual) < 0.5:
+            return False
+        cycles = freq_hz * usual * self.ts_s
+        return abs(cycles - round(cycles)) * starts.size < 2.0
 
     def lines(
         self, signal: Array, freqs_hz: Sequence[float], most: float
