@@ -19,8 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array, Values
-from pipeline.criticism.floors import channel_scale
+from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import disturbed, residual
 from pipeline.criticism.segment import Segment, clock
@@ -75,7 +74,7 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
         ]
         left = residual(segment, model, values)
         for channel, one in zip(segment.channels, left, strict=True):
-            most = (_LARGEST * channel_scale(segment, channel, model, values)) ** 2
+            most = (_LARGEST * _whole(channel, model.machine)) ** 2
             for freq, seen in zip(lines, spectrum.lines(one, lines, most), strict=True):
                 powers[segment.kind, channel, freq].append(seen)
     ratios = {
@@ -233,6 +232,12 @@ class _Spectrum:
         there = size > 0.0
         power = float((np.abs(seen[there]) ** 2 / size[there]).sum())
         return float(np.abs(seen.sum()) ** 2 / size.sum()) / max(power, 1e-300)
+
+
+def _whole(channel: str, machine: Machine) -> float:
+    """The machine's own voltage or torque [the channel's unit]; of other signals no end."""
+    scale = {"v": "voltage_v", "nm": "torque_nm"}.get(channel.rsplit("_", 1)[-1], "")
+    return machine.scales.get(scale, math.inf)
 
 
 def _turns_at(segment: Segment, freq_hz: float) -> bool:
