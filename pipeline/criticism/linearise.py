@@ -151,6 +151,7 @@ _NEEDS: dict[str, tuple[str, ...]] = {
 }
 
 
+_FINE = 1e-3
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
@@ -182,17 +183,21 @@ class _Sampler:
             return self._gain(column)
         if column.name not in _NEEDS[self.segment.kind]:
             return None
-        moved = {**self.values, column.name: self.values[column.name] + column.step}
+        step = column.step
+        if column.name == "j_kgm2":
+            # a coasting shaft goes by 1 / J: a step must be small against what J has come to
+            step = min(step, _FINE * self.values[column.name])
+        moved = {**self.values, column.name: self.values[column.name] + step}
         if column.name == "bench_angle_rad":
             there = measured(self.segment, self.segment.recorded, self.model, moved)
             start = measured(self.segment, self.segment.recorded, self.model, self.values)
-            return (there - start) / column.step
+            return (there - start) / step
         x = replace(self.x, base=moved)
         pieces = self.pieces
         if column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved)
         there = predicted(self.segment, x, pieces, self.model, moved)
-        return -(there - self.start) / column.step
+        return -(there - self.start) / step
 
     def _gain(self, column: Column) -> Array | None:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""

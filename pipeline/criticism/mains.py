@@ -27,11 +27,13 @@ from pipeline.criticism.segment import Segment, clock
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 _BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
 _CYCLES = 12.0
+_CYCLES_EACH = 2.0
 _STANDS_OUT = 20.0
 _SEEN = 4.0
 _CAPTURES = 3
 _SLIDE = 0.03
 _PARTS = 8
+_FINER = 2
 _STEADY = 0.5
 _LARGEST = 0.01
 _EVEN = 0.02
@@ -146,7 +148,7 @@ def _waves(segment: Segment, freq_hz: float) -> Array:
 @dataclass(frozen=True, slots=True)
 class _Spectrum:
     """Where a segment's samples stand on an even clock of `bins` periods: `runs` without a gap,
-    `place` [n] of every sample; `weight` [n] is a Hann window over each run.
+    `place` [n] of every sample; `weight` [n] is a Hann window over each run, and over the whole.
     """
 
     ts_s: float
@@ -166,6 +168,7 @@ class _Spectrum:
             inner = slice(first + _EDGE * (first > 0), last - _EDGE * (last < place.size))
             weight[inner] = np.hanning(max(inner.stop - inner.start, 0) + 2)[1:-1]
         runs = tuple(slice(*both) for both in pairwise(ends))
+        weight *= np.hanning(int(place[-1]) + 3)[1:-1][place]
         return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight)
 
     @property
@@ -196,16 +199,17 @@ class _Spectrum:
         nor what is more than `most`.
         """
         flat = self.weight * self._about_its_mean(signal)
-        whole = np.zeros(self.bins)
+        whole = np.zeros(_FINER * self.bins)
         whole[self.place] = flat
         power = 2.0 * (np.abs(np.fft.rfft(whole)) / self.weight.sum()) ** 2
         told = []
         for freq in freqs_hz:
-            middle = round(freq * self.duration_s)
-            beside = middle + np.array(_BESIDE)
+            middle = round(_FINER * freq * self.duration_s)
+            beside = middle + _FINER * np.array(_BESIDE)
             beside = beside[(beside > 0) & (beside < power.size)]
             level = max(float(np.median(power[beside])), 1e-300)
-            top = middle - 1 + int(np.argmax(power[middle - 1 : middle + 2]))
+            first = middle - _FINER
+            top = first + int(np.argmax(power[first : middle + _FINER + 1]))
             line = float(power[top])
             one_sine = line / (line + _PARTS * level)
             if line > most or self._share(flat, top) < _STEADY * one_sine:
@@ -214,10 +218,13 @@ class _Spectrum:
         return told
 
     def _about_its_mean(self, signal: Array) -> Array:
-        """A signal [n] less the mean of each run, of which a comb of runs would make lines."""
-        level = np.empty_like(signal)
+        """A signal [n] less the mean of each run that holds two cycles of any line: of what differs
+        from run to run the gaps between them would make lines.
+        """
+        level = np.full_like(signal, float(np.average(signal, weights=self.weight)))
         for run in self.runs:
-            level[run] = float(np.average(signal[run], weights=self.weight[run] + 1e-12))
+            if (run.stop - run.start) * self.ts_s * LINES_HZ[0] > _CYCLES_EACH:
+                level[run] = float(np.average(signal[run], weights=self.weight[run] + 1e-12))
         return signal - level
 
     def _share(self, flat: Array, line: int) -> float:
@@ -225,7 +232,7 @@ class _Spectrum:
 
         About line / (line + 8 level) where there is one, an eighth where there is none.
         """
-        wave = flat * np.exp(-2j * np.pi * line / self.bins * self.place)
+        wave = flat * np.exp(-2j * np.pi * line / (_FINER * self.bins) * self.place)
         part = np.minimum(self.place * _PARTS // self.bins, _PARTS - 1)
         size = np.bincount(part, self.weight, _PARTS)
         seen = np.bincount(part, wave.real, _PARTS) + 1j * np.bincount(part, wave.imag, _PARTS)

@@ -118,3 +118,29 @@ def log(n: int = 8000, seed: int = 5, noise: float = 0.0) -> Segment:
         weak,
         {"ambient_k": 0.0},
     )
+
+
+def coasting(n: int = 3000, seed: int = 5) -> Segment:
+    """A shaft that coasts from 200 rad/s against its viscous friction alone."""
+    ts = 1e-3
+    rate = BASE["b_nm_s_rad"] / BASE["j_kgm2"]
+    sigma = 2e-6
+    random = np.random.default_rng(seed)
+    theta = 200.0 / rate * -np.expm1(-rate * ts * np.arange(n)) + random.normal(0.0, sigma, n)
+    signals = {"theta_mech_rad": theta}
+    weak = projection(theta, np.arange(40, n - 140, 50), 100, ())
+    noise = {"theta_mech_rad": sigma}
+    channels = ("omega_mech_rad_s",)
+    return Segment(
+        "coast",
+        "spin_down",
+        "shaft",
+        "bench",
+        "instant",
+        ts,
+        signals,
+        noise,
+        channels,
+        weak,
+        {"ambient_k": 0.0},
+    )

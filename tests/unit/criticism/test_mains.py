@@ -59,6 +59,46 @@ def test_once_a_turn_of_a_steady_shaft_is_not_taken_for_it():
     assert not [h for h in hum_of(made, PLAIN, BASE) if h.freq_hz == 50.0]
 
 
+def cut_to_windows(segment, rate_hz, kept=120):
+    """The log thinned to windows that come at an even rate; its angle goes on between them."""
+    step = round(1.0 / (rate_hz * segment.ts_s))
+    rows = (np.arange(0, segment.size - kept, step)[:, None] + np.arange(kept)).ravel()
+    signals = {name: column[rows] for name, column in segment.recorded.items()}
+    return replace(segment, recorded={**signals, "t_s": rows * segment.ts_s})
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 60.0])
+def test_what_a_thinned_log_leaves_between_its_windows_is_no_hum(rate_hz):
+    """The flux has moved on over every gap: spikes of the back-EMF's size, at the windows' rate."""
+    recorded = [cut_to_windows(log(seed=n, noise=1.0), rate_hz) for n in range(4)]
+    assert hum_of(recorded, PLAIN, BASE) == ()
+
+
+def test_hum_is_heard_in_a_thinned_log():
+    """On the log's own clock: where a third of every 30 ms is left out, cycles are left out."""
+    long = [with_line(log(40_000, n, 1.0), "vq_v", 0.1, 50.0, 0.7 * n) for n in range(3)]
+    recorded = [cut_to_windows(one, 33.0, 400) for one in long]
+    (hum,) = hum_of(recorded, PLAIN, BASE)
+    assert (hum.signal, hum.freq_hz) == ("vq_v", 50.0)
+    assert hum.rms == pytest.approx(0.1, rel=0.3)
+
+
+def test_what_swells_with_the_recording_is_no_hum():
+    """A line of no one size is the machine's: a fault that grows with speed or current."""
+    made = []
+    for one in logs():
+        time = np.arange(one.size) * one.ts_s
+        swell = np.exp(-0.5 * ((time - 0.1) / 0.01) ** 2) * np.sin(2.0 * np.pi * 50.0 * time)
+        signals = {**one.recorded, "vq_v": one.recorded["vq_v"] + 0.1 * swell}
+        made.append(replace(one, recorded=signals))
+    assert hum_of(made, PLAIN, BASE) == ()
+
+
+def test_hum_of_the_size_of_the_signals_is_no_instrument_s():
+    assert hum_of(logs(rms=0.15), PLAIN, BASE)
+    assert hum_of(logs(rms=0.25), PLAIN, BASE) == ()
+
+
 def missed(segment, heard):
     """χ²/n of vq_v where the lines `heard` are known."""
     sigma = noise_floor(segment, PLAIN, BASE, 1)

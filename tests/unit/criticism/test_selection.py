@@ -20,7 +20,7 @@ from pipeline.criticism.scores import Candidate, Score, candidates, score_all, w
 from pipeline.criticism.selection import _doubt, _kin, material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
-from tests.unit.criticism.machines import BASE, log, machine
+from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 LIBRARY = {
     name: effects()[name]
@@ -355,3 +355,26 @@ def test_viscous_friction_comes_back_from_next_to_nothing(start):
     near = Fitted(model, {**BASE, "b_nm_s_rad": start}, floors(segments, model, BASE), BASE)
     found = gauss_newton(segments, near)[0]
     assert found.values["b_nm_s_rad"] == pytest.approx(BASE["b_nm_s_rad"], rel=0.05)
+
+
+@pytest.mark.parametrize("share", [0.015, 0.1, 8.0])
+def test_inertia_comes_back_from_where_a_missing_effect_left_it(share):
+    """A step of its own size would not reach, and a floor that counts T / J by the fit's own J
+    would make it well worth to stay: a coasting shaft may then do what it likes.
+    """
+    segments = (log(noise=1.0), coasting(), log(noise=1.0, seed=6))
+    model = Model(machine(), ())
+    near = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
+    lost = {**BASE, "j_kgm2": share * BASE["j_kgm2"], "b_nm_s_rad": share * BASE["b_nm_s_rad"]}
+    found = gauss_newton(segments, replace(near, values=lost))[0]
+    assert found.values["j_kgm2"] == pytest.approx(BASE["j_kgm2"], rel=0.01)
+    assert found.values["b_nm_s_rad"] == pytest.approx(BASE["b_nm_s_rad"], rel=0.05)
+
+
+def test_reading_errors_do_not_grow_while_a_fit_makes_the_inertia_small():
+    shaft = coasting()
+    model = Model(machine(), ())
+    sigma = floors((shaft,), model, BASE)
+    light = {**BASE, "j_kgm2": 0.01 * BASE["j_kgm2"]}
+    around = [system((shaft,), Fitted(model, v, sigma, BASE)) for v in (BASE, light)]
+    assert around[1].whiten == pytest.approx(around[0].whiten)
