@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -31,6 +33,43 @@ def test_a_slow_turn_has_a_window_a_turn_whatever_its_length(turns):
     own = weak[0, found[0].weak.orders == 84]
     gain = np.sqrt(found[0].weak.length) / 2
     assert np.hypot(*own) > 0.5 * 0.01 * gain * 0.7
+
+
+def at_speed(test, omega, step, n=8000, eccentric=0.0):
+    """A log whose angle an encoder rounded, and its file once more; dq signals that say nothing."""
+    t = np.arange(n) * 5e-5
+    turned = 0.3 + np.cumsum(np.broadcast_to(omega, n)) * 5e-5
+    turned = turned + eccentric * np.sin(turned)
+    random = np.random.default_rng(4)
+    columns = {name: random.normal(0.0, 0.01, n) for name in ("id_a", "iq_a", "vd_v", "vq_v")}
+    theta = np.round(np.round(turned / step) * step * 2**18) / 2**18
+    torque = random.normal(0.0, 1e-3, n)
+    table = pl.DataFrame({"t_s": t, **columns, "theta_mech_rad": theta, "torque_shaft_nm": torque})
+    return Capture(f"{test}.mcap", "0", "verified", CaptureMeta("m", test), (table,))
+
+
+def test_the_angle_of_a_map_is_even_but_for_the_step_that_the_drive_s_encoder_shows():
+    """46.94 steps a sample: by its own differences the angle looks finer than its encoder is, and
+    the rest of its rounding, times J, was taken for torque.
+    """
+    step = 2.0 * np.pi / 2**17
+    drive = at_speed("drive", np.linspace(-40.0, 60.0, 8000), step)
+    held = at_speed("torque_map", 45.0, step, eccentric=0.0005)
+    campaign = Campaign("m", (drive, held))
+    own = machine_of(campaign, Constants())
+    assert own.encoder_rad == pytest.approx(step, rel=1e-6)
+    known, blind = (
+        next(s for s in segments(campaign, one) if s.test == "torque_map")
+        for one in (own, replace(own, encoder_rad=0.0))
+    )
+    bends = [np.diff(s.recorded["theta_mech_rad"], 2)[:300].std() for s in (known, blind)]
+    assert bends[0] < 0.02 * step < 0.2 * step < bends[1]
+
+
+def test_logs_that_disagree_on_the_encoder_tell_of_none():
+    ramp = np.linspace(-40.0, 60.0, 8000)
+    logs = tuple(at_speed("drive", ramp, 2.0 * np.pi / 2**bits) for bits in (15, 17))
+    assert machine_of(Campaign("m", logs), Constants()).encoder_rad == 0.0
 
 
 def test_a_capture_that_lacks_its_equations_signals_is_left_out():

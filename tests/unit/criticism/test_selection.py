@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.diagnosis import trusted
+from pipeline.criticism.diagnosis import _explained, trusted
 from pipeline.criticism.effect import Told
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.linearise import effect_columns
@@ -17,9 +17,10 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
-from pipeline.criticism.selection import _doubt, _kin, material, search
+from pipeline.criticism.selection import Rung, _doubt, _kin, material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
+from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 LIBRARY = {
@@ -270,6 +271,41 @@ def test_beside_an_unknown_a_name_must_take_a_tenth_of_the_error(after, kept):
     rungs, left = trusted(segments, (first, second), totals)
     assert len(rungs) == kept
     assert {one.signal for one in left} >= {"torque_shaft_nm"}
+
+
+def missing_by(**spreads):
+    """A rung around which signals have these χ²/n in a hundred samples each, and no columns."""
+    model = Model(machine(), ())
+    none = np.zeros(len(own_columns(model)))
+    around = System(
+        columns=tuple(own_columns(model)),
+        residual=np.repeat(np.sqrt(list(spreads.values())), 100),
+        matrix=np.zeros((100 * len(spreads), none.size)),
+        group=np.repeat(np.arange(len(spreads)), 100),
+        window=np.tile(np.arange(100), len(spreads)),
+        unit=np.ones(100 * len(spreads)),
+        soft=np.ones(100 * len(spreads)),
+        whiten=np.ones(100 * len(spreads)),
+        labels=tuple((0, name, 0) for name in spreads),
+        penalty=none,
+        pull=none,
+        around=Fitted(model, dict(BASE), (), BASE),
+        tests=("drive",),
+        made_at=BASE,
+    )
+    return Rung((), around.around, around, ())
+
+
+@pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])
+def test_what_one_signal_gained_does_not_explain_another(speed, said):
+    """An offset of the angle that takes all the torque's error leaves a shaft that coasts too
+    short.
+    """
+    names = ("omega_mech_rad_s", "torque_shaft_nm")
+    left = [Remainder("one", name, 0, 9.0, 1.0) for name in names]
+    first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
+    last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
+    assert _explained((first, last), left) is said
 
 
 def test_an_unknown_drag_is_told_by_its_variable_and_curve():
