@@ -18,7 +18,8 @@ _SPEED_S = 0.002
 _TURN_RAD = 0.7
 _FINEST = 48
 _FINEST_LOG = 6
-_ANGLE_ROUNDS = 2
+_ANGLE_ROUNDS = 6
+_ANGLE_RAD = 1e-9
 _CRAWL = 1e-9
 
 
@@ -45,7 +46,9 @@ def operate(
     error = np.zeros(theta.size)
     for _ in range(_ANGLE_ROUNDS):
         nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
-        error = angle_error(nearer, model, values)
+        before, error = error, angle_error(nearer, model, values)
+        if np.abs(error - before).max(initial=0.0) < _ANGLE_RAD:
+            break
     true = theta - error / model.machine.pole_pairs
     omega = _speed(true, segment.ts_s, theta.size // segment.size)
     return _operating(

@@ -28,7 +28,7 @@ from pipeline.criticism.scores import (
     widened,
 )
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Fitted, System, own_columns, tolerances
+from pipeline.criticism.system import Fitted, System, floors, own_columns, tolerances
 
 TIE = 12.0
 _MOST = 6
@@ -74,9 +74,19 @@ def search(
         fitted, _ = _backward(segments, *chosen, base)
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))
+        if found and found[-1].hook == "sensor":
+            fitted = _heard_anew(segments, fitted)
         if tuple(e.name for e in found) in {r.added for r in rungs}:
             break
     return tuple(rungs)
+
+
+def _heard_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
+    """The fit by the noise floors that a sensor's effect leaves: to undo a lag, or a turn of the
+    currents, brings noise with it.
+    """
+    floor = floors(segments, fitted.model, fitted.values)
+    return gauss_newton(segments, replace(fitted, sigma=floor, near=fitted.values))[0]
 
 
 def _chosen(
