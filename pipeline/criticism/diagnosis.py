@@ -173,18 +173,19 @@ def trusted(
 
 
 def _explained(rungs: Sequence[Rung], left: Sequence[Remainder]) -> bool:
-    """Whether the effects found took most of the misfit of every signal that still misses.
+    """Whether the effects found took most of the misfit of the signals that still miss, and a tenth
+    at least of each one's own.
 
-    A signal in which a tenth of what all of these had is left of as much is not: an offset of the
-    angle that takes all the torque's error explains nothing of a shaft that coasts too short.
+    An offset of the angle that takes all the torque's error explains nothing of a shaft that coasts
+    too short. Signals that had less than a tenth of the misfit do not count alone.
     """
-    before = {name: _excess(rungs[0], {name}) for name in {r.signal for r in left}}
-    after = {name: _excess(rungs[-1], {name}) for name in before}
-    least = LEAST_SHARE * sum(before.values())
-    return all(
-        before[name] > 0.0 and after[name] < max(_EXPLAINED * before[name], least)
-        for name in before
+    signals = sorted({r.signal for r in left})
+    before, after = (
+        np.array([_excess(rung, {name}) for name in signals]) for rung in (rungs[0], rungs[-1])
     )
+    large = before > LEAST_SHARE * before.sum()
+    taken = bool((after[large] <= (1.0 - LEAST_SHARE) * before[large]).all())
+    return not left or (taken and float(after.sum()) < _EXPLAINED * float(before.sum()))
 
 
 def _verdict(

@@ -124,7 +124,8 @@ class Quadratic:
 def test_the_others_take_up_what_a_parameter_at_its_bound_cannot_do():
     """Windage may not be negative; Coulomb friction goes to its best value without it."""
     both = tuple(effects()[n] for n in ("coulomb_friction", "windage"))
-    model = Model(Machine(1, None, {"torque_nm": 1.0}), both)
+    scales = dict.fromkeys(("current_a", "voltage_v", "speed_rad_s", "torque_nm", "flux_wb"), 1.0)
+    model = Model(Machine(1, None, scales), both)
     columns = [Column("coulomb_friction.torque_nm", 1.0), Column("windage.drag_nm", 1.0)]
     a = np.array([[2.0, 1.5], [1.5, 2.0]])
     target, at = np.array([0.5, -0.3]), np.array([0.1, 0.0])
