@@ -117,6 +117,13 @@ def test_a_free_shaft_is_turned_by_the_mean_of_a_period(place, part):
     assert residual(held, PLAIN, {**BASE, "ripple_mean": part})[2, 200] == pytest.approx(told[0])
 
 
+def test_what_a_period_leaves_of_the_mean_current_is_within_what_is_known_of_it():
+    """From −1/24 to 1/12, wherever a log samples its period: no free constant."""
+    center, u = PLAIN.priors()["ripple_mean"]
+    assert all(abs(part - center) < 2.0 * u for part in (1 / 12, -1 / 24))
+    assert abs(0.3 - center) > 5.0 * u
+
+
 def test_the_noise_floor_is_the_scatter_over_seeds():
     """chi²/n of a sound machine is 1 in every signal, over 6 logs of fresh noise."""
     total: dict[str, list[float]] = {}

@@ -17,7 +17,7 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
-from pipeline.criticism.selection import Rung, _doubt, _kin, material, search
+from pipeline.criticism.selection import Rung, _doubt, _holds, _kin, material, search
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from pipeline.records.diagnosis import Remainder
@@ -306,6 +306,18 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
     first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
     last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
     assert _explained((first, last), left) is said
+
+
+@pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])
+def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept, monkeypatch):
+    """χ²/n of 3 where the forms found are wrong by all of it: no signal below its floor says that an
+    effect is there, and none above it.
+    """
+    wide, tried = (missing_by(torque_shaft_nm=q).around for q in (3.0, 0.2))
+    after = tried.spreads(tried.residual)
+    monkeypatch.setattr("pipeline.criticism.selection.held_out_spreads", lambda *_: after)
+    doubts = np.array([doubt]), np.array([doubt])
+    assert _holds(wide, np.array([3.0]), tried, (), (10.0, 10.0), doubts) is kept
 
 
 def test_an_unknown_drag_is_told_by_its_variable_and_curve():
