@@ -310,8 +310,8 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
 
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])
 def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept, monkeypatch):
-    """χ²/n of 3 where the forms found are wrong by all of it: no signal below its floor says that an
-    effect is there, and none above it.
+    """χ²/n of 3 that forms which are a little wrong may have made: neither a signal below its floor
+    nor one above says that an effect is there.
     """
     wide, tried = (missing_by(torque_shaft_nm=q).around for q in (3.0, 0.2))
     after = tried.spreads(tried.residual)
