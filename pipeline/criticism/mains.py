@@ -65,7 +65,8 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
     for segment in segments:
         spectrum = _Spectrum.of(segment)
-        if segment.weak is None or spectrum.duration_s * LINES_HZ[0] < _CYCLES:
+        long = spectrum.duration_s * LINES_HZ[0] >= _CYCLES
+        if segment.weak is None or not long or not spectrum.weight.any():
             continue
         lines = [
             f

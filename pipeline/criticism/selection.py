@@ -75,13 +75,13 @@ def search(
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))
         if found and found[-1].hook == "sensor":
-            fitted = _heard_anew(segments, fitted)
+            fitted = _floored_anew(segments, fitted)
         if tuple(e.name for e in found) in {r.added for r in rungs}:
             break
     return tuple(rungs)
 
 
-def _heard_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
+def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
     """The fit by the noise floors that a sensor's effect leaves: to undo a lag, or a turn of the
     currents, brings noise with it.
     """
