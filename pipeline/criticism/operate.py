@@ -18,8 +18,7 @@ _SPEED_S = 0.002
 _TURN_RAD = 0.7
 _FINEST = 48
 _FINEST_LOG = 6
-_ANGLE_ROUNDS = 6
-_ANGLE_RAD = 1e-9
+_ANGLE_ROUNDS = 2
 _CRAWL = 1e-9
 
 
@@ -46,9 +45,7 @@ def operate(
     error = np.zeros(theta.size)
     for _ in range(_ANGLE_ROUNDS):
         nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
-        before, error = error, angle_error(nearer, model, values)
-        if np.abs(error - before).max(initial=0.0) < _ANGLE_RAD:
-            break
+        error = angle_error(nearer, model, values)
     true = theta - error / model.machine.pole_pairs
     omega = _speed(true, segment.ts_s, theta.size // segment.size)
     return _operating(

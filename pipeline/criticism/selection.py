@@ -38,6 +38,7 @@ _HELD = 0.5
 _CLOSE = 0.7
 _KIN = 0.05
 _BESIDE = 3.0
+_OTHER_FLOOR = math.log(1.5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +83,14 @@ def search(
 
 
 def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
-    """The fit by the noise floors that a sensor's effect leaves: to undo a lag, or a turn of the
-    currents, brings noise with it.
+    """The fit by the noise floors that a sensor's effect leaves, where some are others by a half.
+
+    To undo a lag brings noise with it.
     """
     floor = floors(segments, fitted.model, fitted.values)
+    ratio = np.concatenate(floor) / np.concatenate(fitted.sigma)
+    if np.abs(np.log(ratio)).max() < _OTHER_FLOOR:
+        return fitted
     return gauss_newton(segments, replace(fitted, sigma=floor, near=fitted.values))[0]
 
 
