@@ -37,8 +37,6 @@ _FINER = 2
 _STEADY = 0.5
 _LARGEST = 0.01
 _EVEN = 0.02
-# residuals reach over their neighbours: those beside a gap in the log are of no equation
-_EDGE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,14 +158,13 @@ class _Spectrum:
 
     @classmethod
     def of(cls, segment: Segment) -> _Spectrum:
-        """Of the segment's own clock."""
+        """Of the segment's own clock; what is beside a gap is of no equation, and hardly counts."""
         time = clock(segment)
         place = np.rint((time - time[0]) / segment.ts_s).astype(np.int64)
         ends = [0, *(np.flatnonzero(np.diff(place) > 1) + 1).tolist(), place.size]
         weight = np.zeros(place.size)
         for first, last in pairwise(ends):
-            inner = slice(first + _EDGE * (first > 0), last - _EDGE * (last < place.size))
-            weight[inner] = np.hanning(max(inner.stop - inner.start, 0) + 2)[1:-1]
+            weight[first:last] = np.hanning(last - first + 2)[1:-1]
         runs = tuple(slice(*both) for both in pairwise(ends))
         weight *= np.hanning(int(place[-1]) + 3)[1:-1][place]
         return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight)

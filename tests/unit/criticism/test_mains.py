@@ -83,14 +83,26 @@ def test_hum_is_heard_in_a_thinned_log():
     assert hum.rms == pytest.approx(0.1, rel=0.3)
 
 
+def with_bump(one, middle_s, width_s):
+    """The log with 50 Hz in vq_v that comes and goes."""
+    time = np.arange(one.size) * one.ts_s
+    bump = np.exp(-0.5 * ((time - middle_s) / width_s) ** 2) * np.sin(2.0 * np.pi * 50.0 * time)
+    return replace(one, recorded={**one.recorded, "vq_v": one.recorded["vq_v"] + 0.1 * bump})
+
+
 def test_what_swells_with_the_recording_is_no_hum():
     """A line of no one size is the machine's: a fault that grows with speed or current."""
+    assert hum_of([with_bump(one, 0.1, 1.0) for one in logs()], PLAIN, BASE)
+    assert hum_of([with_bump(one, 0.1, 0.022) for one in logs()], PLAIN, BASE) == ()
+
+
+def test_what_every_step_of_a_test_begins_with_is_no_hum():
+    """Steps come at round rates; what is left of a current's settling comes at theirs."""
     made = []
     for one in logs():
-        time = np.arange(one.size) * one.ts_s
-        swell = np.exp(-0.5 * ((time - 0.1) / 0.01) ** 2) * np.sin(2.0 * np.pi * 50.0 * time)
-        signals = {**one.recorded, "vq_v": one.recorded["vq_v"] + 0.1 * swell}
-        made.append(replace(one, recorded=signals))
+        settling = 0.2 * np.exp(-(np.arange(one.size) % 400) / 40.0)
+        signals = {**one.recorded, "vq_v": one.recorded["vq_v"] + settling}
+        made.append(cut_to_windows(replace(one, recorded=signals), 50.0, 300))
     assert hum_of(made, PLAIN, BASE) == ()
 
 

@@ -17,7 +17,15 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
-from pipeline.criticism.selection import Rung, _doubt, _holds, _kin, material, search
+from pipeline.criticism.selection import (
+    Rung,
+    _doubt,
+    _floored_anew,
+    _holds,
+    _kin,
+    material,
+    search,
+)
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
 from pipeline.records.diagnosis import Remainder
@@ -306,6 +314,20 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
     first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
     last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
     assert _explained((first, last), left) is said
+
+
+@pytest.mark.parametrize(("lag_s", "anew"), [(2e-3, True), (1e-6, False)])
+def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
+    segments = (log(noise=1.0), log(noise=1.0, seed=6))
+    before = fitted(segments)
+    lagging = replace(
+        before,
+        model=before.model.with_effects(effects()["torque_lag"]),
+        values={**before.values, "torque_lag.lag_s": lag_s, "torque_lag.late": 0.0},
+    )
+    after = _floored_anew(segments, lagging)
+    assert (after.sigma is not before.sigma) is anew
+    assert bool(after.sigma[0][-1] > 2.0 * before.sigma[0][-1]) is anew
 
 
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.bounds import bounded_step
+from pipeline.criticism.bounds import bounded_step, limits_of
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model, values_of
@@ -119,6 +119,12 @@ class Quadratic:
             step: np.ndarray
 
         return End(-np.linalg.solve(part, slope[places]))
+
+
+def test_inertia_stops_short_of_nothing():
+    scales = dict.fromkeys(("current_a", "voltage_v", "speed_rad_s", "torque_nm", "flux_wb"), 2.0)
+    low, high = limits_of(Model(Machine(1, None, scales), ()))["j_kgm2"]
+    assert 0.0 < low < 1e-3 * scales["torque_nm"] / scales["speed_rad_s"] < high
 
 
 def test_the_others_take_up_what_a_parameter_at_its_bound_cannot_do():
