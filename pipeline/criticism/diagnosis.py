@@ -160,12 +160,14 @@ def trusted(
     """The ladder, and what is left over the floor at its end.
 
     Where that is structure that nothing here explains, the last rungs go that took less than a
-    tenth of the held-out error: beside an unknown, their names would be guesses.
+    tenth of the held-out error: beside an unknown, their names would be guesses. Where anything is
+    left, so does a further effect with which captures held out are predicted worse.
     """
     for count in range(len(rungs), 0, -1):
         kept, around = tuple(rungs[:count]), rungs[count - 1].around
         left = remainder(around, found, around.residual)
-        if count == 1 or _explained(kept, left):
+        worse = count > 2 and held[count - 1].total > held[count - 2].total
+        if count == 1 or not left or (_explained(kept, left) and not worse):
             break
         if held[count - 1].total < (1.0 - LEAST_SHARE) * held[count - 2].total:
             break

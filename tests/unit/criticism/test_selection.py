@@ -304,6 +304,15 @@ def missing_by(**spreads):
     return Rung((), around.around, around, ())
 
 
+@pytest.mark.parametrize(("after", "kept"), [(5.5, 2), (4.9, 3)])
+def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, kept, monkeypatch):
+    rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
+    over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
+    monkeypatch.setattr("pipeline.criticism.diagnosis.remainder", lambda *_: over)
+    totals = [HeldOut(rungs[0].around.residual, total) for total in (10.0, 5.0, after)]
+    assert len(trusted((), rungs, totals)[0]) == kept
+
+
 @pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])
 def test_what_one_signal_gained_does_not_explain_another(speed, said):
     """An offset of the angle that takes all the torque's error leaves a shaft that coasts too
