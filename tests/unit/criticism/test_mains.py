@@ -80,7 +80,7 @@ def test_hum_is_heard_in_a_thinned_log():
     recorded = [cut_to_windows(one, 33.0, 400) for one in long]
     (hum,) = hum_of(recorded, PLAIN, BASE)
     assert (hum.signal, hum.freq_hz) == ("vq_v", 50.0)
-    assert hum.rms == pytest.approx(0.1, rel=0.3)
+    assert hum.rms == pytest.approx(0.1, rel=0.02)
 
 
 def with_bump(one, middle_s, width_s):

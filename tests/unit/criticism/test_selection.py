@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.diagnosis import _explained, trusted
+from pipeline.criticism.diagnosis import trusted
 from pipeline.criticism.effect import Told
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.linearise import effect_columns
@@ -18,17 +18,14 @@ from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import rivals_of
 from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
 from pipeline.criticism.selection import (
-    Rung,
     _doubt,
     _floored_anew,
-    _holds,
     _kin,
     material,
     search,
 )
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
 from pipeline.criticism.unknown import unknown_structure
-from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 
 LIBRARY = {
@@ -281,50 +278,6 @@ def test_beside_an_unknown_a_name_must_take_a_tenth_of_the_error(after, kept):
     assert {one.signal for one in left} >= {"torque_shaft_nm"}
 
 
-def missing_by(**spreads):
-    """A rung around which signals have these χ²/n in a hundred samples each, and no columns."""
-    model = Model(machine(), ())
-    none = np.zeros(len(own_columns(model)))
-    around = System(
-        columns=tuple(own_columns(model)),
-        residual=np.repeat(np.sqrt(list(spreads.values())), 100),
-        matrix=np.zeros((100 * len(spreads), none.size)),
-        group=np.repeat(np.arange(len(spreads)), 100),
-        window=np.tile(np.arange(100), len(spreads)),
-        unit=np.ones(100 * len(spreads)),
-        soft=np.ones(100 * len(spreads)),
-        whiten=np.ones(100 * len(spreads)),
-        labels=tuple((0, name, 0) for name in spreads),
-        penalty=none,
-        pull=none,
-        around=Fitted(model, dict(BASE), (), BASE),
-        tests=("drive",),
-        made_at=BASE,
-    )
-    return Rung((), around.around, around, ())
-
-
-@pytest.mark.parametrize(("after", "kept"), [(5.5, 2), (4.9, 3)])
-def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, kept, monkeypatch):
-    rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
-    over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.diagnosis.remainder", lambda *_: over)
-    totals = [HeldOut(rungs[0].around.residual, total) for total in (10.0, 5.0, after)]
-    assert len(trusted((), rungs, totals)[0]) == kept
-
-
-@pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])
-def test_what_one_signal_gained_does_not_explain_another(speed, said):
-    """An offset of the angle that takes all the torque's error leaves a shaft that coasts too
-    short.
-    """
-    names = ("omega_mech_rad_s", "torque_shaft_nm")
-    left = [Remainder("one", name, 0, 9.0, 1.0) for name in names]
-    first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
-    last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
-    assert _explained((first, last), left) is said
-
-
 @pytest.mark.parametrize(("lag_s", "anew"), [(2e-3, True), (1e-6, False)])
 def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
     segments = (log(noise=1.0), log(noise=1.0, seed=6))
@@ -337,18 +290,6 @@ def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
     after = _floored_anew(segments, lagging)
     assert (after.sigma is not before.sigma) is anew
     assert bool(after.sigma[0][-1] > 2.0 * before.sigma[0][-1]) is anew
-
-
-@pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])
-def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept, monkeypatch):
-    """χ²/n of 3 that forms which are a little wrong may have made: neither a signal below its floor
-    nor one above says that an effect is there.
-    """
-    wide, tried = (missing_by(torque_shaft_nm=q).around for q in (3.0, 0.2))
-    after = tried.spreads(tried.residual)
-    monkeypatch.setattr("pipeline.criticism.selection.held_out_spreads", lambda *_: after)
-    doubts = np.array([doubt]), np.array([doubt])
-    assert _holds(wide, np.array([3.0]), tried, (), (10.0, 10.0), doubts) is kept
 
 
 def test_an_unknown_drag_is_told_by_its_variable_and_curve():
