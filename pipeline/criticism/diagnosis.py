@@ -17,10 +17,10 @@ from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
-from pipeline.criticism.scores import LEAST_SHARE, Candidate, Score, candidates
+from pipeline.criticism.scores import LEAST_SHARE, TIE, Candidate, Score, candidates
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.segments import segments
-from pipeline.criticism.selection import TIE, Rung, loss_without, search
+from pipeline.criticism.segments import TESTS, segments
+from pipeline.criticism.selection import Rung, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import Fitted, own_columns
@@ -42,6 +42,10 @@ _WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at mos
 _STATELESS = (
     "no state of the machine predicts what is left in captures it was not fitted to: see the "
     "remainder, and whether anything was changed between the captures"
+)
+_WITHIN = (
+    "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
+    "capture shows it: whatever changes as slowly looks the same; record that test once more"
 )
 _SEEN = 3.0
 _EXPLAINED = 0.5
@@ -71,6 +75,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         found = calm
         rungs, held, left = _climbed(found, gauss_newton(found, start_fit.fitted)[0], library)
         sketch = _unknown(found, rungs, left, stem)
+    within = None if sketch else _unknown(found, rungs, left, stem, in_parts=True)
+    sketch = sketch or within
     last = rungs[-1]
     offered = candidates(library, last.fitted)
     missing = last.added
@@ -87,13 +93,23 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         sketch if verdict == "unknown" else None,
         left,
         (
+            *_unused(campaign, found),
             *told_hum(start_fit.hum),
             *(() if calm is None else (_WANDER,)),
+            *(() if within is None else (_WITHIN,)),
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
             *(_wanted(library[name]) for name in unseen),
         ),
     )
+
+
+def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
+    """A note of the captures that no equation could use, none where all are used."""
+    used = {segment.capture for segment in found}
+    idle = [c.path for c in campaign.captures if c.path not in used and c.meta.test in TESTS]
+    words = "without the signals of their test's equation, or an even stretch of samples"
+    return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
 
 
 def _climbed(
@@ -134,7 +150,11 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
 
 
 def _unknown(
-    found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder], name: str
+    found: Sequence[Segment],
+    rungs: Sequence[Rung],
+    left: Sequence[Remainder],
+    name: str,
+    in_parts: bool = False,
 ) -> UnknownStructure | None:
     """What the structure depends on that no effect explains; None where there is none, or where
     nothing that the machine does predicts it.
@@ -143,7 +163,7 @@ def _unknown(
         return None
     last = rungs[-1]
     signals = list(dict.fromkeys(r.signal for r in left))
-    return unknown_structure(found, last.fitted, signals, last.around, name)[0]
+    return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]
 
 
 def _excess(rung: Rung, channels: set[str]) -> float:

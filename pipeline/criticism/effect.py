@@ -121,6 +121,7 @@ class Operating:
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
     held: bool = False
+    finer: int = 1
     run: NDArray[np.int64] | None = None
     runs_rad: Array | None = None
     kept: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
@@ -142,7 +143,9 @@ class Operating:
         """Cosine and sine of `order` times the shaft angle [n], as a sample's torque has them.
 
         A free shaft's torque is told by the second difference of its angle, which is a mean under a
-        triangle of two samples: sinc² of the half turn of the wave in one.
+        triangle of two samples: sinc² of the half turn of the wave in one. Of a coasting shaft that
+        mean is taken over `finer` points a sample, and each has the mean of its own part: a wave
+        that turns many times from point to point would beat with them.
         """
         name = ("shaft", order, self.held)
         waves: tuple[Array, Array] = self.once(self.theta_rad, name, lambda: self._turned(order))
@@ -150,9 +153,10 @@ class Operating:
 
     def _turned(self, order: int) -> tuple[Array, Array]:
         angle = order * self.theta_rad
-        if self.held or not self.inverter or angle.size < _NEIGHBOURS:
+        power = 2 if self.inverter else 1
+        if self.held or (power == 1 and self.finer == 1) or angle.size < _NEIGHBOURS:
             return np.cos(angle), np.sin(angle)
-        seen = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** 2
+        seen = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** power
         return seen * np.cos(angle), seen * np.sin(angle)
 
     def one_sample(self) -> Operating:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pipeline.criticism.ports import Port
 from pipeline.criticism.sketch import Expression
-from pipeline.criticism.terms import POWER, Term
+from pipeline.criticism.terms import CENTRED, POWER, Term
 
 _SUFFIX = {"torque": "nm", "drop": "v", "flux": "wb"}
 _REACH = 30.0
@@ -87,7 +87,7 @@ def _summand(port: Port, n: int, term: Term, current_a: float) -> str:
         d, q = port.monomials[term.order]
         return f"{amplitude} * {current_a:.6g} * d**{d} * i**{q}"
     scale = f'q["{_scale(port, n)}"]' if "scale" in term.free else f"{term.scale:.6g}"
-    centre = f'q["centre{n + 1}_rad"]'
+    centre = f'q["{_centre(port, n)}"]'
     carrier = port.carriers[term.carrier].code
     times = "" if carrier == "1.0" else f" * ({carrier})"
     return f"{amplitude}{times} * {term.code(scale, centre)}"
@@ -100,6 +100,11 @@ def _amplitude(port: Port, n: int) -> str:
 def _scale(port: Port, n: int) -> str:
     unit = "" if port.variable is None else port.variable.unit
     return f"scale{n + 1}_{unit.replace('/', '_').lower()}"
+
+
+def _centre(port: Port, n: int) -> str:
+    unit = "rad" if port.variable is None else port.variable.unit
+    return f"centre{n + 1}_{unit.replace('/', '_').lower()}"
 
 
 def _effect(port: Port, found: Expression, name: str, shape: str) -> Iterator[str]:
@@ -127,10 +132,14 @@ def _parameters(port: Port, n: int, term: Term, amplitude: float) -> Iterator[st
         f"{_STEP * size:.4g}, low=-{reach:.4g}, high={reach:.4g}),"
     )
     if "centre" in term.free:
-        start = f"{term.centre % (2 * math.pi):.6g}"
+        turning = term.kind not in CENTRED
+        start = term.centre % (2 * math.pi) if turning else term.centre
+        least = 0.001 if turning else 0.0
+        low, high = (-7.0, 14.0) if turning else (0.0, _REACH * start)
+        unit = "rad" if port.variable is None else port.variable.unit
         yield (
-            f'        Parameter("centre{n + 1}_rad", "rad", 1.0, 0.001, low=-7.0, high=14.0, '
-            f"scan=({start},)),"
+            f"        Parameter({_quoted(_centre(port, n))}, {_quoted(unit)}, 1.0, {least:g}, "
+            f"low={low:.4g}, high={high:.4g}, scan=({start:.6g},)),"
         )
     if "scale" in term.free and port.variable is not None:
         low, high = term.scale / _REACH, term.scale * _REACH

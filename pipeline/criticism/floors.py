@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.model import Model, zero
-from pipeline.criticism.noise import rounding_error
+from pipeline.criticism.noise import rounding_error, unrounded
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import Segment, projected, row_index
 
 _REPLICATES = 2
+_SHIFTS = 16
 _POOLED = 128
 _ALLOWANCE = 5e-5
 _MODEL_DRIVE = 1e-4
@@ -31,20 +32,27 @@ _WHEN = 0.25
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
     """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
 
-    White noise of each sensor's own level, and the rounding of an angle that is rounded, is added
-    to the recording and the residual computed again; the variance of the change is pooled over
-    windows of one (channel, order).
+    White noise of each sensor's own level, and the rounding of an angle that is rounded and of
+    signals that are coarse, is added to the recording and the residual computed again; the variance
+    of the change is pooled over windows of one (channel, order).
     """
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
     wanted = _POOLED // max(int(valid.sum()) // max(len(groups), 1), 1)
-    for replicate in range(min(max(wanted, _REPLICATES), _POOLED)):
+    replicates = min(max(wanted, _REPLICATES), _POOLED)
+    if segment.steps:
+        replicates = max(replicates, _SHIFTS)
+    shifts = _shifts(segment, replicates, seed)
+    smooth = {name: unrounded(segment.recorded[name], q) for name, q in segment.steps.items()}
+    for replicate in range(replicates):
         generator = np.random.default_rng([seed, replicate])
         noisy = {
-            name: column + generator.normal(0.0, segment.noise.get(name, 0.0), column.size)
+            name: column + generator.normal(0.0, _white(segment, name), column.size)
             for name, column in segment.recorded.items()
         }
+        for name, step in segment.steps.items():
+            noisy[name] += rounding_error(smooth[name], step, shifts[name][replicate])
         if segment.angle_step_rad:
             theta = segment.recorded["theta_mech_rad"]
             shift = generator.uniform(-0.5, 0.5)
@@ -53,6 +61,23 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
     return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
+
+
+def _white(segment: Segment, name: str) -> float:
+    """Standard deviation of a column's noise, without the rounding that follows the signal."""
+    rounding = segment.steps.get(name, 0.0) / math.sqrt(12.0)
+    return math.sqrt(max(segment.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
+
+
+def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
+    """Parts of a step [count] by which coarse signals are moved to be rounded anew.
+
+    Evenly spread, since of a steady signal a shift is all that its error hangs on, and in an order
+    of each signal's own.
+    """
+    even = (np.arange(count) + 0.5) / count - 0.5
+    generator = np.random.default_rng([seed, count])
+    return {name: generator.permutation(even) for name in segment.steps}
 
 
 def rough_floor(segment: Segment, model: Model, values: Values) -> Array:

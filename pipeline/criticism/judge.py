@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -98,8 +98,12 @@ def held_out_spreads(around: System, own: int, segments: Sequence[Segment] = ())
     """χ²/n [G] of every group, each capture predicted from all the others along the first `own`
     columns; captures that are always in the fit count as fitted.
     """
-    held = leave_out(around, own, segments).residual
-    return around.spreads(np.where(np.isfinite(held), held, around.residual))
+    return predicted_spreads(around, leave_out(around, own, segments))
+
+
+def predicted_spreads(around: System, held: HeldOut) -> Array:
+    """χ²/n [G] of every group as `held` out; captures that are always in the fit as fitted."""
+    return around.spreads(np.where(np.isfinite(held.residual), held.residual, around.residual))
 
 
 def _units(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
@@ -151,18 +155,37 @@ def remainder(
     error below a two-thousandth of the machine's voltage or torque is nobody's concern.
     """
     found = []
-    spreads, counts = around.spreads(residual / around.soft), around.counts
-    for place, (number, channel, order) in enumerate(around.labels):
+    for place, chi2_per_n, size in _over(around, segments, residual, around.soft):
+        number, channel, order = around.labels[place]
+        found.append(Remainder(segments[number].capture, channel, order, chi2_per_n, size))
+    return tuple(sorted(found, key=lambda r: (-r.chi2_per_n, r.capture, r.signal, r.order)))
+
+
+def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_]:
+    """Groups [G] that a fit leaves over their floor as `remainder` has it, but with what the forms
+    of effects found may be wrong by in that floor.
+    """
+    told = np.zeros(len(around.labels), dtype=bool)
+    as_whitened = np.ones(around.size)
+    told[[place for place, _, _ in _over(around, segments, around.residual, as_whitened)]] = True
+    return told
+
+
+def _over(
+    around: System, segments: Sequence[Segment], residual: Array, soft: Array
+) -> Iterator[tuple[int, float, float]]:
+    """Place, χ²/n and size of every group over a floor that is `soft` [R] of what rows are over."""
+    spreads, counts = around.spreads(residual / soft), around.counts
+    for place, (number, channel, _) in enumerate(around.labels):
         n, q = counts[place], spreads[place]
         if n == 0 or q <= 1.0 + max(_OVER, 5.0 * math.sqrt(2.0 / n)):
             continue
         mine = around.group == place
-        unit = float(((around.unit * around.soft)[mine] ** 2).mean())
+        unit = float(((around.unit * soft)[mine] ** 2).mean())
         more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
         if size > material_size(segments[number], channel, around):
-            found.append(Remainder(segments[number].capture, channel, order, float(q), size))
-    return tuple(sorted(found, key=lambda r: (-r.chi2_per_n, r.capture, r.signal, r.order)))
+            yield place, float(q), size
 
 
 def material_size(segment: Segment, channel: str, around: System) -> float:

@@ -15,6 +15,13 @@ _LOOKED_AT = 2000
 _STEPS = 600
 _TOGETHER = 0.5
 _SNAP = 0.06
+_FLOATING = 1e-9
+_WHOLE = 0.05
+_MOSTLY = 0.95
+# steps over noise, rounding in it, where the noise itself is 0.45 steps
+_UNDITHERED = (0.45**2 + 1.0 / 12.0) ** -0.5
+_MOVING = 16.0
+_IN_STEP = 0.9
 _QUIET = (0.3, -0.5244)
 _STEADY = (0.6, 0.2533)
 
@@ -45,6 +52,46 @@ def sensor_noise(signal: Array, steady: bool = False) -> float:
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 
+def resolution(signal: Array) -> float:
+    """The step that a signal's values [n] are whole multiples of, from their least distance; 0
+    where there is none.
+    """
+    gaps = np.diff(np.unique(signal))
+    # what floating point makes of equal numbers is no step
+    gaps = gaps[gaps > _FLOATING * np.abs(signal).max(initial=0.0)]
+    if gaps.size == 0:
+        return 0.0
+    steps = gaps / gaps.min()
+    whole = np.abs(steps - np.round(steps)) < _WHOLE
+    return float(gaps.min()) if whole.mean() > _MOSTLY else 0.0
+
+
+def coarse_step(signal: Array, sigma: float) -> float:
+    """The resolution of a signal that its noise does not dither, else 0; `sigma` with rounding.
+
+    Noise below 0.45 steps leaves a part of the rounding error that follows the signal, and does not
+    average out. Reference: Widrow & Kollar, Quantization Noise (2008), ch. 19.
+    """
+    step = resolution(signal)
+    return step if step > _UNDITHERED * sigma else 0.0
+
+
+def unrounded(signal: Array, step: float) -> Array:
+    """What a slow signal [n] may have been before it was rounded: straight from one change of a
+    single step to the next, where it stood half way between; as it is around larger changes.
+    """
+    change = np.diff(signal)
+    at = np.flatnonzero(change)
+    single = np.abs(change[at]) < 1.5 * step
+    slow, far = at[single], at[~single]
+    known = np.concatenate([slow + 0.5, far, far + 1.0, [0.0, signal.size - 1.0]])
+    middle = 0.5 * (signal[slow] + signal[slow + 1])
+    level = np.concatenate([middle, signal[far], signal[far + 1], signal[[0, -1]]])
+    order = np.argsort(known, kind="stable")
+    found: Array = np.interp(np.arange(signal.size), known[order], level[order])
+    return found
+
+
 def rounding_error(signal: Array, step: float, shift: float) -> Array:
     """What rounding to multiples of `step` does to a signal [n] like this one [its unit].
 
@@ -65,9 +112,11 @@ def rounding_step(signal: Array) -> float:
     together at the right q, even where a number format has rounded it once more.
     """
     third = np.diff(signal, 3)
+    if third.size < _BLOCK:
+        return 0.0
     third = third[np.abs(third) < _BURST * np.median(np.abs(third)) + 1e-300]
     spread = float(np.sqrt((third**2).mean())) if third.size >= _BLOCK else 0.0
-    if spread == 0.0:
+    if spread <= _FLOATING * float(np.abs(signal).max()):
         return 0.0
     sample = third[:: max(third.size // _LOOKED_AT, 1)]
     steps = np.geomspace(0.25 * spread, 2.0 * spread, _STEPS)
@@ -83,6 +132,13 @@ def rounding_step(signal: Array) -> float:
     # an encoder has 2^n steps a turn, or 4 times its lines
     bits = math.log2(2.0 * math.pi / step)
     return 2.0 * math.pi / 2.0 ** round(bits) if abs(bits - round(bits)) < _SNAP else step
+
+
+def is_rounded(signal: Array, step: float) -> bool:
+    """Whether a moving signal's values are whole multiples of a step, but for a common offset."""
+    if step <= 0.0 or float(np.ptp(signal)) < _MOVING * step:
+        return False
+    return abs(complex(np.exp(2j * np.pi / step * signal).mean())) > _IN_STEP
 
 
 def _rounding(third: Array) -> float:

@@ -111,6 +111,7 @@ def _operating(
         ts_s=segment.ts_s,
         freq_hz=freq,
         held=segment.test == "torque_map",
+        finer=theta.size // segment.size,
     )
 
 

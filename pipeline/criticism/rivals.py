@@ -10,9 +10,9 @@ import numpy as np
 from pipeline.criticism.closer import kin, told_by_wholes
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.scores import Candidate
+from pipeline.criticism.scores import TIE, Candidate
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.selection import TIE, loss_without, material
+from pipeline.criticism.selection import loss_without, shaped
 from pipeline.criticism.system import Fitted, System, own_columns
 
 _NEAR = 0.5
@@ -69,12 +69,12 @@ def rivals_of(
 def _refitted(
     name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment], wide: System
 ) -> System | None:
-    """The system with a candidate in an effect's place; None where it comes out negligible."""
+    """The system with a candidate in an effect's place; None without a shape to speak of."""
     model = fitted.model.without(name).with_effects(candidate.effect)
     kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{name}.")}
     start = replace(fitted, model=model, values={**kept, **candidate.values})
     swapped, around = gauss_newton(segments, start, before=wide)
-    return around if material(swapped, candidate.effect) else None
+    return around if shaped(swapped, candidate.effect) else None
 
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:

@@ -22,9 +22,11 @@ from pipeline.criticism.model import zero
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted, System, own_columns, system
 
+TIE = 12.0
 LEAST_SHARE = 0.1
 WORTH = 30.0
 _CLEAR = 0.5
+_MOST_OF = 0.5
 _GLANCE = ((1.0,), 3)
 THOROUGH = ((1.0, 0.0), 20)
 _PROMISING = 0.3
@@ -49,6 +51,9 @@ class Score:
     parameters, `moves` how the model's own move with it, `share` the part of the removable excess
     of the channel it helps most, `size` the largest of its amplitudes over its negligible size,
     `quiet` the part of the fall in signals that have nothing over their floor to take a share of.
+    `clears`: it takes most of what would be told as a remainder without it, and so matters at any
+    size; no coupling, which noise of an encoder in a speed loop looks like. `shadow` names an
+    effect that explains the same better, but is too small to matter.
     """
 
     candidate: Candidate
@@ -59,6 +64,13 @@ class Score:
     share: float
     size: float
     quiet: float = 0.0
+    clears: bool = False
+    shadow: str | None = None
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is as large as anybody would act on, or what would be left without it is."""
+        return self.size >= 1.0 or self.clears
 
     @property
     def passes(self) -> bool:
@@ -72,7 +84,7 @@ class Score:
         effect = self.candidate.effect
         below = self._below_floor and effect.hook != "sensor" and effect.closer is None
         helps = self.share >= LEAST_SHARE or below
-        return self.fall > self.price and self.size >= 1.0 and helps
+        return self.fall > self.price and self.matters and helps and self.shadow is None
 
     @property
     def _below_floor(self) -> bool:
@@ -83,8 +95,10 @@ class Score:
         """What it lacks to be named; of one that passes, that a refit did not bear it out."""
         if self.fall <= self.price:
             return "not worth its parameters"
-        if self.size < 1.0:
+        if not self.matters:
             return f"seen, at {self.size:.2g} of the least size that matters"
+        if self.shadow is not None:
+            return f"{self.shadow} explains it better, and is too small to matter"
         if self.passes:
             return "did not hold on captures held out"
         if self._below_floor:
@@ -144,26 +158,33 @@ def widened(
     return system(segments, fitted, columns, before)
 
 
-def score_all(around: System, fitted: Fitted, offered: Sequence[Candidate]) -> tuple[Score, ...]:
-    """Every candidate's score, the best fall first; of one effect the best shape only."""
-    own = np.arange(len(own_columns(fitted.model)))
-    grams = around.grams()
-    before = Standing.of(around, own, grams.along(own).best())
+def score_all(
+    around: System,
+    fitted: Fitted,
+    offered: Sequence[Candidate],
+    told: NDArray[np.bool_] | None = None,
+) -> tuple[Score, ...]:
+    """Every candidate's score, the best fall first; of one effect the best shape only.
+
+    `told` [G] are groups that would be told as a remainder if nothing were added.
+    """
+    by = _Scoring.of(around, fitted, told)
     price = math.log(float(around.size))
     search_price = 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
-    best: dict[str, Score] = {}
-    first = own.size
+    best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
+    first = by.own.size
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        score = _score(around, grams, fitted, own, places, candidate, before, _GLANCE)
+        score = by.score(candidate, places, _GLANCE)
         cost = paid_for(candidate.effect, fitted.model.machine, score) * price + search_price
         if score is not None and score.fall > _PROMISING * cost:
-            score = _score(around, grams, fitted, own, places, candidate, before, THOROUGH)
+            score = by.score(candidate, places, THOROUGH)
         known = best.get(candidate.effect.name)
-        if score is not None and (known is None or score.fall > known.fall):
-            best[candidate.effect.name] = replace(score, price=cost)
-    return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
+        if score is not None and (known is None or score.fall > known[0].fall):
+            best[candidate.effect.name] = replace(score, price=cost), places
+    found = [replace(one, shadow=by.shadow(one, best)) for one, _ in best.values()]
+    return tuple(sorted(found, key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
 def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
@@ -176,50 +197,107 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
     )
 
 
-def _score(
-    around: System,
-    grams: Grams,
-    fitted: Fitted,
-    own: NDArray[np.int64],
-    places: NDArray[np.int64],
-    candidate: Candidate,
-    before: Standing,
-    effort: tuple[tuple[float, ...], int],
-) -> Score | None:
-    """Score of one candidate with parameters on the wrong side of a bound left at zero."""
-    machine = fitted.model.machine
-    known = {
-        f"{candidate.effect.name}.{p.name}": (p, machine.scale(p))
-        for p in candidate.effect.parameters_of(machine)
-    }
-    live = places
-    while live.size:
-        end = grams.along(np.concatenate([own, live])).best(*effort)
-        mine = dict(
-            zip((around.columns[n].name for n in live), end.step[own.size :].tolist(), strict=True)
-        )
-        wrong = [
-            n
-            for n in live
-            if _outside(mine[around.columns[n].name], known[around.columns[n].name][0])
+@dataclass(frozen=True, slots=True)
+class _Scoring:
+    """What every candidate is held against: a system, the model's own columns in it and how these
+    alone fit, groups [G] that are then told as a remainder.
+    """
+
+    around: System
+    grams: Grams
+    fitted: Fitted
+    own: NDArray[np.int64]
+    before: Standing
+    told: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, around: System, fitted: Fitted, told: NDArray[np.bool_] | None) -> _Scoring:
+        own, grams = np.arange(len(own_columns(fitted.model))), around.grams()
+        before = Standing.of(around, own, grams.along(own).best())
+        left = np.zeros(len(around.labels), dtype=bool) if told is None else told
+        return cls(around, grams, fitted, own, before, left)
+
+    def score(
+        self,
+        candidate: Candidate,
+        places: NDArray[np.int64],
+        effort: tuple[tuple[float, ...], int],
+    ) -> Score | None:
+        """Score of one candidate with parameters on the wrong side of a bound left at zero."""
+        around, machine = self.around, self.fitted.model.machine
+        known = {
+            f"{candidate.effect.name}.{p.name}": (p, machine.scale(p))
+            for p in candidate.effect.parameters_of(machine)
+        }
+        live = places
+        while live.size:
+            end = self.grams.along(np.concatenate([self.own, live])).best(*effort)
+            steps = end.step[self.own.size :].tolist()
+            mine = dict(zip((around.columns[n].name for n in live), steps, strict=True))
+            wrong = [
+                n
+                for n in live
+                if _outside(mine[around.columns[n].name], known[around.columns[n].name][0])
+            ]
+            if not wrong:
+                break
+            live = np.array([n for n in live if n not in wrong], dtype=int)
+        if live.size == 0:
+            return None
+        sizes = [
+            abs(value) / (known[name][0].negligible * known[name][1])
+            for name, value in mine.items()
+            if known[name][0].negligible > 0
         ]
-        if not wrong:
-            break
-        live = np.array([n for n in live if n not in wrong], dtype=int)
-    if live.size == 0:
-        return None
-    sizes = [
-        abs(value) / (known[name][0].negligible * known[name][1])
-        for name, value in mine.items()
-        if known[name][0].negligible > 0
-    ]
-    after = Standing.of(around, np.concatenate([own, live]), end)
-    fall = before.misfit - after.misfit
-    share = _share(around, candidate.effect, before, after)
-    names = (around.columns[n].name for n in own)
-    moves = dict(zip(names, end.step[: own.size].tolist(), strict=True))
-    quiet = quiet_fall(around, before.spreads, after.spreads)
-    return Score(candidate, fall, 0.0, mine, moves, share, max(sizes, default=math.inf), quiet)
+        after = Standing.of(around, np.concatenate([self.own, live]), end)
+        names = (around.columns[n].name for n in self.own)
+        return Score(
+            candidate,
+            self.before.misfit - after.misfit,
+            0.0,
+            mine,
+            dict(zip(names, end.step[: self.own.size].tolist(), strict=True)),
+            _share(around, candidate.effect, self.before, after),
+            max(sizes, default=math.inf),
+            quiet_fall(around, self.before.spreads, after.spreads),
+            candidate.effect.closer is None
+            and clears(around.counts, self.told, self.before.spreads, after.spreads),
+        )
+
+    def shadow(
+        self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
+    ) -> str | None:
+        """The clearest effect that explains what a candidate does better, at a size too small to
+        matter, and beside which the candidate is not worth its price.
+
+        A loss that is too small to be told must not be told under a wrong name.
+        """
+        if not score.passes:
+            return None
+        small = [
+            (other, places)
+            for other, places in best.values()
+            if not other.matters
+            and other.fall > other.price
+            and other.fall > score.fall + TIE
+            and other.candidate.effect.closer is None
+        ]
+        if not small:
+            return None
+        clearest, beside = max(small, key=lambda pair: pair[0].fall)
+        _, mine = best[score.candidate.effect.name]
+        without = self.grams.along(np.concatenate([self.own, beside])).best(*THOROUGH)
+        both = self.grams.along(np.concatenate([self.own, beside, mine])).best(*THOROUGH)
+        worth = without.misfit - both.misfit > score.price
+        return None if worth else clearest.candidate.effect.name
+
+
+def clears(counts: Array, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
+    """Whether most of the power over the floor goes, between two sets of χ²/n [G], of the groups
+    that are `told` [G] as a remainder.
+    """
+    over, left = (counts * np.maximum(spreads - 1.0, 0.0) for spreads in (before, after))
+    return bool(told.any()) and float(left[told].sum()) < _MOST_OF * float(over[told].sum())
 
 
 def _outside(value: float, parameter: Parameter) -> bool:

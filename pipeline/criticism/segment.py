@@ -22,6 +22,17 @@ _REFERENCE_DEGC = 25.0
 
 
 @dataclass(frozen=True, slots=True)
+class Sensors:
+    """What a recording says of its sensors: `noise` of every column, its rounding in it; `steps` of
+    the columns that are rounded too coarsely for their noise to dither; the shaft's runs.
+    """
+
+    noise: Mapping[str, float]
+    steps: Mapping[str, float] = field(default_factory=dict)
+    runs_rad: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Segment:
     """One capture's signals [n] for one kind of equation, with its weak form.
 
@@ -35,7 +46,8 @@ class Segment:
     capture may have; `runs_rad` the angles turned between reversals, of which the column `run`
     numbers the one at hand; `lines` [K, C, W, M] are weak samples of the mains lines, and of the
     wander of sensors, that there may be; `whole` are the columns of a drive log before it was
-    thinned, with `good`, the samples that were recorded well.
+    thinned, with `good`, the samples that were recorded well; `steps` the resolution of columns
+    whose rounding error follows the signal.
     """
 
     capture: str
@@ -56,6 +68,7 @@ class Segment:
     runs_rad: Array | None = None
     lines: Array | None = None
     whole: Mapping[str, Array] | None = None
+    steps: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -69,12 +82,11 @@ def segment_of(
     instrument: str,
     period: float,
     found: Mapping[str, Array],
-    noise: Mapping[str, float],
+    sensors: Sensors,
     channels: tuple[str, ...],
     weak: Projection | None,
     blocks: NDArray[np.int64] | None = None,
     offsets: Array | None = None,
-    runs_rad: Array | None = None,
     **fixed: float,
 ) -> Segment:
     """A segment with what the capture's metadata says of it."""
@@ -89,7 +101,7 @@ def segment_of(
         timing,
         period,
         found,
-        noise,
+        sensors.noise,
         channels,
         weak,
         {"ambient_k": ambient, **fixed},
@@ -97,7 +109,8 @@ def segment_of(
         rounding_step(found["theta_mech_rad"]) if "theta_mech_rad" in found else 0.0,
         blocks,
         offsets,
-        runs_rad,
+        sensors.runs_rad,
+        steps=sensors.steps,
     )
 
 

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.noise import sensor_noise
-from pipeline.criticism.segment import Segment, electrical_orders, segment_of, slow_orders
+from pipeline.criticism.noise import is_rounded, sensor_noise
+from pipeline.criticism.segment import Segment, Sensors, electrical_orders, segment_of, slow_orders
 from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
 from pipeline.criticism.segments_table import flux_table
 from pipeline.criticism.traces import (
     PAD,
     SMOOTHED,
+    coarse_steps,
     decimated,
     even_angle,
     even_clock,
@@ -40,29 +42,28 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     """Every usable capture as a segment, in path order; a capture that lacks what its test's
     equation needs is left out.
     """
-    makers = {
-        "torque_map": _dq,
-        "drive": _drive,
-        "heat_run": _dq,
-        "cogging": _shaft,
-        "spin_down": _shaft,
-        "open_circuit": _open,
-        "resistance": _terminal,
-        "current_step": _terminal,
-        "lcr": _lcr,
-        "flux_map": flux_table,
-        "holding_current": standing,
-    }
     made: list[Segment] = []
     for capture in campaign.captures:
-        maker = makers.get(capture.meta.test)
+        maker = _MAKERS.get(capture.meta.test)
         found = None if maker is None else maker(capture, machine)
         parts = found if isinstance(found, tuple) else (found,)
-        made += [s for s in parts if s is not None and (s.weak is None or s.weak.starts.size)]
+        usable = (s for s in parts if s is not None and (s.weak is None or s.weak.starts.size))
+        made += [_by_encoder(s, machine.encoder_rad) for s in usable]
     if any(segment.kind == "dq" for segment in made):
         # there are captures to predict a table from as a whole
         made = [replace(s, blocks=None) if s.kind == "flux_map" else s for s in made]
     return tuple(made)
+
+
+def _by_encoder(segment: Segment, step: float) -> Segment:
+    """The segment with the step of the encoder that drive logs show, where its angle is in such.
+
+    A shaft that turns by nearly whole steps a sample does not show them itself, and its rounding is
+    then periodic in the angle, as an electrical order is.
+    """
+    theta = segment.recorded.get("theta_mech_rad")
+    known = theta is not None and is_rounded(theta, step)
+    return replace(segment, angle_step_rad=step) if known else segment
 
 
 def sparse(segment: Segment) -> Segment:
@@ -107,17 +108,19 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     size = found["vd_v"].size
     window = window_of(period, size)
     orders = electrical_orders(machine) if turned > 0.1 else ()
-    noise, runs = prepared(found, period)
+    told = prepared(found, period)
     if capture.meta.test == "torque_map":
+        noise = dict(told.noise)
         noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
         even_angle(found, noise, window)
+        told = replace(told, noise=noise)
     most = _WINDOWS if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
     whole = {**found, "good": keep.astype(float)} if logged else None
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
-    made = segment_of(capture, "dq", "drive", period, found, noise, channels, weak, runs_rad=runs)
+    made = segment_of(capture, "dq", "drive", period, found, told, channels, weak)
     return replace(made, whole=whole)
 
 
@@ -135,11 +138,9 @@ def _shaft(capture: Capture, machine: Machine) -> Segment | None:
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, found, keep, channel)
     window = window_of(period, keep.size)
-    noise, runs = prepared(found, period)
+    told = prepared(found, period)
     weak = projection(found["theta_mech_rad"], window_starts(keep, window), window, ())
-    return segment_of(
-        capture, "shaft", "bench", period, found, noise, (channel,), weak, runs_rad=runs
-    )
+    return segment_of(capture, "shaft", "bench", period, found, told, (channel,), weak)
 
 
 def _slow_turn(
@@ -157,9 +158,10 @@ def _slow_turn(
         return None
     factor = max(int(theta.size / turns / (24 * max(orders))), 1)
     noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
+    steps = coarse_steps(found, noise)
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
     found = {name: decimated(column, factor) for name, column in found.items()}
-    runs = with_travel(found, noise)
+    told = Sensors(noise, steps, with_travel(found, noise))
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
@@ -168,9 +170,7 @@ def _slow_turn(
     # the first and the last sample have no neighbours
     starts = 1 + window_starts(keep[1:-1], window)
     weak = projection(found["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
-    return segment_of(
-        capture, "shaft", "bench", period * factor, found, noise, (channel,), weak, runs_rad=runs
-    )
+    return segment_of(capture, "shaft", "bench", period * factor, found, told, (channel,), weak)
 
 
 def _open(capture: Capture, machine: Machine) -> Segment | None:
@@ -184,12 +184,12 @@ def _open(capture: Capture, machine: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)
     window = window_of(period, keep.size)
-    noise = prepared(found, period)[0]
+    told = prepared(found, period)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, found["theta_mech_rad"]))
-    return segment_of(capture, "open", "bench", period, found, noise, ("vd_v", "vq_v"), weak)
+    return segment_of(capture, "open", "bench", period, found, told, ("vd_v", "vq_v"), weak)
 
 
 def _terminal(capture: Capture, _: Machine) -> Segment | None:
@@ -204,13 +204,13 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra))
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    noise = prepared(found, period)[0]
+    told = prepared(found, period)
     fixed = {"pair_rad": _PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:
             return None
         fixed["theta_elec_rad"] = math.radians(capture.meta.theta_elec_deg)
-        edges = np.abs(np.diff(volts)) > 8 * noise["v_pair_v"]
+        edges = np.abs(np.diff(volts)) > 8 * told.noise["v_pair_v"]
         keep[:-1] &= ~edges
         keep[1:] &= ~edges
         window = max(min(round(_STEP_WINDOW_S / period), keep.size // 4), 8)
@@ -218,19 +218,18 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
         window = window_of(period, keep.size)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
     if capture.meta.test == "resistance":
-        weak = _settled(weak, amps, noise["i_pair_a"])
+        weak = _settled(weak, amps, told.noise["i_pair_a"])
     return segment_of(
         capture,
         "terminal",
         "bench",
         period,
         found,
-        noise,
+        told,
         ("v_pair_v",),
         weak,
         blocks=None,
         offsets=None,
-        runs_rad=None,
         **fixed,
     )
 
@@ -271,4 +270,21 @@ def _lcr(capture: Capture, _: Machine) -> Segment | None:
         fitted = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
         noise[name] = float(np.sqrt(((found[name] - fitted) ** 2).sum() / (angle.size - 3)))
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
-    return segment_of(capture, "lcr", "lcr", 1.0, found, noise, channels, None)
+    return segment_of(capture, "lcr", "lcr", 1.0, found, Sensors(noise), channels, None)
+
+
+_MAKERS: Mapping[str, Callable[[Capture, Machine], Segment | tuple[Segment, ...] | None]] = {
+    "torque_map": _dq,
+    "drive": _drive,
+    "heat_run": _dq,
+    "cogging": _shaft,
+    "spin_down": _shaft,
+    "open_circuit": _open,
+    "resistance": _terminal,
+    "current_step": _terminal,
+    "lcr": _lcr,
+    "flux_map": flux_table,
+    "holding_current": standing,
+}
+TESTS = frozenset(_MAKERS)
+"""Tests that have an equation here."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.segment import Segment, segment_of
+from pipeline.criticism.segment import Segment, Sensors, segment_of
 from pipeline.criticism.traces import even_clock, prepared, shaft_angle, thinned, window_of
 from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
@@ -37,18 +37,14 @@ def q_log(capture: Capture, machine: Machine) -> tuple[Segment, ...] | None:
     if speed is not None:
         found["omega_mech_rad_s"] = speed
     window = window_of(period, keep.size)
-    noise, runs = prepared(found, period)
+    told = prepared(found, period)
     starts = window_starts(keep, window)
     weak = projection(found["theta_mech_rad"], starts, window, ())
     blocks = _in_time(weak.starts + window // 2, keep.size)
     channels = ("vq_v", "omega_mech_rad_s") if speed is not None and angle else ("vq_v",)
-    made = [
-        segment_of(
-            capture, "q", "drive", period, found, noise, channels, weak, blocks, runs_rad=runs
-        )
-    ]
+    made = [segment_of(capture, "q", "drive", period, found, told, channels, weak, blocks)]
     if angle and not capture.has("torque_shaft_nm"):
-        made.append(_motion(capture, period, found, noise, keep, runs))
+        made.append(_motion(capture, period, found, told, keep))
     return tuple(made)
 
 
@@ -56,9 +52,8 @@ def _motion(
     capture: Capture,
     period: float,
     found: dict[str, Array],
-    noise: dict[str, float],
+    told: Sensors,
     keep: NDArray[np.bool_],
-    runs_rad: Array,
 ) -> Segment:
     """The shaft's motion, in a selection of the windows: waves of the angle are dear at speed."""
     names = ("theta_mech_rad", "iq_a", "travel_rad", "run")
@@ -69,9 +64,7 @@ def _motion(
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     blocks = _in_time(shaft.pop("row")[starts + window // 2], keep.size)
     channels = ("torque_shaft_nm",)
-    return segment_of(
-        capture, "motion", "drive", period, shaft, noise, channels, weak, blocks, None, runs_rad
-    )
+    return segment_of(capture, "motion", "drive", period, shaft, told, channels, weak, blocks)
 
 
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:

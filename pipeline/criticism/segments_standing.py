@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.segment import Segment, segment_of
+from pipeline.criticism.segment import Segment, Sensors, segment_of
 from pipeline.numerics.orders import TURN_RAD, passes
 from pipeline.records.capture import Capture
 
@@ -40,7 +40,7 @@ def standing(capture: Capture, _: Machine) -> Segment | None:
     noise = {"iq_a": _noise(spread, current)}
     sectors = sectors_of(table[:, 0])
     return segment_of(
-        capture, "standing", "drive", 1.0, recorded, noise, ("iq_a",), None, blocks=sectors
+        capture, "standing", "drive", 1.0, recorded, Sensors(noise), ("iq_a",), None, blocks=sectors
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.segment import Segment, segment_of
+from pipeline.criticism.segment import Segment, Sensors, segment_of
 from pipeline.records.capture import Capture
 
 _FLUX_NOISE = 1e-3
@@ -34,7 +34,7 @@ def _linkages(capture: Capture) -> Segment:
     blocks = levels if levels.max(initial=0) + 1 >= _FEW_LEVELS else None
     channels = ("psi_d_wb", "psi_q_wb")
     return segment_of(
-        capture, "flux_map", "drive", 1.0, found, noise, channels, None, blocks=blocks
+        capture, "flux_map", "drive", 1.0, found, Sensors(noise), channels, None, blocks=blocks
     )
 
 
@@ -63,7 +63,7 @@ def _steady(capture: Capture) -> Segment | None:
         "drive",
         1.0,
         found,
-        noise,
+        Sensors(noise),
         ("vq_v",),
         None,
         blocks=levels,

@@ -14,23 +14,31 @@ from pipeline.criticism.descent import clipped, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.floors import form_tolerance
 from pipeline.criticism.grams import Grams
-from pipeline.criticism.judge import held_out_spreads
+from pipeline.criticism.judge import (
+    HeldOut,
+    held_out_spreads,
+    leave_out,
+    predicted_spreads,
+    told_groups,
+    uncertainties,
+)
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.scores import (
     LEAST_SHARE,
     THOROUGH,
+    TIE,
     WORTH,
     Score,
     candidates,
+    clears,
     power_share,
     quiet_fall,
     score_all,
     widened,
 )
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Fitted, System, floors, own_columns, tolerances
+from pipeline.criticism.system import Fitted, System, floors, floors_grown, own_columns, tolerances
 
-TIE = 12.0
 _MOST = 6
 _REFITS = 3
 _ROUNDS = 2
@@ -38,6 +46,7 @@ _HELD = 0.5
 _CLOSE = 0.7
 _KIN = 0.05
 _BESIDE = 3.0
+_SURELY = 2.0
 _OTHER_FLOOR = math.log(1.5)
 
 
@@ -60,7 +69,7 @@ def search(
     for _ in range(_MOST):
         offered = candidates(library, fitted)
         wide = widened(segments, fitted, offered, rungs[-1].around if rungs else None)
-        scores = score_all(wide, fitted, offered)
+        scores = score_all(wide, fitted, offered, told_groups(wide, segments))
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
         if len(rungs) == _MOST:
@@ -128,8 +137,8 @@ def _refit_best(
     of its own kind by three prices, since what a form leaves there is of that size.
     """
     own = len(own_columns(fitted.model))
-    before = held_out_spreads(wide, own, segments)
-    any_wrong = _doubt(segments, fitted, wide, found)
+    before = held_out_spreads(wide, own, segments) * _shrunk(segments, wide)
+    any_wrong, told = _doubt(segments, fitted, wide, found), told_groups(wide, segments)
     close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
     least = math.inf
@@ -139,14 +148,42 @@ def _refit_best(
         # of two that tie, the one that some capture here was made to show
         unsought = TIE if set(effect.tests).isdisjoint(wide.tests) else 0.0
         cost = tried[1].misfit + score.price + unsought
-        if not material(tried[0], effect) or cost >= min(least, wide.misfit):
+        if not _matters(*tried, wide, told) or cost >= min(least, wide.misfit):
             continue
         kin = _kin(effect, found)
         doubts = _doubt(segments, fitted, wide, kin), any_wrong
         promised = _HELD * score.price, (_BESIDE if kin else _HELD) * score.price
-        if _holds(wide, before, tried[1], segments, promised, doubts):
+        held = leave_out(tried[1], len(tried[1].columns), segments)
+        if effect.closer is not None and not _sure(*tried, held):
+            continue
+        after = predicted_spreads(tried[1], held) * _shrunk(segments, tried[1])
+        if _holds(wide, before, tried[1], after, promised, doubts):
             best, least = tried, cost
     return best
+
+
+def _matters(fitted: Fitted, around: System, before: System, told: NDArray[np.bool_]) -> bool:
+    """Whether the newest effect of a refit is as large as anybody would act on, or takes most of
+    what was `told` [G] as a remainder before.
+    """
+    effect = fitted.model.effects[-1]
+    if material(fitted, effect):
+        return True
+    was, now = before.spreads(before.residual), around.spreads(around.residual)
+    most = effect.closer is None and clears(around.counts, told, was, now)
+    return most and shaped(fitted, effect)
+
+
+def _sure(fitted: Fitted, around: System, held: HeldOut) -> bool:
+    """Whether some amplitude of the newest effect is surely not zero: two standard uncertainties
+    from it, whichever capture is left out.
+    """
+    effect = fitted.model.effects[-1]
+    sizes = (p.name for p in effect.parameters_of(fitted.model.machine) if p.amplitude)
+    names = {f"{effect.name}.{name}" for name in sizes}
+    spread = uncertainties(around, held, len(around.columns))
+    told = zip(around.columns, spread.tolist(), strict=True)
+    return any(abs(fitted.values[c.name]) > _SURELY * u for c, u in told if c.name in names)
 
 
 def _kin(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
@@ -177,16 +214,15 @@ def _holds(
     wide: System,
     before: Array,
     tried: System,
-    segments: Sequence[Segment],
+    after: Array,
     least: tuple[float, float],
     doubts: tuple[Array, Array],
 ) -> bool:
     """Whether the misfit of captures predicted from all the others falls by the first of `least`,
     and with it a share of some signal's power, or by the second in signals that are below their
-    floor; `before` are their χ²/n without the candidate, of which the first of the `doubts` [G]
-    counts, below the floor the second.
+    floor; `before` and `after` are their χ²/n [G] without and with the candidate, of which the
+    first of the `doubts` [G] counts, below the floor the second.
     """
-    after = held_out_spreads(tried, len(tried.columns), segments)
     kin, below = doubts
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
     fall = wide.misfit_of(kin * before) + cost - tried.misfit_of(kin * after) - left
@@ -194,6 +230,20 @@ def _holds(
     helps = priors or power_share(wide, kin * before, kin * after) >= LEAST_SHARE
     quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
     return fall > least[0] and (helps or quiet > least[1])
+
+
+def _shrunk(segments: Sequence[Segment], tried: System) -> Array:
+    """Factors [G] that turn χ²/n by the floors a fit was made with into χ²/n by those at its end.
+
+    Noise of a current is in the equations times R and L: what makes these smaller makes the
+    residual smaller as well. Reference: Fuller, Measurement Error Models (1987), section 1.3.
+    """
+    was = np.concatenate(tried.around.sigma)[tried.group]
+    now = was * np.concatenate(floors_grown(segments, tried.around))[tried.group]
+    power = tried.whiten**-2
+    by_end = np.bincount(tried.group, power + now**2 - was**2, len(tried.labels))
+    factors: Array = np.bincount(tried.group, power, len(tried.labels)) / np.maximum(by_end, 1e-300)
+    return np.where(tried.counts > 0, factors, 1.0)
 
 
 def begun(fitted: Fitted, score: Score) -> Fitted:
@@ -208,13 +258,17 @@ def material(fitted: Fitted, effect: Effect) -> bool:
     """Whether some amplitude of an effect is over its negligible size, and every shape that has
     one over its own.
     """
+    return shaped(fitted, effect) and size_of(fitted, effect, "negligible") >= 1.0
+
+
+def shaped(fitted: Fitted, effect: Effect) -> bool:
+    """Whether every shape of an effect is over its negligible size, if it has one."""
     machine = fitted.model.machine
-    shapes = [
+    return all(
         abs(fitted.values[f"{effect.name}.{p.name}"]) >= p.negligible * machine.scale(p)
         for p in effect.parameters_of(machine)
         if not p.amplitude
-    ]
-    return all(shapes) and size_of(fitted, effect, "negligible") >= 1.0
+    )
 
 
 def size_of(fitted: Fitted, effect: Effect, unit: str) -> float:

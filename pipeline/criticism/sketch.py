@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from pipeline.criticism.curves import Variable
 from pipeline.criticism.effect import Array
 from pipeline.criticism.ports import Port
 from pipeline.criticism.system import System
-from pipeline.criticism.terms import POWER, SHAPES, WAVES, Term
+from pipeline.criticism.terms import CENTRED, POWER, SHAPES, WAVES, Term
 
 _TIE = 12.0
 _MOST = 4
@@ -31,6 +32,9 @@ _WORTH = 0.01
 _SCALES = 18
 _CENTRES = 24
 _WIDTHS_RAD = (0.15, 0.3, 0.6, 1.2)
+# where in its range a variable may have a hump, and how wide it may be
+_PARTS = (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9)
+_PARTS_WIDE = (0.03, 0.06, 0.12, 0.25)
 _ROUNDS = 12
 _SETTLED = 0.3
 _RIDGE = 1e-9
@@ -245,6 +249,8 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
             old = groups[g][n]
             if name == "scale":
                 found[g][n] = replace(found[g][n], scale=old.scale * math.exp(one))
+            elif old.kind in CENTRED:
+                found[g][n] = replace(found[g][n], centre=old.centre * math.exp(one))
             else:
                 found[g][n] = replace(found[g][n], centre=old.centre + one)
         return [tuple(group) for group in found]
@@ -294,6 +300,9 @@ def _shapes(variable: Variable, carrier: int) -> Iterator[Group]:
         for shape in SHAPES:
             for scale in trial if shape.scaled else (variable.top,):
                 yield (Term(shape.name, carrier, parity, float(scale)),)
+        for kind, centre, width in product(CENTRED, _PARTS, _PARTS_WIDE):
+            place, wide = centre * variable.top, width * variable.top
+            yield (Term(kind, carrier, parity, wide, centre=place),)
 
 
 def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expression:

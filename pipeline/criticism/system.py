@@ -13,8 +13,8 @@ from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.floors import form_tolerance, noise_floor
 from pipeline.criticism.grams import Grams, misfit_of, pseudo_inverse
 from pipeline.criticism.linearise import Column, base_columns, effect_columns, linearise
-from pipeline.criticism.model import Model
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.model import Model, zero
+from pipeline.criticism.segment import Segment, row_index
 from pipeline.criticism.size import base_scales
 
 _SEED = 20260302
@@ -23,6 +23,7 @@ _STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
 # the equation of a coasting shaft is drags over J
 _HEAVIER = 0.05
 _COASTING = "omega_mech_rad_s"
+_CURRENTS = frozenset({"id_a", "iq_a", "i_pair_a"})
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 
 
@@ -176,6 +177,25 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
     """Noise floor of every segment."""
     seeds = range(_SEED, _SEED + len(segments))
     return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
+
+
+def floors_grown(segments: Sequence[Segment], fitted: Fitted) -> tuple[Array, ...]:
+    """Factors by which the noise floor of every segment is another at a fit's values than at those
+    it was made at, by the same noise.
+    """
+    each = [(fitted.model, fitted.values, fitted.near, _SEED + n) for n in range(len(segments))]
+    return on_each(_floor_grown, segments, each)
+
+
+def _floor_grown(segment: Segment, model: Model, values: Values, near: Values, seed: int) -> Array:
+    """One but where there are currents, whose noise is in the equations times what is fitted."""
+    if _CURRENTS.isdisjoint(segment.recorded):
+        return np.ones(len(row_index(segment)[3]))
+    before = dict(near)
+    for effect in model.effects:
+        before = {**zero(effect, model), **before}
+    at_start, at_end = (noise_floor(segment, model, at, seed) for at in (before, values))
+    return at_end / at_start
 
 
 def tolerances(

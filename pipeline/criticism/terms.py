@@ -16,6 +16,7 @@ from pipeline.criticism.effect import Array
 
 WAVES = ("sin", "cos")
 POWER = "power"
+CENTRED = ("hump", "resonance")
 _ABOVE_DEGC = 25.0
 
 
@@ -69,9 +70,11 @@ SHAPES = (
 class Term:
     """One term of an expression, of unit amplitude, on one carrier.
 
-    `kind` is the name of a shape, `sin` or `cos` (of `order`), `bump` (at `centre`, of width
-    `scale`), or `power` (`order` numbers the port's monomials). A shape is `even`, `odd` (times
-    the sign of u), or `plain` (of u itself, no size). `carrier` numbers the port's carriers.
+    `kind` is the name of a shape, `sin` or `cos` (of `order`), `bump` (in a turn, at `centre`, of
+    width `scale`), `hump` or `resonance` (exp(-u²) or 1/(1 + u²) around a `centre` that is not
+    zero, of width `scale`), or `power` (`order` numbers the port's monomials). A shape is `even`,
+    `odd` (times the sign of u), or `plain` (of u itself, no size). `carrier` numbers the port's
+    carriers.
     """
 
     kind: str
@@ -83,7 +86,7 @@ class Term:
 
     @property
     def shape(self) -> Shape:
-        """Its shape in the dictionary; ValueError for waves and bumps."""
+        """Its shape in the dictionary; ValueError for waves and what has a centre."""
         for shape in SHAPES:
             if shape.name == self.kind:
                 return shape
@@ -92,7 +95,7 @@ class Term:
     @property
     def free(self) -> tuple[str, ...]:
         """The fields that are fitted beside the amplitude."""
-        if self.kind == "bump":
+        if self.kind in ("bump", *CENTRED):
             return ("centre", "scale")
         if self.kind in (*WAVES, POWER):
             return ()
@@ -106,8 +109,12 @@ class Term:
         if self.kind == "bump":
             bump: Array = np.exp((np.cos(v - self.centre) - 1.0) / self.scale**2)
             return bump
-        u = v / self.scale
-        half = self.shape.value(u if self.parity == "plain" else np.abs(u))
+        size = v if self.parity == "plain" else np.abs(v)
+        if self.kind in CENTRED:
+            u = (size - self.centre) / self.scale
+            half: Array = np.exp(-u * u) if self.kind == "hump" else 1.0 / (1.0 + u * u)
+        else:
+            half = self.shape.value(size / self.scale)
         return np.sign(v) * half if self.parity == "odd" else half
 
     def words(self, variable: Variable) -> str:
@@ -117,12 +124,18 @@ class Term:
             return f"{self.kind}({self.order} {name})" if self.order > 1 else f"{self.kind}({name})"
         if self.kind == "bump":
             return f"exp((cos({name} - {self.centre:.4g} rad) - 1)/({self.scale:.4g} rad)²)"
+        over = f"({name} - {_ABOVE_DEGC:g} degC)" if variable.kind == "warm" else name
+        if self.kind in CENTRED:
+            shape = "exp(-u²)" if self.kind == "hump" else "1/(1 + u²)"
+            sense = f"sign({name})·" if self.parity == "odd" else ""
+            size = over if self.parity == "plain" else f"|{name}|"
+            away = f"({size} - {self.centre:.4g} {variable.unit})"
+            return f"{sense}{shape}, u = {away}/({self.scale:.4g} {variable.unit})"
         text = self.shape.odd if self.parity == "odd" else self.shape.even
         if self.parity == "plain":
             text = text.replace("|u|", "u")
         if text == "sign(u)":
             return f"sign({name})"
-        over = f"({name} - {_ABOVE_DEGC:g} degC)" if variable.kind == "warm" else name
         return text if "u" not in text else f"{text}, u = {over}/({self.scale:.4g} {variable.unit})"
 
     def code(self, scale: str, centre: str) -> str:
@@ -131,6 +144,10 @@ class Term:
             return f"np.{self.kind}({self.order} * v)"
         if self.kind == "bump":
             return f"np.exp((np.cos(v - {centre}) - 1) / {scale} ** 2)"
-        size = f"(v / {scale})" if self.parity == "plain" else f"(np.abs(v) / {scale})"
-        body = self.shape.code.format(a=size)
+        of = "v" if self.parity == "plain" else "np.abs(v)"
+        if self.kind in CENTRED:
+            shape = "np.exp(-({u} ** 2))" if self.kind == "hump" else "1 / (1 + {u} ** 2)"
+            body = shape.format(u=f"(({of} - {centre}) / {scale})")
+        else:
+            body = self.shape.code.format(a=f"({of} / {scale})")
         return f"np.sign(v) * {body}" if self.parity == "odd" else body

@@ -8,8 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.clocks import counted, sampled_unevenly
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.noise import sensor_noise
+from pipeline.criticism.noise import coarse_step, sensor_noise
+from pipeline.criticism.segment import Sensors
 from pipeline.numerics.projection import window_starts
 from pipeline.records.capture import Capture
 
@@ -27,8 +29,9 @@ def even_clock(
 ) -> tuple[float, dict[str, Array], NDArray[np.bool_]]:
     """Sample period [s], columns [n each] on an even clock and the samples to keep [n].
 
-    A clock that is even within a thousandth is taken as it is; another one is interpolated.
-    Missing values are bridged and not kept; so are samples inside a gap of over 1.5 periods.
+    A clock that is even within a thousandth is taken as it is. Of another one it is asked whether
+    the samples came unevenly, and are interpolated, or only their stamps, and are counted. Missing
+    values are bridged and not kept; so are samples inside a gap of over 1.5 periods.
     """
     home = capture.table_of("t_s", *names)
     found = capture.arrays("t_s", *names, masked=False)
@@ -40,7 +43,16 @@ def even_clock(
         if not good.all() and good.any():
             found[name] = np.interp(time, time[good], column[good])
             keep &= good
-    if np.abs(np.diff(time) - period).max() > 1e-3 * period:
+    uneven = np.abs(np.diff(time) - period).max() > 1e-3 * period
+    clock = counted(time) if uneven else None
+    if clock is not None and not sampled_unevenly(time, clock[1], found.values()):
+        period, number = clock
+        even = np.arange(number[-1] + 1)
+        recorded = np.zeros(even.size, dtype=bool)
+        recorded[number] = keep
+        found = {name: np.interp(even, number, column) for name, column in found.items()}
+        keep = recorded
+    elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
         after = np.clip(np.searchsorted(time, even), 1, time.size - 1)
         near = (time[after] - time[after - 1] < 1.5 * period) & keep[after] & keep[after - 1]
@@ -162,11 +174,12 @@ def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> Non
         found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
 
 
-def prepared(found: dict[str, Array], period: float) -> tuple[dict[str, float], Array]:
-    """Noise of every column, and the shaft's runs [runs, rad]; smooths the temperatures and adds
-    the travel since a reversal.
+def prepared(found: dict[str, Array], period: float) -> Sensors:
+    """Noise, coarse steps and runs of columns; smooths the temperatures and adds the travel since a
+    reversal.
     """
     noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
+    steps = coarse_steps(found, noise)
     width = max(2 * round(_SMOOTHING_S / period) + 1, 51)
     for name in SMOOTHED:
         if name in found:
@@ -175,7 +188,13 @@ def prepared(found: dict[str, Array], period: float) -> tuple[dict[str, float], 
     runs = np.array([math.inf])
     if "theta_mech_rad" in found:
         runs = with_travel(found, noise)
-    return noise, runs
+    return Sensors(noise, steps, runs)
+
+
+def coarse_steps(found: Mapping[str, Array], noise: Mapping[str, float]) -> dict[str, float]:
+    """Steps of the columns that are rounded too coarsely for their noise; an angle has its own."""
+    steps = {n: coarse_step(c, noise[n]) for n, c in found.items() if not n.startswith("theta")}
+    return {name: step for name, step in steps.items() if step > 0.0}
 
 
 def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) -> None:

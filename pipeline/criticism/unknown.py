@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.descent import clipped
 from pipeline.criticism.effect import Array
+from pipeline.criticism.judge import told_groups
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.ports import Port, ports, refined
 from pipeline.criticism.scores import LEAST_SHARE
@@ -24,6 +25,7 @@ _TIE = 12.0
 _NEAR = 0.05
 _PRIOR = 1.0
 _CARRIED = 5.0
+_PARTS = 12
 _EFFORT = ((1.0, 0.0), 20)
 _SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 
@@ -50,6 +52,7 @@ def unknown_structure(
     signals: Sequence[str],
     before: System | None = None,
     name: str = "unknown",
+    in_parts: bool = False,
 ) -> tuple[UnknownStructure | None, float]:
     """What the structure left in `signals` depends on, as curve, expression and effect file.
 
@@ -59,8 +62,10 @@ def unknown_structure(
     floor: instruments that wander follow no state of the machine. Also returns the misfit
     (−2 log likelihood) it removes.
     `before`: a system around the same fit, whose columns are used again. `name`: of the effect.
+    `in_parts`: captures that miss the floor are held out a twelfth at a time, for a heat run that
+    has no second; wander of an instrument would pass for a state of the machine there.
     """
-    found, wide = _ranked(segments, fitted, _hooks(signals), before)
+    found, wide = _ranked(segments, fitted, _hooks(signals), before, in_parts)
     if not found:
         return None, 0.0
     best = _simplest(found)
@@ -101,7 +106,11 @@ def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
 
 
 def _ranked(
-    segments: Sequence[Segment], fitted: Fitted, hooks: Sequence[str], before: System | None
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    hooks: Sequence[str],
+    before: System | None,
+    in_parts: bool,
 ) -> tuple[list[Found], System]:
     """Every port that is worth its price and helps where it was not fitted, the best first."""
     offered = ports(fitted.model.machine, hooks)
@@ -110,8 +119,9 @@ def _ranked(
     own = np.arange(len(own_columns(fitted.model)))
     none = wide.grams(own).best()
     left, base = wide.after(own, none.step), none.misfit
-    carried = _carried(wide, own, left)
-    reference = _held_out(wide, own, left, np.zeros(own.size), carried)
+    missed = _missed(wide, segments) if in_parts else None
+    units = _units(wide, own, left, missed)
+    reference = _held_out(wide, own, left, np.zeros(own.size), units)
     excess = float(wide.counts @ np.log(np.maximum(wide.spreads(left), 1.0)))
     price = math.log(wide.size)
     found = []
@@ -129,7 +139,7 @@ def _ranked(
         if gain <= 0.0:
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
-        held = reference - _held_out(wide, chosen, after, ridge, carried)
+        held = reference - _held_out(wide, chosen, after, ridge, units)
         if held > max(_TIE, LEAST_SHARE * excess):
             found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
@@ -159,27 +169,53 @@ def _simplest(found: Sequence[Found]) -> Found:
     return min((one for one in simple if one.held >= level), key=lambda one: one.place)
 
 
-def _segment_of(around: System) -> NDArray[np.int64]:
-    return np.array([number for number, _, _ in around.labels])[around.group]
+def _missed(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
+    """Numbers of the segments in which a fit leaves something that is told."""
+    told = np.flatnonzero(told_groups(around, segments))
+    return np.unique([around.labels[place][0] for place in told])
 
 
-def _carried(around: System, own: NDArray[np.int64], left: Array) -> frozenset[int]:
-    """Segments without which some constant of the model is lost: they are always in the fit."""
+def _units(
+    around: System, own: NDArray[np.int64], left: Array, missed: NDArray[np.int64] | None
+) -> NDArray[np.int64]:
+    """Number of what is held out together, of every row [R]: a capture, or a part of one of the
+    segments in `missed`; -1 for what is always in the fit.
+
+    That is what alone carries a constant, and with parts all the other captures, which have nothing
+    to predict, and the first and last part, since no curve is known beyond its ends.
+    """
+    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    units = segment.astype(np.int64)
+    if missed is not None:
+        last = np.zeros(len(around.tests), dtype=np.int64)
+        np.maximum.at(last, segment, around.window)
+        part = _PARTS * around.window // (last[segment] + 1)
+        inner = np.isin(segment, missed) & (part > 0) & (part < _PARTS - 1)
+        units = np.where(inner, _PARTS * segment + part, -1)
+    carried = np.isin(units, _carrying(around, own, left, units))
+    return np.where(carried, -1, units)
+
+
+def _carrying(
+    around: System, own: NDArray[np.int64], left: Array, units: NDArray[np.int64]
+) -> list[int]:
+    """Units without which some constant of the model is lost."""
     weight = around.weights(around.spreads(left))
     live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
-    matrix, segment = around.matrix[:, live], _segment_of(around)
+    matrix = around.matrix[:, live]
     normal = (matrix * weight[:, None]).T @ matrix + np.diag(around.penalty[live])
     scale = np.sqrt(np.diag(normal))
     spread = np.diag(np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True))
-    carried = set()
-    for number in range(len(around.tests)):
-        rows = matrix[segment == number]
-        less = normal - (rows * weight[segment == number, None]).T @ rows
+    carrying = []
+    for number in np.unique(units[units >= 0]).tolist():
+        mine = units == number
+        rows = matrix[mine]
+        less = normal - (rows * weight[mine, None]).T @ rows
         inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
         if grown.max() > _CARRIED or (np.diag(less) < 1e-5 * np.diag(normal)).any():
-            carried.add(number)
-    return frozenset(carried)
+            carrying.append(number)
+    return carrying
 
 
 def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
@@ -195,24 +231,28 @@ def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) 
 
 
 def _held_out(
-    around: System, places: NDArray[np.int64], left: Array, ridge: Array, carried: frozenset[int]
+    around: System,
+    places: NDArray[np.int64],
+    left: Array,
+    ridge: Array,
+    units: NDArray[np.int64],
 ) -> float:
-    """Misfit of every capture as predicted without it, by the columns at `places`.
+    """Misfit of every unit as predicted without it, by the columns at `places`.
 
-    `left` [R] is the residual at their best fit, whose weights count; captures in `carried` are
-    left where they are. A coefficient that no other capture tells of stays at zero by `ridge`.
+    `left` [R] is the residual at their best fit, whose weights count; rows of unit -1 are left
+    where they are. A coefficient that no other unit tells of stays at zero by `ridge`.
     """
     weight = around.weights(around.spreads(left))
-    matrix, segment = around.matrix[:, places], _segment_of(around)
+    matrix = around.matrix[:, places]
     weighted = matrix * weight[:, None]
     penalty = np.diag(around.penalty[places] + ridge)
     normal = weighted.T @ matrix + penalty
     slope = weighted.T @ around.residual + around.pull[places]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     predicted = left.copy()
-    for number in range(len(around.tests)):
-        mine = segment == number
-        if number in carried or not np.any(matrix[mine]):
+    for number in np.unique(units[units >= 0]).tolist():
+        mine = units == number
+        if not np.any(matrix[mine]):
             continue
         less = (normal - weighted[mine].T @ matrix[mine]) / np.outer(scale, scale)
         right = (slope - weighted[mine].T @ around.residual[mine]) / scale

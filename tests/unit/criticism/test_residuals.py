@@ -14,7 +14,7 @@ from pipeline.criticism.noise import sensor_noise
 from pipeline.criticism.registry import effects
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import projected, row_index
-from tests.unit.criticism.machines import BASE, log, machine
+from tests.unit.criticism.machines import BASE, log, machine, operating
 
 LIBRARY = effects()
 PLAIN = Model(machine(), ())
@@ -172,3 +172,17 @@ def test_a_jump_of_voltage_is_known_to_a_quarter_of_a_sample():
     near = np.sqrt(np.maximum(allowed**2 - calm[1, :, 0] ** 2, 0.0))
     assert near[over] == pytest.approx(np.abs(told[over]), rel=0.05, abs=0.02 * told.max())
     assert near[~over].max() < 0.1 * told.max(), "of the reading itself"
+
+
+def test_a_wave_that_turns_many_times_a_sample_averages_out_of_a_coasting_shaft():
+    """Order 84 turns 133 times a sample at 2000 rad/s logged at 200 Hz: with waves at a few points
+    a sample its mean is what they happen to beat to.
+    """
+    turned = np.linspace(0.0, 60 * 2000.0 * 5e-3 / 32, 60)
+    x = replace(operating(), theta_rad=turned, inverter=False)
+    for finer, most in ((32, 0.08), (1, 1.0)):
+        cosine, sine = replace(x, finer=finer, kept={}).shaft_waves(84)
+        assert np.hypot(cosine, sine).max() <= most + 1e-12
+    assert np.hypot(cosine, sine).min() == pytest.approx(1.0)
+    slow = replace(x, theta_rad=turned / 3e3, finer=32, kept={})
+    assert np.hypot(*slow.shaft_waves(84)).min() > 0.999

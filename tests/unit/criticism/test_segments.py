@@ -66,6 +66,19 @@ def test_the_angle_of_a_map_is_even_but_for_the_step_that_the_drive_s_encoder_sh
     assert bends[0] < 0.02 * step < 0.2 * step < bends[1]
 
 
+def test_an_angle_that_turns_by_whole_steps_a_sample_is_as_coarse_as_the_drive_s():
+    """13 steps a sample exactly: no difference shows the step, and all rounding is periodic."""
+    step = 2.0 * np.pi / 2**12
+    drive = at_speed("drive", np.linspace(-40.0, 60.0, 8000), step)
+    even = at_speed("heat_run", 13.0 * step / 5e-5, step)
+    fine = at_speed("heat_run", 13.3 * step / 5e-5, step / 2**9)
+    for other, told in ((even, step), (fine, 0.0)):
+        campaign = Campaign("m", (drive, other))
+        found = segments(campaign, machine_of(campaign, Constants()))
+        log = next(s for s in found if s.test == "heat_run")
+        assert log.angle_step_rad == pytest.approx(told, rel=1e-6, abs=0.1 * step)
+
+
 def test_logs_that_disagree_on_the_encoder_tell_of_none():
     ramp = np.linspace(-40.0, 60.0, 8000)
     logs = tuple(at_speed("drive", ramp, 2.0 * np.pi / 2**bits) for bits in (15, 17))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.criticism.diagnosis import _explained, trusted
 from pipeline.criticism.judge import HeldOut
+from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
-from pipeline.criticism.selection import Rung, _holds
+from pipeline.criticism.registry import effects
+from pipeline.criticism.selection import Rung, _holds, _sure
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, machine
@@ -59,12 +63,29 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
 
 
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])
-def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept, monkeypatch):
+def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept):
     """χ²/n of 3 that forms which are a little wrong may have made: neither a signal below its floor
     nor one above says that an effect is there.
     """
     wide, tried = (missing_by(torque_shaft_nm=q).around for q in (3.0, 0.2))
     after = tried.spreads(tried.residual)
-    monkeypatch.setattr("pipeline.criticism.selection.held_out_spreads", lambda *_: after)
     doubts = np.array([doubt]), np.array([doubt])
-    assert _holds(wide, np.array([3.0]), tried, (), (10.0, 10.0), doubts) is kept
+    assert _holds(wide, np.array([3.0]), tried, after, (10.0, 10.0), doubts) is kept
+
+
+@pytest.mark.parametrize(("apart", "sure"), [(0.04, True), (0.06, False)])
+def test_a_coupling_is_named_only_where_it_is_surely_there(apart, sure):
+    """Two captures, without the one or the other of which the share of 0.1 moves so far."""
+    plain = missing_by(torque_shaft_nm=1.0).around
+    column = Column("compliance.share", 1e-3)
+    fitted = Fitted(Model(machine(), (effects()["compliance"],)), {"compliance.share": 0.1}, (), {})
+    around = replace(
+        plain,
+        columns=(column,),
+        matrix=np.full((plain.size, 1), 1e3),
+        penalty=np.zeros(1),
+        pull=np.zeros(1),
+        around=fitted,
+    )
+    held = HeldOut(plain.residual, 1.0, {0: np.array([apart]), 1: np.array([-apart])})
+    assert _sure(fitted, around, held) is sure

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.criticism.curves import coarse, fine, variables
 from pipeline.criticism.ports import ports, refined
-from pipeline.criticism.terms import SHAPES, Term
+from pipeline.criticism.terms import CENTRED, SHAPES, Term
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import log, machine, operating
 from tests.unit.criticism.test_selection import fitted, with_drag
@@ -66,6 +66,28 @@ def test_a_brake_comes_out_as_one_term_with_its_peak_and_speed(tmp_path):
     assert float(peak[2]) == pytest.approx(70.0, rel=0.03)
 
 
+def shiver(omega, _):
+    """A drag around one speed, as of a resonance of the bench."""
+    return 0.04 * np.sign(omega) * np.exp(-(((np.abs(omega) - 80.0) / 30.0) ** 2))
+
+
+def test_a_drag_around_one_speed_comes_out_as_one_term_at_that_speed(tmp_path):
+    """Without such a term it was told as a drag of a hundred times the size with its maximum at
+    rest, most of which viscous and Coulomb friction took back.
+    """
+    found, effect = told(shiver, tmp_path)
+    (term, size, unit) = found.sketch[0]
+    assert len(found.sketch) == 1
+    assert (size, unit) == (pytest.approx(0.04, rel=0.03), "N·m")
+    centre, width = re.search(r"- (\S+) rad/s\)/\((\S+) rad/s\)", term).groups()
+    assert float(centre) == pytest.approx(80.0, rel=0.02)
+    assert float(width) == pytest.approx(30.0, rel=0.05)
+    x = operating()
+    values = {p.name: p.scan[0] for p in effect.parameters if not p.amplitude}
+    values |= {p.name: size for p in effect.parameters if p.amplitude}
+    assert np.abs(effect.torque(x, values) - shiver(x.omega_rad_s, None)).max() < 2e-3
+
+
 def test_the_curve_runs_through_the_truth_within_its_band(tmp_path):
     found, _ = told(brake, tmp_path)
     at = np.array([p.at for p in found.curve])
@@ -106,6 +128,24 @@ def test_two_variables_are_told_where_it_takes_two():
     assert "omega_mech_rad_s" in found.times
 
 
+def test_a_test_that_was_done_once_is_held_out_in_parts():
+    """A drag that melts as one log warms: no other log knows of it, but its other parts do."""
+    warmed, cold = _slowly_warmed(5), _cool(log(noise=1.0, seed=6))
+    what = (warmed, cold), fitted((warmed, cold)), ["torque_shaft_nm"]
+    whole, _ = unknown_structure(*what)
+    assert whole is None or "temp_winding_degc" not in whole.variables
+    found, _ = unknown_structure(*what, in_parts=True)
+    assert "temp_winding_degc" in found.variables
+
+
+def _slowly_warmed(seed):
+    segment = log(noise=1.0, seed=seed)
+    warm = 25.0 + 60.0 * (1.0 - np.exp(-3.0 * np.arange(segment.size) / segment.size))
+    torque = segment.recorded["torque_shaft_nm"] - 0.05 * np.sin((warm - 25.0) / 9.0)
+    columns = {"torque_shaft_nm": torque, "temp_winding_degc": warm}
+    return replace(segment, recorded={**segment.recorded, **columns})
+
+
 @pytest.mark.parametrize("name", sorted(variables(machine())))
 def test_smooth_curves_lie_in_the_hats(name):
     """What a few smooth curves say, narrow hats can say as well."""
@@ -127,6 +167,19 @@ def test_the_python_of_a_term_is_the_term(shape, parity):
     code = term.code("1.7", "0.0")
     written = eval(code, {"np": np, "v": v})
     assert np.broadcast_to(written, v.shape) == pytest.approx(term.value(v))
+
+
+@pytest.mark.parametrize("kind", CENTRED)
+@pytest.mark.parametrize("parity", ["odd", "even", "plain"])
+def test_the_python_of_a_term_with_a_centre_is_the_term(kind, parity):
+    term = Term(kind, parity=parity, scale=0.7, centre=1.9)
+    v = np.linspace(-3.0, 4.0, 15)
+    written = eval(term.code("0.7", "1.9"), {"np": np, "v": v})
+    assert written == pytest.approx(term.value(v))
+    assert float(term.value(np.array([1.9]))[0]) == pytest.approx(1.0)
+    assert term.value(np.array([-1.9]))[0] == pytest.approx(
+        {"odd": -1.0, "even": 1.0, "plain": float(term.value(np.array([5.7]))[0])}[parity]
+    )
 
 
 def test_a_straight_line_is_a_smooth_curve_of_speed():

@@ -1,0 +1,65 @@
+"""The clock of a log: whether its samples came unevenly, or only their stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array
+
+_SCATTER = 0.5
+_MISSING = 1.6
+_SURELY = 2.0
+_REACH = 2
+
+
+def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
+    """Period [s] and sample numbers [n] of an even clock whose stamps [n, s] scatter by less than
+    half the period; None where there is no such clock.
+
+    Where over half a period more than one has passed samples may be missing, and numbers left out:
+    whichever scatters less.
+    """
+    since = time - time[0]
+    steps = np.diff(since) / np.median(np.diff(since))
+    gaps = np.where(steps > _MISSING, np.rint(steps), 1.0)
+    ends = []
+    for counts in (np.ones(steps.size), gaps):
+        number = np.concatenate([[0.0], np.cumsum(counts)])
+        period, first = np.polyfit(number, since, 1)
+        scatter = float(np.std(since - first - period * number)) / period
+        ends.append((scatter, float(period), number.astype(np.int64)))
+    scatter, period, number = min(ends, key=lambda end: end[0])
+    return None if scatter > _SCATTER else (period, number)
+
+
+def sampled_unevenly(time: Array, number: NDArray[np.int64], columns: Iterable[Array]) -> bool:
+    """Whether signals [n] surely run more smoothly over the stamps [n] than over the sample
+    numbers [n].
+
+    A shaft that turns tells when its angle was read: where it is evener than the clock that
+    stamped it, the stamps are at fault and not the sampling. The signal that tells most decides;
+    where none moves enough, it makes no difference.
+    """
+    told = [_roughness(c, number.astype(float)) / _roughness(c, time) for c in columns]
+    clearest = max(told, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)
+    return clearest > _SURELY
+
+
+def _roughness(signal: Array, at: Array) -> float:
+    """Median distance of samples from the cubic through the two before and the two after."""
+    near = [n for n in range(-_REACH, _REACH + 1) if n]
+    inner = slice(_REACH, signal.size - _REACH)
+    moved = {n: slice(_REACH + n, signal.size - _REACH + n) for n in near}
+    foretold = np.zeros(max(signal.size - 2 * _REACH, 0))
+    for n in near:
+        weight = np.ones_like(foretold)
+        for other in near:
+            if other != n:
+                weight *= (at[inner] - at[moved[other]]) / (at[moved[n]] - at[moved[other]])
+        foretold += weight * signal[moved[n]]
+    error = np.abs(signal[inner] - foretold)
+    moving = error[error > 0.0]
+    return max(float(np.median(moving)) if moving.size else 0.0, 1e-300)

@@ -1,0 +1,67 @@
+"""Clocks of logs: uneven samples are interpolated, uneven stamps are counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.clocks import counted
+from pipeline.criticism.traces import even_clock
+from pipeline.records.capture import Capture, CaptureMeta
+
+PERIOD = 1e-4
+
+
+def instants(n=4000, scatter=0.05, seed=1):
+    """Even instants [n, s] and the same scattered by a part of the period."""
+    even = PERIOD * np.arange(n)
+    return even, even + PERIOD * scatter * np.random.default_rng(seed).standard_normal(n)
+
+
+def angle(t):
+    """A shaft that speeds up [rad]."""
+    return 40.0 * t + 90.0 * t**2 + 0.02 * np.sin(300.0 * t)
+
+
+def log(stamps, theta):
+    table = pl.DataFrame({"t_s": stamps, "theta_mech_rad": theta})
+    return Capture("log.mcap", "0", "verified", CaptureMeta("m", "drive"), (table,))
+
+
+@pytest.mark.parametrize("scatter", [0.01, 0.05, 0.2])
+def test_samples_of_an_even_clock_are_taken_as_they_are_whatever_their_stamps(scatter):
+    even, stamps = instants(scatter=scatter)
+    for start_s in (0.0, 1.79e9):
+        capture = log(start_s + stamps, angle(even))
+        period, found, keep = even_clock(capture, ("theta_mech_rad",))
+        assert period == pytest.approx(PERIOD, rel=1e-5)
+        assert np.array_equal(found["theta_mech_rad"], angle(even))
+        assert keep[1:-1].all()
+
+
+@pytest.mark.parametrize("scatter", [0.01, 0.05, 0.2])
+def test_samples_that_came_unevenly_are_interpolated(scatter):
+    """Counted, they would be out by the speed times the scatter."""
+    _, stamps = instants(scatter=scatter)
+    period, found, keep = even_clock(log(stamps, angle(stamps)), ("theta_mech_rad",))
+    at = stamps[0] + period * np.arange(found["theta_mech_rad"].size)
+    error = found["theta_mech_rad"] - angle(at)
+    assert np.abs(error[keep]).max() < 0.1 * 40.0 * PERIOD * scatter
+    assert keep.mean() > 0.9
+
+
+def test_samples_that_are_missing_leave_their_numbers_out():
+    even, stamps = instants()
+    there = np.ones(even.size, dtype=bool)
+    there[[700, 1500, 1501, 1502, 3000]] = False
+    capture = log(stamps[there], angle(even)[there])
+    period, found, keep = even_clock(capture, ("theta_mech_rad",))
+    assert period == pytest.approx(PERIOD, rel=1e-5)
+    assert np.array_equal(keep[1:-1], there[1:-1])
+    assert found["theta_mech_rad"][keep] == pytest.approx(angle(even)[keep], abs=1e-12)
+
+
+def test_a_clock_that_runs_by_fits_and_starts_cannot_be_counted():
+    steps = np.random.default_rng(3).choice([0.2, 1.0, 7.0], 4000, p=[0.3, 0.5, 0.2])
+    assert counted(PERIOD * np.cumsum(steps)) is None
