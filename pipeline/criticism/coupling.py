@@ -11,7 +11,7 @@ of a spring or of a spring behind a gap, which `closer` tells from whole logs. A
 passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
-(2002), backlash as a dead zone of the twist.
+(2002), backlash as a dead zone of the twist; [3] Tukey, Exploratory Data Analysis (1977), ch. 16.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ import numpy as np
 from pipeline.criticism.effect import Array, Operating, Told, Values, Whole
 from pipeline.criticism.twist import Shaft, law_of_twist
 
-_BLOCK_S = 0.75e-3
-# three blocks and a difference stay within the samples kept around a window
-_MOST = 15
+_BLOCK_S = 0.5e-3
+# six blocks and a difference stay within the samples kept around a window
+_MOST = 7
 _SURE = 3.5
 _FEW = 6
 _NO_GAP_RAD = 2e-4
@@ -35,24 +35,32 @@ _NO_GAP_RAD = 2e-4
 def passed_on(x: Operating, share: float) -> Array:
     """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
 
-    `share` of the inertia is at the far end. Both parts are under the weights that means over a
-    block have once they are differenced twice, which keeps the encoder's rounding out of them; a
-    ringing of some 100 Hz stays as it is.
+    `share` of the inertia is at the far end. Three running means keep the encoder's rounding out
+    of it; twiced [3], so that a ringing stays as it is, to one per cent at a sixth of 1/block.
     """
     block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
     block -= 1 - block % 2
     box = np.full(block, 1.0 / block)
-    kernel = np.convolve(np.convolve(box, box), box)
+    smooth = np.convolve(np.convolve(box, box), box)
+    kernel = 2.0 * np.pad(smooth, smooth.size // 2) - np.convolve(smooth, smooth)
     found = np.zeros(x.theta_rad.size)
     if found.size < kernel.size + 2:
         return found
-    means = np.convolve(x.theta_rad, box, mode="valid")
-    bend = means[2 * block :] - 2.0 * means[block:-block] + means[: -2 * block]
-    near = (1.0 - share) * x.base["j_kgm2"] / (block * x.ts_s) ** 2
-    inner = np.convolve(x.torque_nm, kernel, mode="valid")[1:-1] - near * bend
+    near = (1.0 - share) * x.base["j_kgm2"] / x.ts_s**2
+    through = x.torque_nm[1:-1] - near * np.diff(x.theta_rad, 2)
     first = kernel.size // 2 + 1
-    found[first : first + inner.size] = inner
+    found[first : x.theta_rad.size - first] = np.convolve(through, kernel, mode="valid")
     return found
+
+
+def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
+    """Twist [n] of a spring and damper side by side, by the torque they pass on [rad].
+
+    S = k (twist + c/k twist′), so the twist lags S by c/k, to first order in it.
+    """
+    late = through_nm - q["damping_s"] / x.ts_s * np.gradient(through_nm)
+    twist: Array = q["twist_rad"] / x.machine.scales["torque_nm"] * late
+    return twist
 
 
 def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
@@ -110,7 +118,7 @@ def closer(wholes: Sequence[Whole], q: Values) -> Told | None:
     matters = max(_NO_GAP_RAD, law.softness / part * law.torque_nm)
     if gap > max(matters, _SURE * u_gap):
         return Told("backlash", {**values, "gap_rad": (gap, u_gap)})
-    return Told("compliance", values) if gap + _SURE * u_gap < matters else None
+    return Told("compliance", {}) if gap + _SURE * u_gap < matters else None
 
 
 def _shaft(one: Whole, between: bool, share: float) -> Shaft:

@@ -20,6 +20,8 @@ _MOST_BLOCKS = 10_000
 _OVER = 1.0
 _MATERIAL = 5e-4
 _MATERIAL_BENCH = 1e-2
+_MATERIAL_READING = 5e-3
+_VOLTS = ("vd_v", "vq_v")
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,8 +191,15 @@ def _over(
 
 
 def material_size(segment: Segment, channel: str, around: System) -> float:
-    """Error [unit of the signal] below which nobody would act."""
+    """Error [unit of the signal] below which nobody would act.
+
+    Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
+    """
     bench = segment.kind in ("terminal", "lcr", "flux_map", "standing")
     fitted = around.around
     scale = channel_scale(segment, channel, fitted.model, fitted.values)
-    return (_MATERIAL_BENCH if bench else _MATERIAL) * scale
+    size = (_MATERIAL_BENCH if bench else _MATERIAL) * scale
+    if segment.kind == "dq" and channel in _VOLTS:
+        reading = max(float(np.abs(segment.recorded[name]).max()) for name in _VOLTS)
+        size = min(size, _MATERIAL_READING * reading)
+    return size

@@ -84,17 +84,16 @@ def search(
         fitted, _ = _backward(segments, *chosen, base)
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))
-        if found and found[-1].hook == "sensor":
-            fitted = _floored_anew(segments, fitted)
+        fitted = _floored_anew(segments, fitted)
         if tuple(e.name for e in found) in {r.added for r in rungs}:
             break
     return tuple(rungs)
 
 
 def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
-    """The fit by the noise floors that a sensor's effect leaves, where some are others by a half.
+    """The fit by the noise floors that effects leave, where some are others by a half.
 
-    To undo a lag brings noise with it.
+    To undo a sensor's lag brings noise with it, and so does a twist that is told by an angle.
     """
     floor = floors(segments, fitted.model, fitted.values)
     ratio = np.concatenate(floor) / np.concatenate(fitted.sigma)

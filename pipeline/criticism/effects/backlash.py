@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.coupling import closer, far_drag, passed_on, side_of
+from pipeline.criticism.coupling import closer, far_drag, passed_on, side_of, spring_twist
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
@@ -11,8 +11,7 @@ def _torque(x: Operating, q: Values) -> Array:
 
     def twist() -> Array:
         through = passed_on(x, share)
-        softness = q["twist_rad"] / x.machine.scales["torque_nm"]
-        found: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + softness * through
+        found: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
         return found
 
     return far_drag(x, share, q["between"] > 0.0, twist)
@@ -29,7 +28,8 @@ EFFECT = Effect(
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
         Parameter("gap_rad", "rad", 0.005, 0.0002, low=0.0, high=0.3, scan=(0.0005, 0.005)),
-        Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=0.3, scan=(0.003,)),
+        Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=3.0, scan=(0.003,)),
+        Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
         Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", scan=(0.01,), choice=True),
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),

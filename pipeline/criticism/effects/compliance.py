@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.coupling import closer, far_drag, passed_on
+from pipeline.criticism.coupling import closer, far_drag, passed_on, spring_twist
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
 def _torque(x: Operating, q: Values) -> Array:
     def twist() -> Array:
-        return q["twist_rad"] / x.machine.scales["torque_nm"] * passed_on(x, q["share"])
+        return spring_twist(x, q, passed_on(x, q["share"]))
 
     return far_drag(x, q["share"], q["between"] > 0.0, twist)
 
@@ -16,14 +16,16 @@ def _torque(x: Operating, q: Values) -> Array:
 EFFECT = Effect(
     name="compliance",
     words="two masses and a spring: a share of J at the far end, behind a twist (told at the "
-    "machine's torque) by the torque passed on; between: the transducer is in the coupling",
+    "machine's torque) by the torque passed on, damping_s late (c/k); between: the transducer is "
+    "in the coupling",
     signature="a resonance after torque steps",
     tests=("drive", "torque_map"),
     experiment="torque steps with the angle recorded on the load side as well",
     reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
-        Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=0.3, scan=(0.002, 0.01)),
+        Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=3.0, scan=(0.002, 0.01)),
+        Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),

@@ -6,20 +6,25 @@ import numpy as np
 
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
+_NO_TAIL = 1e-6
+
 
 def _torque(x: Operating, q: Values) -> Array:
-    bump = np.exp(-(np.abs(x.omega_rad_s / q["speed_rad_s"]) ** q["exponent"]))
+    fast = np.abs(x.omega_rad_s / q["speed_rad_s"]) ** q["exponent"]
+    slowed = np.log1p(q["tail"] * fast) / q["tail"] if q["tail"] > _NO_TAIL else fast
+    bump = np.exp(-slowed)
     drag: Array = q["excess_nm"] * bump * np.sign(x.omega_rad_s)
     return drag
 
 
 EFFECT = Effect(
     name="stribeck",
-    words="drag (T_s − T_c) exp(−|ω/ω_s|^δ) sign(ω)",
+    words="drag (T_s − T_c) exp(−|ω/ω_s|^δ) sign(ω), or with a tail to (T_s − T_c)/(1 + |ω/ω_s|^δ)",
     signature="a bump of drag at low speed",
     tests=("spin_down", "cogging", "drive"),
     experiment="a spin-down to standstill, and slow reversals",
-    reference="Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994)",
+    reference="Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994); with a tail: "
+    "Hess & Soom, J. Tribology 112 (1990)",
     parameters=(
         Parameter("excess_nm", "N·m", 0.005, 0.0005, "torque_nm", low=0.0, high=1.0),
         Parameter(
@@ -33,6 +38,7 @@ EFFECT = Effect(
             scan=(0.004, 0.012, 0.036, 0.1),
         ),
         Parameter("exponent", "1", 2.0, 0.0, low=0.3, high=4.0, scan=(2.0,)),
+        Parameter("tail", "1", 0.5, 0.0, low=0.0, high=1.0, scan=(0.0,), optional=1),
     ),
     rivals={"presliding": "a reversal slow enough to see the angle within a milliradian"},
     torque=_torque,

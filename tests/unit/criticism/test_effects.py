@@ -146,8 +146,13 @@ def test_torque_comes_from_the_co_energy_of_the_linear_machine():
         ),
         (
             "stribeck",
-            {"excess_nm": 0.01, "speed_rad_s": 7.0, "exponent": 2.0},
+            {"excess_nm": 0.01, "speed_rad_s": 7.0, "exponent": 2.0, "tail": 0.0},
             lambda x: 0.01 * np.exp(-((x.omega_rad_s / 7.0) ** 2)) * np.sign(x.omega_rad_s),
+        ),
+        (
+            "stribeck",
+            {"excess_nm": 0.01, "speed_rad_s": 7.0, "exponent": 2.0, "tail": 1.0},
+            lambda x: 0.01 / (1.0 + (x.omega_rad_s / 7.0) ** 2) * np.sign(x.omega_rad_s),
         ),
         (
             "unbalance",

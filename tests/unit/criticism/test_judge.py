@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pipeline.criticism.judge import leave_out, uncertainties
+from pipeline.criticism.judge import leave_out, material_size, uncertainties
 from pipeline.criticism.linearise import Column
-from pipeline.criticism.system import Fitted, System
+from pipeline.criticism.model import Model
+from pipeline.criticism.system import Fitted, System, system
+from tests.unit.criticism.machines import BASE, log, machine
 
 ROWS = 400
 
@@ -54,3 +58,18 @@ def test_captures_that_disagree_are_not_surer_than_their_scatter():
 def test_one_capture_alone_has_its_noise():
     around = captures([0.0])
     assert uncertainties(around, leave_out(around, 1), 1)[0] == pytest.approx(ROWS**-0.5, rel=0.1)
+
+
+def test_at_standstill_a_voltage_is_measured_by_what_is_there():
+    """Half a per cent of R i at standstill is told, however high the machine's own voltage is."""
+    running = log()
+    still = {
+        n: 0.2 * running.recorded[n] / np.abs(running.recorded[n]).max() for n in ("vd_v", "vq_v")
+    }
+    standing = replace(running, recorded={**running.recorded, **still})
+    fitted = Fitted(Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    around = system((running,), fitted)
+    volt, torque = (running.channels[n] for n in (0, 2))
+    assert material_size(running, volt, around) == pytest.approx(5e-4 * 20.0)
+    assert material_size(standing, volt, around) == pytest.approx(5e-3 * 0.2)
+    assert material_size(standing, torque, around) == material_size(running, torque, around)

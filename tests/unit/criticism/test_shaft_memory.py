@@ -90,7 +90,8 @@ def test_a_compliant_shaft_is_two_masses_and_a_spring(between: float):
     share, softness = 0.33, 0.002
     theta, torque, load, through = two_masses(share, softness)
     x = replace(shaft(theta), torque_em_nm=torque, inverter=True)
-    q = {"share": share, "twist_rad": softness * x.machine.scales["torque_nm"], "between": between}
+    twist_rad = softness * x.machine.scales["torque_nm"]
+    q = {"share": share, "twist_rad": twist_rad, "damping_s": 0.0, "between": between}
     drag = LIBRARY["compliance"].torque(x, q)
     rigid = torque.copy()
     rigid[1:-1] -= BASE["j_kgm2"] * np.diff(theta, 2) / TS**2
