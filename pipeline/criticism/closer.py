@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from pipeline.criticism.descent import clipped, gauss_newton
-from pipeline.criticism.effect import Effect, Parameter, Told, Whole
+from pipeline.criticism.effect import Array, Effect, Parameter, Told, Values, Whole
 from pipeline.criticism.model import Model, evaluate, values_of, zero
 from pipeline.criticism.operate import operate
 from pipeline.criticism.residuals import measured
@@ -32,11 +34,22 @@ def _whole(segment: Segment, model: Model, fitted: Fitted) -> Whole:
     full = replace(segment, recorded=signals, weak=None)
     x = operate(full, signals, model, values)
     drag = evaluate(model, x, values).drag_nm
-    shaft = measured(full, signals, model, values)[-1] / (1.0 + values["gain_torque"])
+    shaft = _undone(measured(full, signals, model, values)[-1], model, values)
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     noise = segment.noise
     u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
     return Whole(x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap)
+
+
+def _undone(recorded: Array, model: Model, values: Values) -> Array:
+    """True shaft torque [n] behind a recorded one: gain and offset of the transducer taken out."""
+    torque = recorded / (1.0 + values["gain_torque"])
+    for effect in reversed(model.effects):
+        if effect.shaft is not None:
+            q = values_of(effect, model.machine, values)
+            rest, one = effect.shaft(np.array([0.0, 1.0]), q)
+            torque = (torque - rest) / (one - rest)
+    return torque
 
 
 def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
-from pipeline.criticism.judge import HeldOut, leave_out, uncertainties
+from pipeline.criticism.judge import HeldOut, in_common, leave_out, uncertainties
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.maps import all_maps, told_signal, unit_of
 from pipeline.criticism.model import BASE, PHYSICAL, Model
@@ -56,14 +56,14 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     maps = all_maps(found, around, residual, fitted)
     parameters = _parameters(fitted, around, held)
     without = model_of(model.bare(), machine)
-    bare, moved = _bare(found, fitted, without, parameters)
+    bare, total, moved = _bare(found, fitted, without, parameters, (around, held))
     return Comparison(
         campaign.motor_id,
         model.name,
         names,
         parameters,
         (*_errors(found, around, held), *run_errors(simulated)),
-        held.total,
+        total,
         tuple(_where(maps)),
         (*told_hum(begun.hum), *held.notes),
         maps,
@@ -94,15 +94,21 @@ def _parameters(fitted: Fitted, around: System, held: HeldOut) -> dict[str, Mode
 
 
 def _bare(
-    found: Sequence[Segment], fitted: Fitted, without: Model, after: dict[str, ModelParameter]
-) -> tuple[float | None, tuple[Move, ...]]:
-    """Held-out error and parameters of the model without the effects that were asked for.
+    found: Sequence[Segment],
+    fitted: Fitted,
+    without: Model,
+    after: dict[str, ModelParameter],
+    whole: tuple[System, HeldOut],
+) -> tuple[float | None, float, tuple[Move, ...]]:
+    """Held-out error of the model without the effects that were asked for, and of the `whole` one;
+    parameters of both.
 
-    Both fits share the noise floor of the fuller one, so that their errors compare.
+    Both fits share the noise floor of the fuller one and hold out the same rows, so that their
+    errors compare.
     """
     names = {effect.name for effect in without.effects}
     if names == {effect.name for effect in fitted.model.effects}:
-        return None, ()
+        return None, whole[1].total, ()
     gone = [e.name for e in fitted.model.effects if e.name not in names]
     values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
     begun = replace(fitted, model=without, values=values, tolerance=())
@@ -113,7 +119,8 @@ def _bare(
         Move(name, one.unit, one.value, one.u, after[name].value, after[name].u)
         for name, one in before.items()
     )
-    return held.total, moved
+    less, full = in_common((around, whole[0]), (held, whole[1]))
+    return less.total, full.total, moved
 
 
 def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[SignalError]:

@@ -12,7 +12,7 @@ from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
-from pipeline.criticism.judge import HeldOut, leave_out, remainder
+from pipeline.criticism.judge import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
@@ -117,9 +117,10 @@ def _climbed(
 ) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...]]:
     """The ladder as far as it is trusted, its held-out errors, and what is left at its end."""
     rungs = search(found, start, library)
-    held = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
-    rungs, left = trusted(found, rungs, held)
-    return rungs, held[: len(rungs)], left
+    alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
+    kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
+    held = in_common([r.around for r in kept], alone[: len(kept)])
+    return kept, list(held), left
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -255,7 +256,7 @@ def _ranking(
     """Found effects in the order found, then the others by their score on the last rung."""
     last = rungs[-1]
     found = []
-    for place, name in enumerate(last.added):
+    for name in last.added:
         effect = next(e for e in last.fitted.model.effects if e.name == name)
         over = _passed_over(rungs, name, last.added)
         confused = rivals_of(name, last.fitted, last.around, offered, captured, over)
@@ -265,7 +266,7 @@ def _ranking(
             RankedEffect(
                 name,
                 loss - dof * math.log(last.around.size),
-                _drop(held, place),
+                _drop(rungs, held, name),
                 _p_value(loss, dof),
                 confused,
                 f"{effect.words}; {effect.signature}",
@@ -298,12 +299,15 @@ def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tupl
     )
 
 
-def _drop(held: Sequence[HeldOut], place: int) -> float:
-    """Share of the removable held-out error, from first to last rung, that one step took."""
+def _drop(rungs: Sequence[Rung], held: Sequence[HeldOut], name: str) -> float:
+    """Share of the removable held-out error, from first to last rung, that went where an effect
+    was added; 0 where the error grew there.
+    """
     totals = [math.log(max(h.total, 1e-300)) for h in held]
-    if place + 1 >= len(totals) or totals[0] <= totals[-1]:
+    place = next(n for n, rung in enumerate(rungs) if name in rung.added)
+    if place == 0 or totals[0] <= totals[-1]:
         return 0.0
-    return (totals[place] - totals[place + 1]) / (totals[0] - totals[-1])
+    return max((totals[place - 1] - totals[place]) / (totals[0] - totals[-1]), 0.0)
 
 
 def _other(score: Score) -> RankedEffect:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,11 +96,20 @@ def uncertainties(around: System, held: HeldOut, own: int) -> Array:
     return wider
 
 
-def held_out_spreads(around: System, own: int, segments: Sequence[Segment] = ()) -> Array:
-    """χ²/n [G] of every group, each capture predicted from all the others along the first `own`
-    columns; captures that are always in the fit count as fitted.
+def in_common(fits: Sequence[System], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
+    """The same rows held out of several fits to the same captures, so that their errors compare.
+
+    A parameter that one capture alone carries keeps that capture in the fit: to count it where it
+    is predicted, and not where it is fitted, would pass for a better prediction.
     """
-    return predicted_spreads(around, leave_out(around, own, segments))
+    shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
+    told = shared if shared.any() else np.ones(shared.size, dtype=bool)
+    made = []
+    for around, one in zip(fits, held, strict=True):
+        residual = np.where(shared, one.residual, np.nan)
+        errors = (np.where(shared, one.residual, around.residual) / around.soft)[told]
+        made.append(replace(one, residual=residual, total=math.sqrt(float((errors**2).mean()))))
+    return tuple(made)
 
 
 def predicted_spreads(around: System, held: HeldOut) -> Array:

@@ -189,9 +189,7 @@ class _Sampler:
             step = min(step, _FINE * self.values[column.name])
         moved = {**self.values, column.name: self.values[column.name] + step}
         if column.name == "bench_angle_rad":
-            there = measured(self.segment, self.segment.recorded, self.model, moved)
-            start = measured(self.segment, self.segment.recorded, self.model, self.values)
-            return (there - start) / step
+            return (residual(self.segment, self.model, moved) - self.here) / step
         x = replace(self.x, base=moved)
         pieces = self.pieces
         if column.name not in _BETWEEN:

@@ -211,9 +211,9 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
         if effect.coenergy is not None:
             more, turn = effect_flux(effect, x, values_of(effect, model.machine, values))
             flux, slope = flux + more, slope + turn
-    mean = mean_current(x, values)
     x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
+    mean = mean_current(x, values)
     drop: Complex = values["r_ohm"] * mean.i_a
     drag: Array = values["b_nm_s_rad"] * x.omega_rad_s
     for effect in model.effects:

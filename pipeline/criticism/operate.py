@@ -46,8 +46,9 @@ def operate(
     for _ in range(_ANGLE_ROUNDS):
         nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
         error = angle_error(nearer, model, values)
-    true = theta - error / model.machine.pole_pairs
-    omega = _speed(true, segment.ts_s, theta.size // segment.size)
+    turned = error / model.machine.pole_pairs
+    true = theta - turned
+    omega = omega - _speed(turned, segment.ts_s, theta.size // segment.size)
     return _operating(
         segment, signals, model, values, current * np.exp(1j * error), true, omega, freq
     )
@@ -93,12 +94,13 @@ def _operating(
     omega: Array,
     freq: Array,
 ) -> Operating:
+    zero_rad = values["bench_angle_rad"] if segment.kind == "open" else 0.0
     return Operating(
         machine=model.machine,
         base=values,
         id_a=current.real,
         iq_a=current.imag,
-        eps_rad=model.machine.pole_pairs * theta,
+        eps_rad=model.machine.pole_pairs * theta - zero_rad,
         theta_rad=theta,
         omega_rad_s=omega,
         winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
@@ -125,14 +127,19 @@ def _warmth(
 
 def _travel(signals: Mapping[str, Array], size: int) -> Array:
     since = signals.get("travel_rad")
-    return np.full(size, np.inf) if since is None or since.size != size else since
+    if since is None:
+        return np.full(size, np.inf)
+    at = np.arange(size) * since.size / size
+    known = np.isfinite(since)
+    turned = np.interp(at, np.arange(since.size), np.where(known, since, 0.0))
+    return np.where(known[at.astype(np.int64)], turned, np.inf)
 
 
 def _run(signals: Mapping[str, Array], size: int) -> NDArray[np.int64]:
     run = signals.get("run")
-    if run is None or run.size != size:
+    if run is None:
         return np.zeros(size, dtype=np.int64)
-    return run.astype(np.int64)
+    return np.repeat(run.astype(np.int64), size // run.size)
 
 
 def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:

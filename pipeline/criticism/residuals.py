@@ -33,6 +33,12 @@ def residual(
     return measured(segment, signals, model, values) - predicted(segment, x, pieces, model, values)
 
 
+def over_inertia(segment: Segment, channel: str) -> bool:
+    """Whether an equation is one of accelerations [rad/s²]: of a shaft that runs free."""
+    coasting = channel == "omega_mech_rad_s" and segment.kind == "shaft"
+    return coasting or segment.kind == "motion"
+
+
 def disturbed(
     segment: Segment, weak: Projection, model: Model, values: Values, name: str, waves: Array
 ) -> Array:
@@ -54,7 +60,7 @@ def measured(segment: Segment, signals: Mapping[str, Array], model: Model, value
         return np.stack([v.real, v.imag])
     rows = []
     for channel in segment.channels:
-        if segment.kind == "motion" or (channel == "omega_mech_rad_s" and segment.kind == "shaft"):
+        if over_inertia(segment, channel):
             rows.append(np.zeros(segment.size))
         elif segment.kind == "standing":
             true = operate(segment, signals, model, values).i_a.imag
@@ -157,7 +163,7 @@ def _shaft_torque(
     if finer > 1:
         shaft = _averaged(shaft, finer)
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
-    if segment.channels[-1] == "omega_mech_rad_s" or segment.kind == "motion":
+    if over_inertia(segment, segment.channels[-1]):
         # in the angle sensor's units: a torque's noise floor would shrink with the inertia
         return shaft / values["j_kgm2"] - acceleration
     shaft = shaft - values["j_kgm2"] * acceleration

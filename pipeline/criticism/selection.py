@@ -16,7 +16,7 @@ from pipeline.criticism.floors import form_tolerance
 from pipeline.criticism.grams import Grams
 from pipeline.criticism.judge import (
     HeldOut,
-    held_out_spreads,
+    in_common,
     leave_out,
     predicted_spreads,
     told_groups,
@@ -136,7 +136,7 @@ def _refit_best(
     of its own kind by three prices, since what a form leaves there is of that size.
     """
     own = len(own_columns(fitted.model))
-    before = held_out_spreads(wide, own, segments) * _shrunk(segments, wide)
+    before, shrunk = leave_out(wide, own, segments), _shrunk(segments, wide)
     any_wrong, told = _doubt(segments, fitted, wide, found), told_groups(wide, segments)
     close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
     best: tuple[Fitted, System] | None = None
@@ -155,8 +155,10 @@ def _refit_best(
         held = leave_out(tried[1], len(tried[1].columns), segments)
         if effect.closer is not None and not _sure(*tried, held):
             continue
-        after = predicted_spreads(tried[1], held) * _shrunk(segments, tried[1])
-        if _holds(wide, before, tried[1], after, promised, doubts):
+        one, other = in_common((wide, tried[1]), (before, held))
+        without = predicted_spreads(wide, one) * shrunk
+        after = predicted_spreads(tried[1], other) * _shrunk(segments, tried[1])
+        if _holds(wide, without, tried[1], after, promised, doubts):
             best, least = tried, cost
     return best
 

@@ -14,6 +14,7 @@ from pipeline.criticism.floors import form_tolerance, noise_floor
 from pipeline.criticism.grams import Grams, misfit_of, pseudo_inverse
 from pipeline.criticism.linearise import Column, base_columns, effect_columns, linearise
 from pipeline.criticism.model import Model, zero
+from pipeline.criticism.residuals import over_inertia
 from pipeline.criticism.segment import Segment, row_index
 from pipeline.criticism.size import base_scales
 
@@ -22,7 +23,6 @@ _SEED = 20260302
 _STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
 # the equation of a coasting shaft is drags over J
 _HEAVIER = 0.05
-_COASTING = "omega_mech_rad_s"
 _CURRENTS = frozenset({"id_a", "iq_a", "i_pair_a"})
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 
@@ -238,9 +238,9 @@ def system(
     rescaled = np.ones(whiten.size)
     if before is not None and known:
         rescaled = whiten / before.whiten
-        speed = np.array([segments[n].kind == "shaft" and c == _COASTING for n, c, _ in labels])
+        free = np.array([over_inertia(segments[n], channel) for n, channel, _ in labels])
         inertia = before.around.values["j_kgm2"] / values["j_kgm2"]
-        rescaled *= np.where(speed, inertia, 1.0)[np.concatenate(groups)]
+        rescaled *= np.where(free, inertia, 1.0)[np.concatenate(groups)]
     for place, column in enumerate(columns):
         old = known.get(column.key)
         matrix[:, place] = made[:, fresh[column.key]] if old is None else old * rescaled

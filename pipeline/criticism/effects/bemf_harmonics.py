@@ -51,4 +51,5 @@ EFFECT = Effect(
     ),
     rivals={"cogging": "a slow turn without current"},
     coenergy=_coenergy,
+    torque=_torque,
 )

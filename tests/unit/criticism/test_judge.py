@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.judge import leave_out, material_size, uncertainties
+from pipeline.criticism.judge import in_common, leave_out, material_size, uncertainties
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
 from pipeline.criticism.system import Fitted, System, system
@@ -58,6 +58,25 @@ def test_captures_that_disagree_are_not_surer_than_their_scatter():
 def test_one_capture_alone_has_its_noise():
     around = captures([0.0])
     assert uncertainties(around, leave_out(around, 1), 1)[0] == pytest.approx(ROWS**-0.5, rel=0.1)
+
+
+def test_a_column_that_one_capture_carries_predicts_nothing_better():
+    """It keeps the worst capture in the fit, which is no prediction: rows count in both or none."""
+    around = captures([0.0, 0.0, 0.0, 0.0, 3.0])
+    own = np.random.default_rng(9).standard_normal(around.size) * (around.group == 4)
+    wider = replace(
+        around,
+        columns=(*around.columns, Column("psi_wb", 1.0)),
+        matrix=np.column_stack([around.matrix, own]),
+        penalty=np.zeros(2),
+        pull=np.zeros(2),
+    )
+    alone = leave_out(around, 1), leave_out(wider, 2)
+    assert alone[1].total < 0.9 * alone[0].total
+    before, after = in_common((around, wider), alone)
+    assert after.total == pytest.approx(before.total, rel=0.02)
+    assert np.array_equal(np.isfinite(before.residual), around.group != 4)
+    assert np.array_equal(np.isfinite(after.residual), around.group != 4)
 
 
 def test_at_standstill_a_voltage_is_measured_by_what_is_there():

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pipeline.criticism.diagnosis import _explained, trusted
+from pipeline.criticism.diagnosis import _drop, _explained, trusted
 from pipeline.criticism.judge import HeldOut
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
@@ -89,3 +90,14 @@ def test_a_coupling_is_named_only_where_it_is_surely_there(apart, sure):
     )
     held = HeldOut(plain.residual, 1.0, {0: np.array([apart]), 1: np.array([-apart])})
     assert _sure(fitted, around, held) is sure
+
+
+def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
+    """A removal on the way leaves rungs and names of different counts."""
+    rungs = [
+        Rung(added, None, None, ())  # type: ignore[arg-type]
+        for added in ((), ("cogging",), ("saturation",), ("saturation", "windage"))
+    ]
+    held = [HeldOut(np.zeros(1), total) for total in (math.e**4, math.e**3, math.e, math.e**1.5)]
+    assert _drop(rungs, held, "saturation") == pytest.approx(2.0 / 2.5)
+    assert _drop(rungs, held, "windage") == 0.0
