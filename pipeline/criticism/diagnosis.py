@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammaincc
@@ -50,6 +51,7 @@ _WITHIN = (
 _SEEN = 3.0
 _EXPLAINED = 0.5
 _AS_GOOD = 0.1
+_NOTHING = 0.01
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -182,12 +184,13 @@ def trusted(
 
     Where that is structure that nothing here explains, the last rungs go that took less than a
     tenth of the held-out error: beside an unknown, their names would be guesses. Where anything is
-    left, so does a further effect with which captures held out are predicted worse.
+    left, so does a further effect with which captures held out are not predicted better by a
+    hundredth.
     """
     for count in range(len(rungs), 0, -1):
         kept, around = tuple(rungs[:count]), rungs[count - 1].around
         left = remainder(around, found, around.residual)
-        worse = count > 2 and held[count - 1].total > held[count - 2].total
+        worse = count > 2 and held[count - 1].total > (1.0 - _NOTHING) * held[count - 2].total
         if count == 1 or not left or (_explained(kept, left) and not worse):
             break
         if held[count - 1].total < (1.0 - LEAST_SHARE) * held[count - 2].total:
@@ -260,8 +263,8 @@ def _ranking(
         effect = next(e for e in last.fitted.model.effects if e.name == name)
         over = _passed_over(rungs, name, last.added)
         confused = rivals_of(name, last.fitted, last.around, offered, captured, over)
-        loss = loss_without(last.around, last.fitted, (name,))
         dof = effect.dof(last.fitted.model.machine)
+        loss = _loss(captured, last, effect, dof)
         found.append(
             RankedEffect(
                 name,
@@ -285,6 +288,19 @@ def _ranking(
         )
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
     return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
+
+
+def _loss(found: Sequence[Segment], last: Rung, effect: Effect, dof: int) -> float:
+    """Rise of misfit without a found effect: to first order, or of a refit where that says that
+    the effect is not worth its parameters. Along a bent valley the tangent knows little.
+    """
+    loss = loss_without(last.around, last.fitted, (effect.name,))
+    if loss > dof * math.log(last.around.size):
+        return loss
+    own = f"{effect.name}."
+    values = {k: v for k, v in last.fitted.values.items() if not k.startswith(own)}
+    less = replace(last.fitted, model=last.fitted.model.without(effect.name), values=values)
+    return max(loss, gauss_newton(found, less)[1].misfit - last.around.misfit)
 
 
 def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tuple[Candidate, ...]:

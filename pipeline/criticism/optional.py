@@ -24,22 +24,48 @@ def trimmed(
     """The fit with the optional terms of the named effects that do not pay left out.
 
     A term pays when −2 log L falls by more than ln n a parameter. What to first order does not pay
-    is left out in one refit; if that loses more than foreseen, the cheapest term alone is. One term
-    with an amplitude always stays.
+    is left out in one refit; if that loses more than foreseen, one term after the other is. One
+    term with an amplitude always stays.
     """
     price = math.log(max(around.size, 2))
     for name in names:
-        effect = next(e for e in fitted.model.effects if e.name == name)
+        effect = _named(fitted, name)
         spare = _spare(fitted, around, effect, price)
-        for terms in (spare, spare[:1]) if len(spare) > 1 else (spare,):
-            if not terms:
-                break
-            parameters = _parameters(fitted, effect, terms)
-            tried = _without(segments, fitted, around, effect, terms)
-            if tried[1].misfit - around.misfit < price * len(parameters):
-                fitted, around = tried
-                break
+        if not spare:
+            continue
+        less = _unless_worth(segments, fitted, around, name, spare, price)
+        if less is not None:
+            fitted, around = less
+            continue
+        terms = {p.optional for p in effect.parameters_of(fitted.model.machine)}
+        for term in (*spare, *sorted(terms - {0, *spare})):
+            less = _unless_worth(segments, fitted, around, name, (term,), price)
+            fitted, around = less or (fitted, around)
     return fitted, around
+
+
+def _named(fitted: Fitted, name: str) -> Effect:
+    return next(e for e in fitted.model.effects if e.name == name)
+
+
+def _unless_worth(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    around: System,
+    name: str,
+    terms: tuple[int, ...],
+    price: float,
+) -> tuple[Fitted, System] | None:
+    """The refit without some terms of an effect; None where these were worth their price, or no
+    amplitude would stay.
+    """
+    effect = _named(fitted, name)
+    mine = effect.parameters_of(fitted.model.machine)
+    if not any(p.amplitude and p.optional not in terms for p in mine):
+        return None
+    tried = _without(segments, fitted, around, effect, terms)
+    worth = price * len(_parameters(fitted, effect, terms))
+    return tried if tried[1].misfit - around.misfit < worth else None
 
 
 def _parameters(fitted: Fitted, effect: Effect, terms: Sequence[int]) -> tuple[str, ...]:
