@@ -109,15 +109,19 @@ def _chosen(
     wide: System,
     found: Sequence[Effect],
 ) -> tuple[Fitted, System] | None:
-    """The first few candidates refitted, the next few where none of these keeps its promise.
+    """The first few candidates refitted, the next few where none of these keeps its promise, or
+    is surely there.
 
-    The fit that stays is finished with columns of its own.
+    The fit that stays is finished with columns of its own, and without terms that do not pay.
     """
     for first in range(0, min(len(passing), _ROUNDS * _REFITS), _REFITS):
-        best = _refit_best(segments, fitted, passing[first : first + _REFITS], wide, found)
-        if best is not None:
+        batch = list(passing[first : first + _REFITS])
+        while (best := _refit_best(segments, fitted, batch, wide, found)) is not None:
             named = [effect.name for effect in best[0].model.effects]
-            return trimmed(segments, *gauss_newton(segments, best[0]), named)
+            finished = trimmed(segments, *gauss_newton(segments, best[0]), named)
+            if _sure(*finished, leave_out(finished[1], len(finished[1].columns), segments)):
+                return finished
+            batch = [s for s in batch if s.candidate.effect.name != named[-1]]
     return None
 
 
@@ -153,8 +157,6 @@ def _refit_best(
         doubts = _doubt(segments, fitted, wide, kin), any_wrong
         promised = _HELD * score.price, (_BESIDE if kin else _HELD) * score.price
         held = leave_out(tried[1], len(tried[1].columns), segments)
-        if effect.closer is not None and not _sure(*tried, held):
-            continue
         one, other = in_common((wide, tried[1]), (before, held))
         without = predicted_spreads(wide, one) * shrunk
         after = predicted_spreads(tried[1], other) * _shrunk(segments, tried[1])
@@ -178,6 +180,9 @@ def _matters(fitted: Fitted, around: System, before: System, told: NDArray[np.bo
 def _sure(fitted: Fitted, around: System, held: HeldOut) -> bool:
     """Whether some amplitude of the newest effect is surely not zero: two standard uncertainties
     from it, whichever capture is left out.
+
+    A large drag below the lowest speed that anything turned at mends how friction changes its
+    sense at a reversal, and is known to no figure.
     """
     effect = fitted.model.effects[-1]
     sizes = (p.name for p in effect.parameters_of(fitted.model.machine) if p.amplitude)

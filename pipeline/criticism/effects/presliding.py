@@ -39,7 +39,9 @@ EFFECT = Effect(
     reference="Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995), friction model",
     parameters=(
         Parameter("torque_nm", "N·m", 0.01, 0.001, "torque_nm", low=0.0, high=1.0),
-        Parameter("travel_rad", "rad", 0.001, 0.0, low=1e-5, high=0.1, scan=(0.0003, 0.003, 0.03)),
+        Parameter(
+            "travel_rad", "rad", 0.001, 0.0001, low=1e-5, high=0.1, scan=(0.0003, 0.003, 0.03)
+        ),
     ),
     rivals={"stribeck": "a spin-down: it has no reversal"},
     torque=_torque,

@@ -75,7 +75,7 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
 
 
 @pytest.mark.parametrize(("apart", "sure"), [(0.04, True), (0.06, False)])
-def test_a_coupling_is_named_only_where_it_is_surely_there(apart, sure):
+def test_an_effect_is_named_only_where_it_is_surely_there(apart, sure):
     """Two captures, without the one or the other of which the share of 0.1 moves so far."""
     plain = missing_by(torque_shaft_nm=1.0).around
     column = Column("compliance.share", 1e-3)
