@@ -138,6 +138,12 @@ def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
     return CaptureMeta(**known, extra=dict(sorted(extra.items())))
 
 
+def belongs(values: Mapping[str, str]) -> None:
+    """Raises what `capture_meta` would where no motor is named: such a file is in no campaign."""
+    if not values.get("motor_id", "").strip():
+        capture_meta(values)
+
+
 def _missing(values: Mapping[str, str]) -> list[CaptureError]:
     """One fault for each of the keys that every capture needs and this one lacks."""
     return [

@@ -22,6 +22,7 @@ from pipeline.io.metadata import (
     MAX_MANIFEST_BYTES,
     MAX_SIDECAR_BYTES,
     SIDECAR_SUFFIX,
+    belongs,
     manifest,
     merge,
     sidecar,
@@ -276,6 +277,7 @@ def _entry(
     said, contradictions = merge(path, statements)
     findings += contradictions
     said = fixed | said
+    belongs(said)
     return Entry(path, digest, form, source, tuple(sorted(said.items())), recovered)
 
 

@@ -63,6 +63,11 @@ ROWS = "".join(f"{k * 1e-5},{1.0},{0.01 * k}\n" for k in range(400))
         ("words.mcap", "these are words, not a recording\n", "not_mcap"),
         ("column.csv", STEP + "t_s,vab_v\n" + "0.0,1.0\n0.1,1.0\n", "missing_column"),
         ("nan.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "nan,1.0,0.0\n", "time_not_finite"),
+        (
+            "nobody.csv",
+            STEP.replace("# motor_id: stray\n", "") + "t_s,vab_v,ia_a\n" + ROWS,
+            "missing_metadata",
+        ),
         ("test.csv", HEAD.format(test="dance") + "t_s,vab_v,ia_a\n" + ROWS, "unknown_test"),
         ("back.csv", STEP + "t_s,vab_v,ia_a\n" + ROWS + "0.0,1.0,0.0\n", "time_not_increasing"),
         ("one.csv", SPIN + "t_s,vab_v,vbc_v,theta_mech_rad\n0.0,1.0,0.5,0.1\n", "angle_coverage"),

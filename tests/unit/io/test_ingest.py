@@ -155,6 +155,7 @@ def test_the_same_bytes_count_once(tmp_path: Path) -> None:
         ("test: spin_down", "test: dance", "unknown_test", "'dance'"),
         ("# test: spin_down\n", "", "missing_metadata", "test"),
         ("# motor_id: 000123\n", "# motor_id:\n", "missing_metadata", "motor_id"),
+        ("# motor_id: 000123\n", "", "missing_metadata", "motor_id"),
         ("contract: 1", "contract: 2", "contract_version", "'2'"),
         ("# test", "# pole_pairs: seven\n# test", "bad_metadata", "pole_pairs"),
         ("# test", "# pole_pairs: 3.5\n# test", "bad_metadata", "pole_pairs"),
@@ -175,6 +176,18 @@ def test_what_cannot_be_used_is_refused_and_says_why(
     got, message = only_refusal(tmp_path, a__csv=CSV.replace(old, new))
     assert got == code
     assert says in message
+
+
+def test_a_capture_without_a_motor_is_refused_before_motors_are_told_apart(tmp_path: Path) -> None:
+    """Every entry of a survey names its motor, so nothing after it has to ask."""
+    bare = CSV.replace("# motor_id: 000123\n", "")
+    found = fill(tmp_path, a__csv=CSV, b__csv=bare, c__csv=bare.replace("# test: spin_down\n", ""))
+    assert [entry.said["motor_id"] for entry in found.entries] == ["000123"]
+    assert [(f.file, f.code) for f in found.findings] == [
+        ("b.csv", "missing_metadata"),
+        ("c.csv", "missing_metadata"),
+    ]
+    assert "nothing states test" in found.findings[1].message
 
 
 def test_files_that_only_look_like_captures_are_refused(tmp_path: Path) -> None:
