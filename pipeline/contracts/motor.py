@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
 
+from pipeline.contracts.requirements import LINE_CURRENTS
 from pipeline.contracts.rotation import shaft_angle
+from pipeline.contracts.waveform import samples_per_time_constant
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.finding import Finding
 
@@ -15,6 +18,9 @@ CONSEQUENCE = {
     "pole_pairs": "constants that need it take the count from the data, never the nameplate",
     "winding": "the wye equivalent is published, which holds for both",
 }
+
+# Saliency and iron's bend part the time constants of one rotor by far less.
+STEPS_APART = 100.0
 
 
 def agree(campaign: Campaign) -> tuple[Finding, ...]:
@@ -27,6 +33,7 @@ def agree(campaign: Campaign) -> tuple[Finding, ...]:
     findings += _one_test_only(campaign)
     findings += _cogging_directions(campaign)
     findings += _torque_signs(campaign)
+    findings += _step_clocks(campaign)
     return tuple(findings)
 
 
@@ -139,3 +146,34 @@ def _torque_signs(campaign: Campaign) -> list[Finding]:
 def _extremes(capture: Capture) -> tuple[float, float]:
     current = capture.arrays("iq_a")["iq_a"]
     return float(np.nanpercentile(current, 2.0)), float(np.nanpercentile(current, 98.0))
+
+
+def _step_clocks(campaign: Campaign) -> list[Finding]:
+    found = [(c, _settling_s(c)) for c in campaign.of("current_step")]
+    times = [seconds for _, seconds in found if 0.0 < seconds < math.inf]
+    if not times or max(times) < STEPS_APART * min(times):
+        return []
+    usual = float(np.exp(np.median(np.log(times))))
+    least = math.sqrt(STEPS_APART)
+    return [
+        Finding(
+            c.path,
+            "warning",
+            "clock_contradiction",
+            f"its current settles in {seconds:.3g} s, where {usual:.3g} s is usual in the steps of "
+            f"{campaign.motor_id}: no Ld and Lq from steps while one clock is wrong",
+            "correct t_s, in seconds, or take the capture out",
+        )
+        for c, seconds in found
+        if 0.0 < seconds < math.inf and not usual / least < seconds < usual * least
+    ]
+
+
+def _settling_s(capture: Capture) -> float:
+    """Time constant of a step's current [s], roughly; infinite where it has no edge."""
+    names = [n for n in LINE_CURRENTS if capture.has("t_s", n)]
+    data = capture.arrays("t_s", *names)
+    current = data[names[0]][np.isfinite(data[names[0]])] if names else np.zeros(0)
+    if current.size < 2:
+        return math.inf
+    return samples_per_time_constant(current) * float(np.median(np.diff(data["t_s"])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
@@ -36,8 +37,16 @@ def check_all(
     for rule in rules():
         chosen = {**rule.options, **options.get(rule.name, {})}
         try:
-            checks.append(rule.check(constants, campaign, chosen))
+            checks.append(_finite(rule.check(constants, campaign, chosen)))
         except BROKEN as error:
             words = f"broke on this data: {type(error).__name__}: {error}; report it with this line"
             checks.append(not_evaluated(rule.name, words))
     return tuple(checks)
+
+
+def _finite(check: Check) -> Check:
+    """The check, or that it was not made where its value or limit is no finite number."""
+    numbers = (x for x in (check.value, check.limit) if x is not None)
+    if all(math.isfinite(x) for x in numbers):
+        return check
+    return not_evaluated(check.name, f"{check.value} against {check.limit} judges nothing")

@@ -106,7 +106,7 @@ def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:
 
 
 def _possible(estimator: Estimator, result: Fit) -> Fit:
-    """The result with every value outside its term's range turned into its own refusal."""
+    """The result with every value that is not finite or out of range turned into a refusal."""
     own = {term.name: term for term in estimator.terms}
     return Fit(
         tuple(
@@ -118,13 +118,16 @@ def _possible(estimator: Estimator, result: Fit) -> Fit:
 
 
 def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
-    if not estimate.known or term is None or _in_range(estimate.number, term):
+    if not estimate.known:
         return estimate
-    low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
-    note = (
-        f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}: look at "
-        f"signs and units of {', '.join(estimate.captures[:3])}"
-    )
+    if not estimate.finite:
+        wrong = f"came out as {estimate.number:.4g} {estimate.unit} with no finite uncertainty"
+    elif term is not None and not _in_range(estimate.number, term):
+        low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
+        wrong = f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}"
+    else:
+        return estimate
+    note = f"{wrong}: look at clock, signs and units of {', '.join(estimate.captures[:3])}"
     return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
 
 

@@ -27,6 +27,7 @@ from pipeline.fit.step_record import StepRecord
 Array = NDArray[np.float64]
 SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4")
 TERMS = 4
+EDGE_REACH = 4.0  # [samples]
 LD, LQ = 0, 1 + TERMS
 SPACE = 2.0 / math.sqrt(3.0)
 
@@ -275,6 +276,20 @@ class StepModel:
             blocks.append(parameters[levels])
             slopes.append((levels[:, None] == free[None, :]).astype(np.float64))
         return np.concatenate(blocks), np.vstack(slopes)
+
+    def bounds(self, start: Array) -> tuple[Array, Array]:
+        """Where the search may go from `start`: beyond, a current would run away without end.
+
+        Inductances and resistances stay positive, and an edge near the samples that leave it open.
+        """
+        low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
+        positive = [LD, LQ, *self.layout.starts]
+        low[positive] = 1e-3 * start[positive]
+        for record, at in zip(self.records, self.layout.starts, strict=True):
+            first = at + 1 + (record.wave.levels_v.size > 1)
+            edges = slice(first, first + len(record.wave.free))
+            low[edges], high[edges] = -EDGE_REACH, EDGE_REACH
+        return low, high
 
     def level_columns(self, capture: int) -> NDArray[np.intp]:
         """Where the errors of a capture's voltage levels sit among the parameters."""

@@ -9,6 +9,7 @@ sample, by the trapezoid, the hold or the centred mean that `voltage_timing` ask
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 MOST_EDGES = 12
 MOST_CELLS = 1500
 MOST_BINS = 3000
+MOST_APART = 100.0
+"""Most that saliency and iron's bend together part the inductances of one rotor's steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +129,23 @@ def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] |
     if not fit.full_rank or inverse <= 0.0 or slope <= 0.0:
         return None
     return 1.0 / inverse, slope / inverse
+
+
+def disagreement(records: Sequence[StepRecord]) -> str:
+    """The captures that cannot be of one rotor with the others, in words; empty where all can.
+
+    A clock or a current in another unit scales L by a thousand, and a common fit would follow it.
+    """
+    found = np.log([record.l_start_h for record in records])
+    if found.size < 2 or np.ptp(found) < math.log(MOST_APART):
+        return ""
+    apart = found - np.median(found)
+    odd = [
+        f"{record.capture.path} ({math.exp(ratio):.3g} times the usual L)"
+        for record, ratio in zip(records, apart, strict=True)
+        if abs(ratio) > 0.5 * math.log(MOST_APART) - 1e-9
+    ]
+    return f"look at t_s and the units of {', '.join(odd)}: not one rotor with the other steps"
 
 
 def waveform_of(t_s: Array, v_v: Array, timing: VoltageTiming) -> Waveform:

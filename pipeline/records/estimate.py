@@ -16,6 +16,7 @@ from pipeline.records.uncertainty import (
 
 Status = Literal["measured", "derived", "assumed", "not_identifiable"]
 Conditions = Mapping[str, float | int | str]
+MOST = 1e150
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,15 @@ class Estimate:
     def known(self) -> bool:
         """Whether there is a value."""
         return self.value is not None
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number is one that a document can hold and that can be squared."""
+        numbers: list[float] = [part.u for part in self.budget]
+        numbers += [x for x in self.at.values() if not isinstance(x, str)]
+        numbers += self.bounds or ()
+        numbers += [x for one in self.orders for x in (one.amplitude, one.u, one.phase_rad)]
+        return all(abs(x) < MOST for x in numbers)
 
     @property
     def number(self) -> float:

@@ -14,6 +14,7 @@ from tests.faults.healthy import (
     Motor,
     cogging,
     column,
+    current_step,
     lcr,
     open_circuit,
     resistance,
@@ -108,3 +109,12 @@ def test_one_sign_of_torque(rng: np.random.Generator) -> None:
     other = resistance(MOTOR, rng)
     assert [f.code for f in agree(_campaign(motoring, other))] == ["current_coverage"]
     assert agree(_campaign(motoring, braking, other)) == ()
+
+
+def test_a_step_of_another_clock(rng: np.random.Generator) -> None:
+    """Warned at the capture whose `t_s` is in milliseconds, and not at the other two."""
+    steps = [current_step(MOTOR, rng) for _ in range(3)]
+    steps[1] = with_column(steps[1], "t_s", 1e3 * column(steps[1], "t_s"))
+    found = [f for f in agree(_campaign(*steps)) if f.code == "clock_contradiction"]
+    assert [(f.file, f.severity) for f in found] == [("1_current_step.csv", "warning")]
+    assert "t_s" in found[0].remedy

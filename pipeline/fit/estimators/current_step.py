@@ -18,7 +18,7 @@ from pipeline.fit.instruments import (
 )
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.step_model import LD, LQ, SHARED, SPACE, TERMS, StepModel, along_ramp, start_of
-from pipeline.fit.step_record import StepRecord, read_step
+from pipeline.fit.step_record import StepRecord, disagreement, read_step
 from pipeline.numerics.least_squares import (
     NonlinearFit,
     autocorrelation_time,
@@ -80,8 +80,9 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     del known
     records, notes = _records(campaign.of("current_step"))
     axes = _axes_told(records, options["least_share"])
-    if not axes:
-        reason = "; ".join([*notes, EXPERIMENT])
+    odd = disagreement(records)
+    if odd or not axes:
+        reason = "; ".join([*notes, odd or EXPERIMENT])
         return Fit(tuple(not_identifiable(n, "H", NAME, reason) for n in GIVES))
     model = StepModel(records)
     solution = _solve(model, axes)
@@ -205,10 +206,10 @@ def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -
         trial[where] = values
         return model.residuals(trial, sigmas, free)
 
-    low = np.full(where.size, -np.inf)
-    for place in (LD, LQ):
-        low[where == place] = 1e-3 * start[place]
-    fit = gauss_newton(residuals_and_jacobian, start[where], low, tolerance=1e-3)
+    low, high = model.bounds(start)
+    fit = gauss_newton(
+        residuals_and_jacobian, start[where], low[where], high[where], tolerance=1e-3
+    )
     parameters = start.copy()
     parameters[where] = fit.parameters
     scale = np.linalg.norm(fit.jacobian, axis=0)

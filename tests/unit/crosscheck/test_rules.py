@@ -182,6 +182,16 @@ def test_a_rule_that_breaks_has_judged_nothing(monkeypatch: pytest.MonkeyPatch) 
     assert {check.name: check.status for check in others}["pole_pairs_nameplate"] == "pass"
 
 
+@pytest.mark.parametrize(("value", "limit"), [(math.nan, 1.0), (1.0, math.inf), (1.0, math.nan)])
+def test_a_check_against_no_number_has_judged_nothing(
+    monkeypatch: pytest.MonkeyPatch, value: float, limit: float
+) -> None:
+    odd = Rule("odd", lambda *_: Check("odd", "pass", "fine", value, limit))
+    monkeypatch.setattr(registry, "rules", lambda: (odd,))
+    (check,) = registry.check_all(constants(), EMPTY, {})
+    assert (check.status, check.value, check.limit) == ("not_evaluated", None, None)
+
+
 @pytest.mark.parametrize(
     ("order", "status"),
     [(84, "pass"), (168, "pass"), (12, "marginal"), (14, "marginal"), (1, "marginal"), (5, "fail")],

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.fit import step_record
 from pipeline.fit.estimators import (
     current_step,
     lcr,
@@ -124,6 +126,38 @@ def test_saturation_is_extrapolated_to_zero_current():
 
 
 # LCR
+
+
+STEPS = [(-30.0, 4.0), (-30.0, -4.0), (60.0, 4.0), (60.0, -4.0)]
+
+
+def steps_with_a_slow_clock(factor):
+    """Four steps of one rotor, the second with its time multiplied."""
+    captures = [
+        step_capture("ab", theta, v, terminal("ab", theta, 2e-4, 3e-4), seed=k)
+        for k, (theta, v) in enumerate(STEPS)
+    ]
+    slow = captures[1].tables[0].with_columns(pl.col("t_s") * factor)
+    captures[1] = replace(captures[1], tables=(slow,))
+    return captures
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_step_of_another_clock_is_named_and_no_number_is_made_of_it():
+    """A common fit follows the slow capture: 0.2 H with a small u, or a NaN."""
+    captures = steps_with_a_slow_clock(1e3)
+    found = estimates(current_step.ESTIMATOR, *captures)
+    assert {e.status for e in found.values()} == {"not_identifiable"}
+    for estimate in found.values():
+        assert captures[1].path in estimate.note and captures[0].path not in estimate.note
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_search_for_l_stays_where_a_current_is_finite(monkeypatch):
+    """Fault: one clock off by a thousand. Unbounded, an edge runs off and the current overflows."""
+    monkeypatch.setattr(step_record, "MOST_APART", math.inf)
+    for estimate in estimates(current_step.ESTIMATOR, *steps_with_a_slow_clock(1e3)).values():
+        assert math.isfinite(estimate.number) and math.isfinite(estimate.u)
 
 
 def lcr_capture(offset_deg, pairs=("ab",), angles=None, seed=0):
