@@ -28,6 +28,13 @@ class Listing:
     findings: tuple[Finding, ...]
 
 
+def input_folder(name: str) -> Path:
+    """The folder of captures; raises UsageError where it is none."""
+    if not Path(name).is_dir():
+        raise UsageError(f"input={name} is no folder", "name the folder of captures")
+    return Path(name)
+
+
 def list_files(folder: Path) -> Listing:
     """All regular files below a folder; hidden ones are left out.
 

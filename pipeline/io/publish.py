@@ -7,9 +7,12 @@ import json
 import os
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
-from pipeline.records.errors import MachineError
+from pipeline.records.errors import MachineError, UsageError
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def canonical_json(document: Any) -> bytes:
@@ -40,6 +43,25 @@ def write_whole(path: Path, content: bytes) -> None:
         ) from error
 
 
+def output_folder(output: str) -> Path:
+    """The folder `output`, made if need be; called before the work, so that none is lost.
+
+    Raises UsageError where nothing can be written there, MachineError where the disk is full.
+    """
+    folder, remedy = Path(output), "name a folder to write to, output=DIR"
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"output={output} is a file", remedy)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        told = f"output={output} cannot be written: {error.strerror}"
+        if error.errno in FULL:
+            raise MachineError(told, _remedy(error)) from error
+        raise UsageError(told, remedy) from error
+
+
 def partial_owner(path: Path) -> int | None:
     """The process that was writing a file of a temporary name; None where the name is no such."""
     words = path.name.split(".")
@@ -47,7 +69,7 @@ def partial_owner(path: Path) -> int | None:
 
 
 def _remedy(error: OSError) -> str:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+    if error.errno in FULL:
         return "free the disk and run again"
     return "name an output folder that can be written"
 

@@ -47,6 +47,14 @@ def summary(
     return "\n".join(lines)
 
 
+def nothing_usable(folder: str, *, refused: bool) -> str:
+    """The line that says that a folder holds no capture to work on, and what to do."""
+    remedy = "`inspect FILE` says why a file is none; name the folder of captures by input="
+    if refused:
+        remedy = "correct what is refused, or name another folder by input="
+    return f"undecided: no usable capture in {folder}; {remedy}"
+
+
 def _table(datasheets: Sequence[Datasheet]) -> list[str]:
     head = ["motor", "lot", "status", *(title for title, *_ in COLUMNS)]
     rows = [

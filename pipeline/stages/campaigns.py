@@ -8,8 +8,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from pipeline.io.files import input_folder
 from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import find_map, load_source_maps
 from pipeline.io.survey import Entry, Survey, survey
@@ -26,18 +27,25 @@ if TYPE_CHECKING:
     from pipeline.records.constants import Constants
 
 
+class Gathered(NamedTuple):
+    """Campaigns by motor_id, what was refused or doubtful, and a line on the other files."""
+
+    campaigns: tuple[Campaign, ...]
+    findings: tuple[Finding, ...]
+    note: str
+
+
 def campaigns(
     folder: str,
     source: str = "auto",
     motor: str | None = None,
     limits: ReadLimits | None = None,
-) -> tuple[tuple[Campaign, ...], tuple[Finding, ...]]:
-    """Every motor's usable captures, by motor_id, and what was refused or doubtful.
+) -> Gathered:
+    """Every motor's usable captures.
 
     Raises UsageError where the folder is not there or holds no capture of `motor`.
     """
-    if not Path(folder).is_dir():
-        raise UsageError(f"input={folder} is no folder", "name the folder of captures")
+    input_folder(folder)
     maps = load_source_maps(configuration_folder() / "source")
     sources = maps if source == "auto" else {source: find_map(maps, source)}
     bounds = limits or ReadLimits()
@@ -57,7 +65,7 @@ def campaigns(
         findings += doubts
         if captures:
             made.append(Campaign(task.motor_id, captures))
-    return tuple(made), tuple(findings)
+    return Gathered(tuple(made), tuple(findings), found.note)
 
 
 def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
@@ -65,9 +73,8 @@ def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) ->
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
     if motor is not None and motor not in motors:
-        raise UsageError(
-            f"no capture of motor {motor} in {folder}", f"there are {', '.join(sorted(motors))}"
-        )
+        there = f"there are {', '.join(sorted(motors))}" if motors else "there is none of any motor"
+        raise UsageError(f"no capture of motor {motor} in {folder}", there)
     wanted = sorted(motors) if motor is None else [motor]
     return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
 

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+from pipeline.io.files import input_folder
 from pipeline.io.guard import ReadLimits
+from pipeline.io.publish import output_folder
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
+from pipeline.report.console import nothing_usable
 from pipeline.settings import CompareSettings
-from pipeline.stages.campaigns import campaigns, start_constants
+from pipeline.stages.campaigns import Gathered, campaigns, start_constants
 from pipeline.stages.mate import mate
 
 
@@ -34,24 +37,34 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
 
     While workers read the captures, the module that the judge `needs` is imported.
     """
-    watch, output = Stopwatch(), Path(settings.output)
+    input_folder(settings.input)
+    watch, output = Stopwatch(), output_folder(settings.output)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     with mate(settings.effects_path) as second:
         with watch.stage("read"), ThreadPoolExecutor(1) as aside:
             asked = settings.input, settings.source, settings.motor, limits
             read = aside.submit(campaigns, *asked)
             import_module(needs)
-            found, findings = read.result()
+            found = read.result()
         spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
         told = []
-        for one in found:
+        for one in found.campaigns:
             with second.campaign():
                 told.append(judge(one, spec, start_constants(one), output, watch))
-    refused = any(finding.severity == "refused" for finding in findings)
+    return _outcome(settings.input, found, told, watch)
+
+
+def _outcome(folder: str, found: Gathered, told: Sequence[Judged], watch: Stopwatch) -> Outcome:
+    refused = any(finding.severity == "refused" for finding in found.findings)
     undecided = not told or any(one.undecided for one in told)
+    lines = [finding.line() for finding in found.findings]
+    if not told:
+        lines.append(nothing_usable(folder, refused=refused))
+    if found.note:
+        lines.append(f"note: {found.note}")
     return Outcome(
         first_that_applies(3 if refused else 0, 4 if undecided else 0),
-        "\n".join(one.text for one in told) + "\n",
-        tuple(finding.line() for finding in findings),
+        "\n".join(one.text for one in told),
+        tuple(lines),
         watch.table(),
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 from pipeline.export.protocol import Exporter, Source
 from pipeline.export.registry import exporters
 from pipeline.fit.registry import estimators
-from pipeline.io.publish import write_whole
+from pipeline.io.publish import output_folder, write_whole
 from pipeline.io.registry import Registry, one_of
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import UsageError
@@ -39,7 +39,7 @@ def main(settings: ExportSettings) -> Outcome:
     text = exporter.render(Source(sheet, version.revision, {**own, **CONSTANTS}), options)
     ending = dict.fromkeys((exporter.name, exporter.extension))
     name = ".".join((file_stem(version.motor_id), *ending))
-    path = Path(settings.output) / "export" / name
+    path = output_folder(settings.output) / "export" / name
     write_whole(path, text.encode())
     return Outcome(text=text, errors=(*notes, f"note: wrote {path.as_posix()}"))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from pipeline.fit.registry import estimators
 from pipeline.io.diagnoses import read_diagnoses
 from pipeline.io.limits import limits_file, read_limits
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.publish import canonical_json, output_folder, write_whole
 from pipeline.io.registry import Registry
 from pipeline.lots.code import compare_versions
 from pipeline.lots.limits_lint import lint
@@ -55,8 +55,9 @@ def main(settings: RegressSettings) -> Outcome:
         settings.mode,
         limits.golden,
     )
+    output = output_folder(settings.output)
     regression = _compare(settings, chosen, limits, terms)
-    files = _write(Path(settings.output), regression)
+    files = _write(output, regression)
     text = regression_text(regression, files)
     return Outcome(EXIT_CODES.get(regression.verdict, UNDECIDED), text)
 

@@ -10,10 +10,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipeline.io.files import size_bytes
+from pipeline.io.files import input_folder, size_bytes
 from pipeline.io.guard import ReadLimits
 from pipeline.io.limits import limits_file, required_constants
-from pipeline.io.publish import canonical_json
+from pipeline.io.publish import canonical_json, output_folder
 from pipeline.io.registry import Registry
 from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
@@ -47,14 +47,11 @@ class Registered:
 def main(settings: RunSettings) -> Outcome:
     """Every motor of `input` to `output`; refused captures are named and the rest goes on."""
     _known_options(settings)
-    folder, output = Path(settings.input), Path(settings.output)
-    if not folder.is_dir():
-        raise UsageError(f"input={settings.input} is no folder", "name the folder of captures")
-    if output.exists() and not output.is_dir():
-        raise UsageError(f"output={settings.output} is a file", "name a folder to write to")
+    input_folder(settings.input)
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
     registry = _registry(settings)
+    output = output_folder(settings.output)
     cluster = Cluster(settings.scheduler, settings.tls_ca, settings.tls_cert, settings.tls_key)
     crew = Crew(
         open_pool(settings.executor, cluster), settings.workers or core_count(), output / CRUMBS

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.io.plain_yaml import load_plain
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.publish import canonical_json, output_folder, write_whole
 from pipeline.io.write_capture import Format, write_capture
 from pipeline.records.errors import UsageError
 from pipeline.records.naming import file_stem
@@ -57,6 +57,7 @@ def main(settings: SimulateSettings) -> Outcome:
         jobs = list(_fleet(settings) if settings.fleet else _single(settings))
     except (ValueError, KeyError) as error:
         raise UsageError(f"simulate: {error}", "correct it") from error
+    output_folder(settings.output)
     lines = []
     for folder, motor, bench, seed, plan in jobs:
         with watch.stage("simulate"):

@@ -16,7 +16,7 @@ from pipeline.io.survey import Survey
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
 from pipeline.records.outcome import Outcome, first_that_applies
-from pipeline.report.console import COLUMNS, summary
+from pipeline.report.console import COLUMNS, nothing_usable, summary
 from pipeline.report.words import KEY_CONSTANTS
 from pipeline.settings import RunSettings
 from pipeline.stages.fleet.jobs import MotorResult
@@ -119,15 +119,15 @@ def outcome_of(
 ) -> Outcome:
     """What the command says, with its exit code; `placed` names the folders in it."""
     statuses = [{check.status for check in sheet.checks} for sheet in datasheets]
+    refused = any(finding.severity == "refused" for finding in findings)
     code = first_that_applies(
         1 if any("fail" in seen for seen in statuses) else 0,
-        3 if any(finding.severity == "refused" for finding in findings) else 0,
+        3 if refused else 0,
         4 if not datasheets or any(seen == {"not_evaluated"} for seen in statuses) else 0,
     )
     lines = tuple(finding.line() for finding in findings)
-    if not found.entries:
-        nothing = f"undecided: no usable capture in {INPUT}; `inspect FILE` says why"
-        lines = (*lines, nothing)
+    if not datasheets:
+        lines = (*lines, nothing_usable(INPUT, refused=refused))
     if found.note:
         lines = (*lines, f"note: {found.note}")
     return Outcome(code, summary(datasheets, findings, OUTPUT, report=report), lines)
