@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, Field, dataclass, fields
+import textwrap
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 from pipeline import settings as s
+
+INDENT = " " * 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,11 +119,27 @@ def usage(command: Command) -> str:
     places = "".join(f" {name.upper()}" for name in command.positional)
     lines = [f"usage: python -m pipeline {command.name}{places} key=value ...", ""]
     lines += [command.words, "", "keys"]
-    for key in fields(command.settings):
-        lines.append(f"  {key.name.rstrip('_')}={_default(key)}")
+    lines += _keys(command.settings, "")
+    return "\n".join(lines)
+
+
+def _keys(settings: type[Any], group: str) -> list[str]:
+    """Two lines or more a key; a group of keys as `group.key`."""
+    lines = []
+    for key in fields(settings):
+        made = None if key.default_factory is MISSING else key.default_factory()
+        if is_dataclass(made):
+            lines += _keys(type(made), f"{key.name}.")
+            continue
+        lines.append(f"  {group}{key.name.rstrip('_')}={_default(key)}")
         if words := key.metadata.get("words"):
             lines.append(f"      {words}")
-    return "\n".join(lines)
+        if room := key.metadata.get("room"):
+            names = sorted(module.name for module in iter_modules(import_module(room).__path__))
+            lines += textwrap.wrap(
+                ", ".join(names), 92, initial_indent=INDENT, subsequent_indent=INDENT
+            )
+    return lines
 
 
 def _default(key: Field[Any]) -> str:

@@ -7,6 +7,7 @@ Text keys are taken as typed, because an override grammar would turn serial numb
 from __future__ import annotations
 
 import typing
+from dataclasses import is_dataclass
 from typing import Any
 
 from pipeline.commands import Command
@@ -38,6 +39,7 @@ def load_settings(command: Command, words: list[str]) -> Settings:
                     f"{command.name}: no key {key.lstrip('+')!r}",
                     f"`python -m pipeline {command.name} --help` lists the keys",
                 )
+            _well_formed(command, key.lstrip("+"), value)
             nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict
             rest.append(f"++{word}" if nested else word)
     settings = _composed(command, rest)
@@ -46,6 +48,26 @@ def load_settings(command: Command, words: list[str]) -> Settings:
     if command.free:
         setattr(settings, command.free, free)
     return settings
+
+
+def _well_formed(command: Command, key: str, value: str) -> None:
+    """Refuses a word that Hydra would refuse without saying what to write instead."""
+    kind: Any = command.settings
+    for depth, name in enumerate(parts := key.split(".")):
+        if not is_dataclass(kind):
+            return
+        group, kinds = ".".join(parts[:depth]), typing.get_type_hints(kind)
+        if name not in kinds:
+            has = ", ".join(f"{group}.{known}" for known in kinds)
+            raise UsageError(f"{command.name}: no key {key!r}", f"{group} has {has}")
+        kind = kinds[name]
+    if is_dataclass(kind):
+        known = sorted(path.stem for path in (configuration_folder() / key).glob("*.yaml"))
+        if value not in known:
+            raise UsageError(f"{command.name}: no {key} {value!r}", f"known are {', '.join(known)}")
+    elif typing.get_origin(kind) is list and not (value[:1] == "[" and value[-1:] == "]"):
+        listed = f"[{value.strip('[]')}]"
+        raise UsageError(f"{command.name}: {key}={value} is no list", f"write {key}={listed}")
 
 
 def _with_names(command: Command, words: list[str]) -> list[str]:

@@ -14,9 +14,12 @@ import pipeline
 from pipeline.records.errors import UsageError
 
 
-def key(default: Any, words: str, *, result: bool = True) -> Any:
-    """A settings field; `result` is False where the value cannot change what is computed."""
-    metadata = {"words": words, "result": result}
+def key(default: Any, words: str, *, result: bool = True, room: str | None = None) -> Any:
+    """A settings field; `result` is False where the value cannot change what is computed.
+
+    `room` is a package each of whose modules is a name that the key takes.
+    """
+    metadata = {"words": words, "result": result, "room": room}
     if isinstance(default, (dict, list)):
         return field(default_factory=lambda: type(default)(default), metadata=metadata)
     return field(default=default, metadata=metadata)
@@ -172,8 +175,16 @@ class SimulateSettings(Settings):
 class ModelSettings:
     """`model.name` and `model.effects`: which model is held against the recordings."""
 
-    name: str = key("standard", "ideal or standard")
-    effects: list[str] = key([], "effects to add; a leading - takes one away")
+    name: str = key(
+        "standard",
+        "ideal, or standard: with copper_temperature, magnet_temperature and coulomb_friction; "
+        "model=NAME says the same",
+    )
+    effects: list[str] = key(
+        [],
+        "[a,b] adds effects, [-a] takes one away: those of effects_path, and these",
+        room="pipeline.criticism.effects",
+    )
 
 
 @dataclass(kw_only=True)

@@ -6,6 +6,7 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
@@ -60,5 +61,8 @@ def chosen(names: tuple[str, ...], effects_path: str | None = None) -> dict[str,
     library = effects(effects_path)
     unknown = [name for name in names if name not in library]
     if unknown:
-        raise UsageError(f"unknown effect {', '.join(unknown)}", f"known are {', '.join(library)}")
+        near = [close for name in unknown for close in get_close_matches(name, library, 1)]
+        hint = f"did you mean {', '.join(near)}?" if near else f"known are {', '.join(library)};"
+        own = "effects_path=FOLDER holds your own"
+        raise UsageError(f"unknown effect {', '.join(unknown)}", f"{hint} {own}")
     return {name: library[name] for name in names}

@@ -39,6 +39,8 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     """
     input_folder(settings.input)
     watch, output = Stopwatch(), output_folder(settings.output)
+    if settings.model.effects:
+        _known(settings)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     with mate(settings.effects_path) as second:
         with watch.stage("read"), ThreadPoolExecutor(1) as aside:
@@ -52,6 +54,14 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
             with second.campaign():
                 told.append(judge(one, spec, start_constants(one), output, watch))
     return _outcome(settings.input, found, told, watch)
+
+
+def _known(settings: CompareSettings) -> None:
+    """Refuses the name of an effect that there is not, also of one to take away."""
+    from pipeline.criticism.registry import chosen
+
+    names = tuple(name.removeprefix("-") for name in settings.model.effects)
+    chosen(names, settings.effects_path)
 
 
 def _outcome(folder: str, found: Gathered, told: Sequence[Judged], watch: Stopwatch) -> Outcome:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from pipeline.__main__ import main
 from pipeline.commands import COMMANDS, Command
 from pipeline.configuration import load_settings
+from pipeline.criticism.registry import effects
 from pipeline.records.errors import UsageError
-from pipeline.settings import RunSettings, result_document
+from pipeline.settings import ModelSettings, RunSettings, result_document
 
 
 def test_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -44,6 +46,39 @@ def test_wrong_usage_is_one_line_and_exit_2(
     error = capsys.readouterr().err
     assert error.startswith("error: ")
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("word", "remedy"),
+    [
+        ("model.effects=dead_time", "write model.effects=[dead_time]"),
+        ("model.effects=a,b", "write model.effects=[a,b]"),
+        ("model.effects=[dead_time", "write model.effects=[dead_time]"),
+        ("model=standrad", "known are ideal, standard"),
+        ("model.efects=[dead_time]", "model has model.name, model.effects"),
+        ("model.effects=[deadtime]", "did you mean dead_time? effects_path="),
+        ("model.effects=[-deadtime]", "did you mean dead_time?"),
+        ("model.effects=[zzzz]", "known are angle_eccentricity, "),
+    ],
+)
+def test_a_wrong_model_says_what_to_write(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], word: str, remedy: str
+) -> None:
+    """Each before a capture is read: there is none to read here, which would be exit code 4."""
+    assert main(["compare", f"input={tmp_path}", f"output={tmp_path / 'out'}", word]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert remedy in line
+
+
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_help_explains_the_model_and_names_the_effects(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "--help"]) == 0
+    printed = capsys.readouterr().out
+    assert "ModelSettings" not in printed
+    assert all(f"  model.{key}=" in printed for key in ModelSettings.__dataclass_fields__)
+    assert all(name in printed for name in effects())
 
 
 def test_a_reader_that_leaves_early_is_no_failure() -> None:
