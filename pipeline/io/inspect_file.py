@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -16,11 +16,12 @@ from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_co
 from pipeline.io.files import read_whole
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
-from pipeline.io.metadata import capture_meta
+from pipeline.io.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
 from pipeline.io.raw_table import RawTable
 from pipeline.io.sniff import encoding_of, numeric_columns, sniff
 from pipeline.io.source_map import SourceMap
 from pipeline.io.starter_map import FieldSeen, StreamSeen, starter_map
+from pipeline.io.survey import look, question_of
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError
 
@@ -50,10 +51,24 @@ class InspectReport:
 def describe(path: Path, sources: Mapping[str, SourceMap]) -> InspectReport:
     """Look into any file; raises CaptureError only where it cannot be opened at all."""
     data = read_whole(path)
-    name = path.name
-    if data.startswith(MAGIC):
-        return _mcap(name, data, sources)
-    return _text(name, data, sources)
+    look_into = _mcap if data.startswith(MAGIC) else _text
+    report = look_into(path.name, data, sources)
+    if "contract" in dict(report.metadata):
+        return report
+    return replace(report, faults=(*report.faults, *_unused(path, report, sources)))
+
+
+def _unused(path: Path, report: InspectReport, sources: Mapping[str, SourceMap]) -> list[str]:
+    """Why `run` does not use a file that states no contract, where its faults do not say."""
+    answer = look(path.parent, question_of(path), sources)
+    if answer.entry is not None:
+        return _metadata_faults(answer.entry.said)
+    if answer.findings or report.faults or not report.streams:
+        told = (f"{finding.message}; {finding.remedy}" for finding in answer.findings)
+        return [words for words in told if words not in report.faults]
+    remedy = f"state `contract: {CONTRACT_VERSION}` in its metadata or NAME{SIDECAR_SUFFIX}"
+    remedy += ", or finish the source map below" if report.starter else ": it lacks nothing else"
+    return [f"`run` takes it for no capture, for nothing states `contract`; {remedy}"]
 
 
 def _mcap(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectReport:
@@ -119,10 +134,20 @@ def _text(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectRe
     matched = _matched(name, head, [], sources)
     streams = () if table is None else (_stream(table, "text"),)
     starter = ""
-    if table is not None and (foreign or "contract" not in metadata):
+    lacks = "contract" not in metadata and not _but_for_the_key(data, metadata, streams)
+    if table is not None and (foreign or lacks):
         starter = starter_map(streams, dialect, header, [], by_name=foreign)
     form: Literal["text", "unknown"] = "text" if head else "unknown"
     return _report(name, form, data, checksums, metadata, matched, streams, faults, starter)
+
+
+def _but_for_the_key(
+    data: bytes, metadata: Mapping[str, str], streams: Sequence[StreamSeen]
+) -> bool:
+    """Whether a table would be a capture of the contract if it only stated `contract`."""
+    stated = not _metadata_faults({"contract": CONTRACT_VERSION, **metadata})
+    known = any(field.certain for stream in streams for field in stream.fields)
+    return stated and known and not _contract_faults(data, [])
 
 
 def _contract_faults(data: bytes, faults: list[str]) -> bool:

@@ -144,6 +144,13 @@ def survey(
     return Survey(tuple(entries.values()), tuple(sorted(findings, key=_order)), tuple(others))
 
 
+def question_of(path: Path) -> Question:
+    """The question of one file by itself, with the sidecar and the manifest that lie beside it."""
+    there = frozenset(other.name for other in path.parent.iterdir() if other.is_file())
+    listed = _manifests(path.parent, sorted(there & {MANIFEST}), []).get(path.name, {})
+    return Question(path.name, _sidecar(path.name, there), tuple(listed.items()))
+
+
 def settled(folder: Path, question: Question, sources: Mapping[str, SourceMap]) -> Answer | None:
     """The answer where name and first bytes say that a file is no capture, else None."""
     if question.sidecar is not None or question.listed:

@@ -9,8 +9,9 @@ import pytest
 
 from pipeline.io.ingest import read_capture, survey
 from pipeline.io.inspect_file import describe
-from pipeline.io.source_map import parse_source_map
+from pipeline.io.source_map import load_source_maps, parse_source_map
 from pipeline.records.errors import CaptureError
+from pipeline.settings import configuration_folder
 from pipeline.stages.inspect_file import render
 from tests.unit.io.recordings import META, json_messages, mcap_file, small_capture
 
@@ -120,11 +121,44 @@ def test_metadata_that_run_would_refuse_is_named(tmp_path: Path) -> None:
     assert "the test 'dance' is unknown" in render(describe(path, {}))
 
 
+def test_a_capture_that_lacks_the_contract_key_alone_is_told_so(tmp_path: Path) -> None:
+    """It needs no source map, and `run` uses it as soon as the key is there."""
+    path = tmp_path / "x.csv"
+    rows = "t_s,omega_mech_rad_s\n0,1\n1,2\n"
+    path.write_text(SPIN.replace("# contract: 1\n", "") + rows)
+    assert survey(tmp_path, {}).others == ("x.csv",)
+    report = describe(path, {})
+    (fault,) = report.faults
+    assert "`run` takes it for no capture" in fault and "`contract: 1`" in fault
+    assert report.starter == ""
+    (tmp_path / "x.meta.yaml").write_text("contract: 1\n")
+    assert describe(path, {}).faults == ()
+    assert len(survey(tmp_path, {}).entries) == 1
+
+
+def test_a_strangers_table_is_told_both_ways_in(tmp_path: Path) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(STRANGER)
+    text = render(describe(path, {}))
+    assert "or finish the source map below" in text and "a source map to start from" in text
+
+
+def test_what_a_recognised_file_lacks_is_named(tmp_path: Path) -> None:
+    """A shipped map knows a scope's columns and not whose motor it was."""
+    path = tmp_path / "x.csv"
+    path.write_text((Path(__file__).parent / "samples" / "rigol.csv").read_text())
+    maps = load_source_maps(configuration_folder() / "source")
+    assert "nothing states motor_id" in render(describe(path, maps))
+    (tmp_path / "x.meta.yaml").write_text("motor_id: m\ntest: drive\n")
+    assert describe(path, maps).faults == ()
+
+
 def test_a_table_in_latin_1_is_read_and_its_map_says_so(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_bytes("Zeit (s);temp_winding (\xb0C)\n0;20\n1;21,5\n".encode("latin-1"))
     report = describe(path, {})
-    assert report.faults == ()
+    (fault,) = report.faults
+    assert "nothing states `contract`" in fault
     assert "encoding: 'latin-1'" in report.starter
     assert [seen.first for seen in report.streams[0].fields] == [0.0, 20.0]
     finished = report.starter.replace("# 'Zeit (s)': {column: , unit: }", "'Zeit (s)': t_s")
