@@ -92,10 +92,12 @@ class InspectSettings(ReadingSettings):
 
 
 @dataclass(kw_only=True)
-class PlanSettings(Settings):
+class PlanSettings(ReadingSettings):
     """`plan`: which test to record next."""
 
-    output: str = key("reports/demo", "output folder of a run")
+    output: str = key("reports/demo", "output folder of a run: the plan is of its datasheets")
+    input: str | None = key(None, "folder of captures to plan from, where there is no run of them")
+    source: str = key("auto", "source map of conf/source/ for foreign files of input")
     motor: str | None = key(None, "motor_id; every motor without it")
 
 

@@ -1,10 +1,11 @@
-"""Captures of a folder as validated campaigns, one a motor; shared by compare and diagnose.
+"""Captures of a folder as validated campaigns, one a motor; for compare, diagnose and plan.
 
 Strangers' files are parsed by workers under limits, as in a run, and never in the driver.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +18,8 @@ from pipeline.io.survey import Entry, Survey, survey
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.report.console import nothing_usable
 from pipeline.settings import configuration_folder
 from pipeline.stages.fleet.captures import ReadTask, usable_captures
 from pipeline.stages.fleet.crew import Crew
@@ -77,6 +80,18 @@ def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) ->
         raise UsageError(f"no capture of motor {motor} in {folder}", there)
     wanted = sorted(motors) if motor is None else [motor]
     return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
+
+
+def outcome_of(folder: str, found: Gathered, told: Sequence[str], *, undecided: bool) -> Outcome:
+    """What was told of each motor, what was refused, and what to do where nothing is usable."""
+    refused = any(finding.severity == "refused" for finding in found.findings)
+    lines = [finding.line() for finding in found.findings]
+    if not told:
+        lines.append(nothing_usable(folder, refused=refused))
+    if found.note:
+        lines.append(f"note: {found.note}")
+    code = first_that_applies(3 if refused else 0, 4 if undecided else 0)
+    return Outcome(code, "\n".join(told), tuple(lines))
 
 
 def start_constants(campaign: Campaign) -> Constants:

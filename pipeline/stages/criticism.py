@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -14,10 +14,9 @@ from pipeline.io.publish import output_folder
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
-from pipeline.report.console import nothing_usable
+from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import CompareSettings
-from pipeline.stages.campaigns import Gathered, campaigns, start_constants
+from pipeline.stages.campaigns import campaigns, outcome_of, start_constants
 from pipeline.stages.mate import mate
 
 
@@ -53,7 +52,9 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
         for one in found.campaigns:
             with second.campaign():
                 told.append(judge(one, spec, start_constants(one), output, watch))
-    return _outcome(settings.input, found, told, watch)
+    undecided = not told or any(one.undecided for one in told)
+    outcome = outcome_of(settings.input, found, [one.text for one in told], undecided=undecided)
+    return replace(outcome, timings=watch.table())
 
 
 def _known(settings: CompareSettings) -> None:
@@ -62,19 +63,3 @@ def _known(settings: CompareSettings) -> None:
 
     names = tuple(name.removeprefix("-") for name in settings.model.effects)
     chosen(names, settings.effects_path)
-
-
-def _outcome(folder: str, found: Gathered, told: Sequence[Judged], watch: Stopwatch) -> Outcome:
-    refused = any(finding.severity == "refused" for finding in found.findings)
-    undecided = not told or any(one.undecided for one in told)
-    lines = [finding.line() for finding in found.findings]
-    if not told:
-        lines.append(nothing_usable(folder, refused=refused))
-    if found.note:
-        lines.append(f"note: {found.note}")
-    return Outcome(
-        first_that_applies(3 if refused else 0, 4 if undecided else 0),
-        "\n".join(one.text for one in told),
-        tuple(lines),
-        watch.table(),
-    )

@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.crosscheck.plan import Aims, Known, Plan, Way, make_plan
-from pipeline.crosscheck.registry import rules
-from pipeline.fit.registry import estimators
+from pipeline.crosscheck.registry import check_all, rules
+from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.datasheets import read_datasheets
+from pipeline.io.guard import ReadLimits
 from pipeline.io.limits import limits_file, required_constants
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
 from pipeline.settings import PlanSettings, configuration_folder
+from pipeline.stages.campaigns import campaigns, outcome_of
 
 # Relative standard uncertainties that a bench of calibrated instruments reaches.
 U_REL = 0.02
@@ -36,21 +38,44 @@ U_OF = {"resistance_imbalance": 0.005}
 
 
 def main(settings: PlanSettings) -> Outcome:
-    """The plan of one motor of an output folder, or of each; raises UsageError for neither."""
+    """The plan of one motor, or of each, of an output folder or of a folder of captures.
+
+    Raises UsageError where there is no such motor.
+    """
+    required = frozenset(
+        required_constants(limits_file(configuration_folder() / "limits", "default"))
+    )
+    if settings.input is not None:
+        return _of_captures(settings, settings.input, required)
     sheets = read_datasheets(Path(settings.output))
     chosen = [s for s in sheets if settings.motor is None or s.motor_id == settings.motor]
     if not chosen:
         known = ", ".join(sheet.motor_id for sheet in sheets)
         raise UsageError(f"no motor {settings.motor!r} in {settings.output}", f"known are {known}")
-    required = required_constants(limits_file(configuration_folder() / "limits", "default"))
-    plans = (plan_of(sheet, frozenset(required)) for sheet in chosen)
-    return Outcome(text="\n\n".join(plan.text() for plan in plans))
+    return Outcome(text="\n\n".join(plan_of(sheet, required).text() for sheet in chosen))
+
+
+def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) -> Outcome:
+    """The plans of what a run of these captures would find; nothing is written."""
+    limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
+    found = campaigns(folder, settings.source, settings.motor, limits)
+    plans = []
+    for campaign in found.campaigns:
+        constants = fit_all(campaign, {})[0]
+        tests = frozenset(capture.meta.test for capture in campaign.captures)
+        checks = check_all(constants, campaign, {})
+        known = Known(campaign.motor_id, constants.chosen(), checks, tests)
+        plans.append(_planned(known, required).text())
+    return outcome_of(folder, found, plans, undecided=not plans)
 
 
 def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:
     """What to record next of the motor of a datasheet, to have `required` and settle its doubts."""
     tests = frozenset(capture.test for capture in sheet.captures)
-    known = Known(sheet.motor_id, sheet.constants, sheet.checks, tests)
+    return _planned(Known(sheet.motor_id, sheet.constants, sheet.checks, tests), required)
+
+
+def _planned(known: Known, required: frozenset[str]) -> Plan:
     by_rank = sorted(estimators(), key=lambda estimator: (estimator.rank, estimator.name))
     ways = [Way(e.gives, e.tests, e.experiment, e.uses) for e in by_rank]
     check_tests = {rule.name: rule.tests for rule in rules()}

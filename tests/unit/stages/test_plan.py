@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import main as door
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.datasheets import datasheet_of, read_datasheets
 from pipeline.io.publish import canonical_json
@@ -18,6 +20,8 @@ from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.uncertainty import type_a, type_b
 from pipeline.settings import PlanSettings
 from pipeline.stages.plan import main
+
+DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
 
 
 def sheet(motor_id: str, constants: dict[str, Estimate], *tests: str) -> Datasheet:
@@ -94,6 +98,26 @@ def test_plan_of_a_motor_with_one_test(tmp_path: Path, resistance_alone: Datashe
     assert {"open_circuit", "torque_map"} <= set(tests[:3])
     assert "psi_pm_wb" in reasons(outcome.text)
     assert "r_phase_ohm" not in reasons(outcome.text)
+
+
+def test_plan_from_captures_is_that_of_a_run_of_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The contract has `plan` read captures as well: no run has to come first."""
+    folder, output = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    for path in DEMO.glob("resistance*"):
+        shutil.copyfile(path, folder / path.name)
+    assert door(["plan", f"motor={DEMO.name}", f"input={folder}"]) == 0
+    planned = capsys.readouterr().out
+    quiet = ["report=false", "recordings=false", "registry=null", "workers=1"]
+    door(["run", f"input={folder}", f"output={output}", *quiet])
+    capsys.readouterr()
+    assert door(["plan", f"output={output}"]) == 0
+    assert planned == capsys.readouterr().out
+    assert "open_circuit" in planned
+    assert door(["plan", "motor=other", f"input={folder}"]) == 2
+    assert f"there are {DEMO.name}" in capsys.readouterr().err
 
 
 def test_every_constant_can_be_planned(tmp_path: Path) -> None:
