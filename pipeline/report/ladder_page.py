@@ -10,6 +10,7 @@ from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect
 from pipeline.report.axis import quantity_words
 from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, heatmap
+from pipeline.report.notes import told_and_unseen
 from pipeline.report.page import render
 from pipeline.report.rung_chart import rung_chart
 
@@ -66,9 +67,12 @@ def render_ladder(result: Diagnosis) -> str:
         name: [r.errors[name].rmse / max(r.errors[name].noise_floor, 1e-300) for r in result.ladder]
         for name in signals
     }
+    notes, unseen = told_and_unseen(result.notes)
     return render(
         "ladder.html.jinja",
         result=result,
+        notes=notes,
+        unseen=unseen,
         verdict_words=VERDICT_WORDS[result.verdict],
         chart=rung_chart([_short(view) for view in views], over),
         rungs=views,
