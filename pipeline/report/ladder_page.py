@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pipeline.physics.notation import MINUS, quantity, reading, significant
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect
-from pipeline.report.axis import quantity_words
+from pipeline.report.axis import quantity_words, unit_of
 from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, heatmap
 from pipeline.report.notes import told_and_unseen
@@ -21,6 +21,7 @@ VERDICT_WORDS = {
     "insufficient": "The captures cannot tell; record what is named below.",
 }
 SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
+ACCELERATION = "alpha_mech_rad_s2"
 MOST_RANKED = 12
 
 
@@ -63,10 +64,7 @@ def render_ladder(result: Diagnosis) -> str:
     signals = _signals(result)
     reach = _reaches(result.ladder)
     views = [_view(result, n, signals, reach) for n in range(len(result.ladder))]
-    over = {
-        name: [r.errors[name].rmse / max(r.errors[name].noise_floor, 1e-300) for r in result.ladder]
-        for name in signals
-    }
+    over = _over_floors(result.ladder, signals)
     notes, unseen = told_and_unseen(result.notes)
     return render(
         "ladder.html.jinja",
@@ -85,23 +83,51 @@ def render_ladder(result: Diagnosis) -> str:
         remainder=[
             (
                 one.capture,
-                quantity_words(one.signal),
+                quantity_words(name),
                 str(one.order) if one.order else "mean",
                 significant(one.chi2_per_n, 3),
-                significant(one.size, 3),
+                quantity(one.size, unit_of(name), 3),
             )
             for one in result.remainder
+            for name in [_shown_as(one.signal, result.ladder)]
         ],
     )
 
 
+def _shown_as(signal: str, ladder: Sequence[LadderRung]) -> str:
+    """The name, unit last, under which a signal's error is shown: of a speed it is that of its
+    slope, unless the ladder has errors of the speed itself.
+    """
+    if signal == SPEED and not any(SPEED in rung.errors for rung in ladder):
+        return ACCELERATION
+    return signal
+
+
 def _signals(result: Diagnosis) -> list[str]:
-    """Signals told on every rung, the one farthest over its floor on the first rung first."""
+    """Signals told on every rung, the one farthest over its floor on the first rung first, those
+    of which no floor is told last.
+    """
     if not result.ladder:
         return []
-    first = result.ladder[0].errors
-    names = [name for name in first if all(name in rung.errors for rung in result.ladder)]
-    return sorted(names, key=lambda n: (-first[n].rmse / max(first[n].noise_floor, 1e-300), n))
+    first = result.ladder[0]
+    told = {_shown_as(name, result.ladder): None for name in [*first.errors, *first.signals]}
+    rungs = [{_shown_as(n, result.ladder) for n in [*r.errors, *r.signals]} for r in result.ladder]
+    names = [name for name in told if all(name in rung for rung in rungs)]
+    return sorted(names, key=lambda n: (n not in first.errors, -_over(first, n), n))
+
+
+def _over(rung: LadderRung, name: str) -> float:
+    """A signal's error over its noise floor, 0 where none is told."""
+    error = rung.errors.get(name)
+    return 0.0 if error is None else error.rmse / max(error.noise_floor, 1e-300)
+
+
+def _over_floors(ladder: Sequence[LadderRung], signals: Sequence[str]) -> dict[str, list[float]]:
+    """What the chart draws: each signal's error over its floor, else that of all together."""
+    drawn = [name for name in signals if all(name in rung.errors for rung in ladder)]
+    if not drawn:
+        return {"all signals": [rung.held_out for rung in ladder]} if ladder else {}
+    return {name: [_over(rung, name) for rung in ladder] for name in drawn}
 
 
 def _reaches(ladder: Sequence[LadderRung]) -> dict[tuple[str, str], float]:
@@ -139,16 +165,23 @@ def _view(
 
 
 def _cell(rung: LadderRung, below: LadderRung | None, name: str) -> ErrorCell | None:
-    error = rung.errors.get(name)
-    if error is None:
+    now, before = _rmse(rung, name), None if below is None else _rmse(below, name)
+    if now is None:
         return None
-    before = None if below is None else below.errors.get(name)
+    error = rung.errors.get(name)
     return ErrorCell(
-        quantity(error.rmse, error.unit, 3),
-        quantity(error.noise_floor, error.unit, 3),
-        significant(error.rmse / max(error.noise_floor, 1e-300), 3),
-        "" if before is None else _percent(error.rmse, before.rmse),
+        quantity(now, unit_of(name) if error is None else error.unit, 3),
+        "" if error is None else quantity(error.noise_floor, error.unit, 3),
+        "" if error is None else significant(_over(rung, name), 3),
+        "" if before is None else _percent(now, before),
     )
+
+
+def _rmse(rung: LadderRung, name: str) -> float | None:
+    """A signal's error, whether its floor is told or not [its unit]."""
+    if name in rung.errors:
+        return rung.errors[name].rmse
+    return rung.signals.get(SPEED if name == ACCELERATION else name)
 
 
 def _percent(now: float, before: float) -> str:

@@ -11,17 +11,20 @@ from pipeline.report.axis import quantity_words
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 760.0, 250.0, 56.0, 130.0, 22.0, 44.0
 LABEL_PITCH, COLOURS = 14.0, 6
 LETTER, MOST_LEVELS = 6.3, 3
+LEAST = 1e-3
 
 
 def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str:
     """SVG of `over`, each signal's error over its noise floor [rungs], on a logarithmic scale.
 
-    `names` are the rungs in words. The band below 1 is the noise floor.
+    `names` are the rungs in words. The band below 1 is the noise floor. What is below `LEAST`
+    stands at the foot with an arrow.
     """
-    finite = [max(v, 0.3) for values in over.values() for v in values if math.isfinite(v)]
+    finite = [max(v, LEAST) for values in over.values() for v in values if math.isfinite(v)]
     if not finite or not names:
         return '<p class="empty">no errors to draw</p>'
-    low, high = -0.5, max(math.ceil(math.log10(max(finite)) * 2) / 2, 0.5)
+    low = min(math.floor(math.log10(min(finite)) * 2) / 2, -0.5)
+    high = max(math.ceil(math.log10(max(finite)) * 2) / 2, 0.5)
     bottom = TOP + HEIGHT
 
     def y(value: float) -> float:
@@ -36,18 +39,23 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
         f'<rect class="band" x="{LEFT:g}" y="{y(1.0):.1f}" width="{WIDTH - LEFT - RIGHT:g}" '
         f'height="{bottom - y(1.0):.1f}"/>'
     ]
-    for decade in range(math.ceil(high) + 1):
-        if decade <= high:
-            place = y(10.0**decade)
-            parts.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')
-            parts.append(
-                f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10**decade}</text>'
-            )
+    for decade in range(math.ceil(low), math.floor(high) + 1):
+        place = y(10.0**decade)
+        parts.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')
+        parts.append(
+            f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10.0**decade:g}</text>'
+        )
     levels = _levels(names)
     for rung, name in enumerate(names):
         where = f'x="{x(rung):.1f}" y="{bottom + 16 + LABEL_PITCH * (rung % levels):.1f}"'
         parts.append(f'<text class="tick x" {where}>{escape(name)}</text>')
     parts += _lines(over, x, y)
+    parts += [
+        f'<text class="tick x" x="{x(n):.1f}" y="{bottom - 6:.1f}">↓ {value:.1g}</text>'
+        for values in over.values()
+        for n, value in enumerate(values)
+        if value < LEAST
+    ]
     return (
         f'<svg class="ladder" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
         'aria-label="error over noise floor of every signal, rung by rung">'

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
+from pipeline.records.diagnosis import LadderRung, Remainder, RungError
 from pipeline.report.comparison_text import comparison_text
 from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, colour, heatmap
@@ -134,6 +135,48 @@ def test_the_chart_puts_the_floor_and_the_errors_on_one_logarithmic_scale() -> N
     assert ys[1][1] == pytest.approx(float(band.attrib["y"]), abs=0.1)
     decade = ys[1][1] - ys[1][0]
     assert ys[0][1] - ys[0][0] == pytest.approx(decade * np.log10(65.0 / 1.3), abs=0.3)
+
+
+def test_the_chart_reaches_down_to_the_lowest_error_and_marks_what_is_below_it() -> None:
+    """Far below its floor is a finding as well: a floor too high, or a signal fitted twice."""
+    over = {"alpha_mech_rad_s2": [0.017, 0.011], "vq_v": [9.0, 0.0]}
+    root = ElementTree.fromstring(rung_chart(["0", "1"], over))
+    lines = {p.attrib["class"]: p.attrib["d"] for p in root.iter("path")}
+    first, second = (float(y) for y in re.findall(r" ([\d.]+)", lines["c0"]))
+    grid = {
+        t.text: float(t.attrib["y"]) - 4 for t in root.iter("text") if "tick y" in str(t.attrib)
+    }
+    decade = grid["0.1"] - grid["1"]
+    assert (first - grid["1"]) / decade == pytest.approx(-np.log10(0.017), abs=0.01)
+    assert (second - first) / decade == pytest.approx(np.log10(0.017 / 0.011), abs=0.01)
+    assert [t.text for t in root.iter("text") if "↓" in (t.text or "")] == ["↓ 0"]
+
+
+def test_errors_without_a_floor_are_on_the_page_and_all_together_in_the_chart() -> None:
+    """A table of flux levels has no windows and so no floors: its error is told all the same."""
+    rungs = [
+        LadderRung((), 1.6, {"vq_v": 0.00778, "omega_mech_rad_s": 3.0}),
+        LadderRung(("saturation",), 1.1, {"vq_v": 0.00544, "omega_mech_rad_s": 3.0}),
+    ]
+    html = render_ladder(replace(make_diagnosis(), ladder=tuple(rungs)))
+    for words in ("v_q", "7.78 mV", "5.44 mV", "−30 %", "all signals", "3.00 rad/s²"):
+        assert words in html
+    assert "no errors to draw" not in html
+
+
+@pytest.mark.parametrize("signal", ["omega_mech_rad_s", "alpha_mech_rad_s2"])
+def test_what_is_left_has_its_unit(signal: str) -> None:
+    """The error of a coasting shaft's speed is that of its slope, whatever the document says."""
+    left = (
+        Remainder("spin_down_0.mcap", signal, 0, 9.0, 276.0),
+        Remainder("lcr.csv", "lab_h", 2, 3.0, 1.3e-6),
+    )
+    html = render_ladder(replace(make_diagnosis(), remainder=left))
+    assert "acceleration mech" in html and "276 rad/s²" in html and "1.30 µH" in html
+    speeds = {"omega_mech_rad_s": RungError(1.0, 1.0, "rad/s")}
+    rungs = tuple(replace(rung, errors=speeds) for rung in make_diagnosis().ladder)
+    of_speed = replace(make_diagnosis(), remainder=left[:1], ladder=rungs)
+    assert ("276 rad/s<" in render_ladder(of_speed)) == (signal == "omega_mech_rad_s")
 
 
 def test_words_of_neighbouring_rungs_do_not_meet() -> None:
