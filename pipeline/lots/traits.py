@@ -152,12 +152,8 @@ def _change(
     before = [one for one in base if name in one.sizes]
     after = [one for one in candidate if name in one.sizes]
     verdict = _verdict(before, after, base, candidate, p_holm)
-    new = len(after) * len(base) > len(before) * len(candidate)
-    kind = {
-        "fail": "new in this lot",
-        "marginal": "no longer there" if not new else "in more motors than before",
-        "undecided": "in this lot, and too few motors to tell",
-    }.get(verdict, "as before")
+    more = len(after) * len(base) - len(before) * len(candidate)
+    kind = _kind(verdict, more, gone=not after)
     why = f"{kind}: {len(after)} of {len(candidate)} motors, {len(before)} of {len(base)} before"
     unit = next((one.units[name] for one in (*after, *before) if name in one.units), "")
     return EffectChange(
@@ -176,6 +172,20 @@ def _change(
         unit,
         tuple(sorted(one.motor_id for one in after)),
     )
+
+
+def _kind(verdict: Verdict, more: int, *, gone: bool) -> str:
+    """A verdict in words; `more` is above zero where a larger share of motors shows it now."""
+    if verdict == "fail":
+        return "new in this lot"
+    if verdict == "undecided":
+        return "in this lot, and too few motors to tell"
+    if more == 0:
+        return "as before"
+    chance = ", which may be chance" if verdict == "pass" else ""
+    if gone:
+        return f"no longer there{chance}"
+    return f"in {'more' if more > 0 else 'fewer'} motors than before{chance}"
 
 
 def _verdict(
