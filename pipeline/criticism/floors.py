@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect, Values
-from pipeline.criticism.model import Model, zero
+from pipeline.criticism.model import Model, evaluate, zero
 from pipeline.criticism.noise import rounding_error, unrounded
+from pipeline.criticism.operate import operate
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import Segment, projected, row_index
 
@@ -27,6 +29,8 @@ FORM = 0.02
 _LINE = 0.03
 _JUMP = 8.0
 _WHEN = 0.25
+_CREEPS = 1e-3
+"""Share of the machine's largest speed below which friction may hold the shaft as it likes."""
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -142,6 +146,7 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
     if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
         both[place] = np.hypot(both[place], _encoder_lines(segment, values))
+        both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values))
     if segment.kind == "dq":
         jumps = _jumps(segment)[:, None]
         for place, channel in enumerate(segment.channels):
@@ -167,6 +172,32 @@ def _jumps(segment: Segment) -> Array:
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
     error: Array = _WHEN * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
     return error
+
+
+def _at_rest(segment: Segment, model: Model, values: Values) -> Array:
+    """Torque [W] that friction may be out by where the shaft rests or creeps, as weak samples.
+
+    A shaft that sticks is held by anything between plus and minus its friction [Armstrong-Hélouvry
+    (1991), ch. 4], whatever the log says of its speed: a rectangle's standard deviation.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    known = dict(values)
+    for effect in model.effects:
+        known = {**zero(effect, model), **known}
+    x = operate(segment, segment.recorded, model, known)
+    slow = _CREEPS * model.machine.scales["speed_rad_s"]
+    creeping = np.abs(x.omega_rad_s) < slow
+    if not creeping.any():
+        return np.zeros(weak.starts.size)
+    onward, back = (
+        evaluate(model, replace(x, omega_rad_s=np.full(creeping.size, speed)), known).drag_nm
+        for speed in (slow, -slow)
+    )
+    grip = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
+    out: Array = np.abs(weak.project(np.where(creeping, grip, 0.0)[None])[0, :, 0])
+    return out
 
 
 def _encoder_lines(segment: Segment, values: Values) -> Array:

@@ -1,4 +1,4 @@
-"""An encoder mounted off centre: an angle error once a turn."""
+"""An encoder mounted off centre or at a tilt: an angle error once a turn, and twice."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _angle(x: Operating, q: Values) -> Array:
-    wave = q["sine_rad"] * np.sin(x.theta_rad) + q["cosine_rad"] * np.cos(x.theta_rad)
-    error: Array = x.machine.pole_pairs * wave
+    once = q["sine_rad"] * np.sin(x.theta_rad) + q["cosine_rad"] * np.cos(x.theta_rad)
+    twice = q["sine2_rad"] * np.sin(2 * x.theta_rad) + q["cosine2_rad"] * np.cos(2 * x.theta_rad)
+    error: Array = x.machine.pole_pairs * (once + twice)
     return error
 
 
 EFFECT = Effect(
     name="angle_eccentricity",
-    words="recorded shaft angle = true one + sine sin θ + cosine cos θ",
+    words="recorded shaft angle = true one + sine sin θ + cosine cos θ, a tilted disc's sine2 sin "
+    "2θ + cosine2 cos 2θ besides",
     signature="first order a turn in v_d proportional to speed, in torque proportional to i_d",
     tests=("torque_map", "drive"),
     experiment="a constant speed of several turns, in both senses",
@@ -23,6 +25,8 @@ EFFECT = Effect(
     parameters=(
         Parameter("sine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2),
         Parameter("cosine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2),
+        Parameter("sine2_rad", "rad", 0.001, 0.0002, low=-0.1, high=0.1, optional=1),
+        Parameter("cosine2_rad", "rad", 0.001, 0.0002, low=-0.1, high=0.1, optional=1),
     ),
     rivals={"unbalance": "a slow turn: an unbalance shows at rest, an encoder error not"},
     angle=_angle,

@@ -174,6 +174,28 @@ def test_a_jump_of_voltage_is_known_to_a_quarter_of_a_sample():
     assert near[~over].max() < 0.1 * told.max(), "of the reading itself"
 
 
+def test_friction_at_rest_may_be_anything_between_both_its_senses():
+    """A shaft that sticks for half a window: T/√3 there, what the log says of its sense aside."""
+    running = log()
+    rest = np.array(running.recorded["theta_mech_rad"])
+    start, length = running.weak.starts[-1], running.weak.length
+    rest[start + length // 2 :] = rest[start + length // 2]
+    stuck = replace(running, recorded={**running.recorded, "theta_mech_rad": rest})
+    friction = LIBRARY["coulomb_friction"]
+    model = Model(machine(), (friction,))
+    values = {**BASE, "coulomb_friction.torque_nm": 0.2}
+    moving, resting = (reading_error(one, model, values)[2, :, 0] for one in (running, stuck))
+    window = running.weak.functions[0, 0]
+    smoothing = round(1e-3 / running.ts_s)
+    late = window[length // 2 + smoothing :].sum()
+    assert resting[-1] == pytest.approx(0.2 / 3**0.5 * late, rel=0.05)
+    assert moving[-1] < 0.01 * resting[-1]
+    # within 0.25 rad/s of zero at 400 rad/s²: 25 samples around the 3000th
+    near = int(np.argmin(np.abs(running.weak.starts + length // 2 - 3000)))
+    there = 25 * window[3000 - running.weak.starts[near]]
+    assert moving[near] == pytest.approx(0.2 / 3**0.5 * there, rel=0.1)
+
+
 def test_a_wave_that_turns_many_times_a_sample_averages_out_of_a_coasting_shaft():
     """Order 84 turns 133 times a sample at 2000 rad/s logged at 200 Hz: with waves at a few points
     a sample its mean is what they happen to beat to.
