@@ -14,7 +14,15 @@ _BURST = 12.0
 _LOOKED_AT = 2000
 _STEPS = 600
 _TOGETHER = 0.5
+_HIGH = 0.9
 _SNAP = 0.06
+_AS_GOOD = 0.01
+# windows of a record that tell a step sharper and sharper: samples of the first, their number, the
+# spacing of trial steps in turns of the phase, and how far they reach around the last one
+_FIRST_WINDOW, _WIDER = 32, 4
+_PLACES = 16
+_SPACING, _FINEST = 0.2, 0.02
+_REACH = 1.5
 _FLOATING = 1e-9
 _WHOLE = 0.05
 _MOSTLY = 0.95
@@ -109,7 +117,8 @@ def rounding_step(signal: Array) -> float:
     """The step of a signal whose noise is mostly its rounding, 0 of another one [its unit].
 
     Third differences of a rounded signal are whole steps, so that their phase e^{j2π d/q} stays
-    together at the right q, even where a number format has rounded it once more.
+    together at the right q, even where a number format has rounded it once more. The whole record
+    tells q sharply enough to part 4000 steps a turn from 4096.
     """
     third = np.diff(signal, 3)
     if third.size < _BLOCK:
@@ -125,13 +134,71 @@ def rounding_step(signal: Array) -> float:
     together = np.hypot(np.cos(phase).mean(axis=1), np.sin(phase).mean(axis=1))
     inner = together[1:-1]
     peaks = 1 + np.flatnonzero((inner >= together[:-2]) & (inner >= together[2:]))
-    high = [n for n in peaks if together[n] >= max(0.8 * together[peaks].max(), _TOGETHER)]
+    high = [n for n in peaks if together[n] >= max(_HIGH * together[peaks].max(), _TOGETHER)]
     if not high:
         return 0.0
-    step = float(steps[high[-1]])
+    step, parts = _sharpened(signal, float(steps[high[-1]]))
     # an encoder has 2^n steps a turn, or 4 times its lines
     bits = math.log2(2.0 * math.pi / step)
-    return 2.0 * math.pi / 2.0 ** round(bits) if abs(bits - round(bits)) < _SNAP else step
+    for count in (2.0 ** round(bits), float(round(2.0**bits))):
+        whole = 2.0 * math.pi / max(count, 1.0)
+        if abs(math.log2(max(count, 1.0)) - bits) < _SNAP:
+            both = _coherence(parts, np.array([step, whole]))
+            if both[1] >= both[0] - _AS_GOOD:
+                return whole
+    return step
+
+
+def _sharpened(signal: Array, step: float) -> tuple[float, Array]:
+    """The step near a rough one at which ever longer parts of the record are whole multiples of it,
+    and the longest parts [parts, samples] that are.
+
+    A part that spans m steps tells the step to 1/m of itself, so that its phase is searched as far
+    as the part before left it open. Offsets of the parts are free.
+    """
+    known = step * math.log(8.0) / _STEPS
+    parts = _parts(signal, _FIRST_WINDOW)
+    length = _FIRST_WINDOW
+    while True:
+        wider = _parts(signal, length)
+        lobe = step**2 / max(float(np.ptp(wider, axis=1).max()), step)
+        found = _best_step(wider, step, known, _SPACING * lobe)
+        if float(_coherence(wider, np.array([found]))[0]) < _TOGETHER:
+            break
+        step, parts, known = found, wider, min(known, _REACH * _SPACING * lobe)
+        if length >= signal.size:
+            break
+        length = min(_WIDER * length, signal.size)
+    lobe = step**2 / max(float(np.ptp(parts, axis=1).max()), step)
+    return _best_step(parts, step, min(known, _SPACING * lobe), _FINEST * lobe), parts
+
+
+def _best_step(parts: Array, step: float, reach: float, spacing: float) -> float:
+    """The most coherent of trial steps around one, no more than there are at first."""
+    count = min(math.ceil(reach / spacing), _STEPS // 2)
+    trials = step + spacing * np.arange(-count, count + 1, dtype=np.float64)
+    # of equals, the nearest
+    trials = trials[np.argsort(np.abs(trials - step), kind="stable")]
+    return float(trials[np.argmax(_coherence(parts, trials))])
+
+
+def _parts(signal: Array, length: int) -> Array:
+    """Parts [parts, samples] of a signal, less their first sample: those of the larger spans."""
+    length = min(length, signal.size)
+    starts = np.unique(np.linspace(0, signal.size - length, _PLACES).round().astype(np.int64))
+    inside = np.linspace(0, length - 1, min(length, _LOOKED_AT // starts.size))
+    parts = signal[starts[:, None] + inside.round().astype(np.int64)]
+    span = np.ptp(parts, axis=1)
+    wide: Array = (parts - parts[:, :1])[span >= np.median(span)]
+    return wide
+
+
+def _coherence(parts: Array, steps: Array) -> Array:
+    """How well the phases e^{j2π x/q} of parts [parts, samples] stay together, for steps q [n]."""
+    found: Array = np.array(
+        [np.abs(np.exp((2j * np.pi / step) * parts).mean(axis=1)).mean() for step in steps]
+    )
+    return found
 
 
 def is_rounded(signal: Array, step: float) -> bool:

@@ -9,7 +9,13 @@ import pytest
 
 from pipeline.criticism.floors import noise_floor
 from pipeline.criticism.model import Model
-from pipeline.criticism.noise import coarse_step, resolution, sensor_noise
+from pipeline.criticism.noise import (
+    coarse_step,
+    is_rounded,
+    resolution,
+    rounding_step,
+    sensor_noise,
+)
 from pipeline.criticism.segment import row_index
 from pipeline.criticism.selection import _shrunk
 from pipeline.criticism.system import Fitted, floors, floors_grown, system
@@ -40,6 +46,26 @@ def test_numbers_of_no_step_have_no_resolution():
 def test_a_signal_is_coarse_where_its_noise_does_not_dither_it(share, coarse):
     signal = rounded(0.02, 0.02 * share)
     assert coarse_step(signal, sensor_noise(signal)) == pytest.approx(0.02 if coarse else 0.0)
+
+
+@pytest.mark.parametrize("file_step", [0.0, 2.0**-18])
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+@pytest.mark.parametrize("counts", [2000, 2400, 4000, 4096, 5000, 8000, 10_000, 2**14, 2**17])
+def test_an_encoder_s_counts_a_turn_are_told_whether_powers_of_two_or_not(counts, noise, file_step):
+    """Line encoders are within 0.05 bit of 2^n, and a step 0.1 % off is out of step in a turn."""
+    step, random = 2.0 * np.pi / counts, np.random.default_rng(1)
+    t = np.arange(20_000) * 1e-4
+    moved = 48.0 * np.sin(2.5 * t) + noise * step * random.normal(size=t.size)
+    theta = np.round(moved / step) * step
+    theta = np.round(theta / file_step) * file_step if file_step else theta
+    told = rounding_step(theta)
+    assert 2.0 * np.pi / told == pytest.approx(counts, rel=1e-9)
+    assert is_rounded(theta, told)
+
+
+def test_a_noisy_angle_has_no_step():
+    theta = np.linspace(0.0, 9.0, 8000) + np.random.default_rng(2).normal(0.0, 1e-3, 8000)
+    assert rounding_step(theta) == 0.0
 
 
 def test_the_floor_holds_what_coarse_rounding_really_does():

@@ -66,9 +66,10 @@ def test_the_angle_of_a_map_is_even_but_for_the_step_that_the_drive_s_encoder_sh
     assert bends[0] < 0.02 * step < 0.2 * step < bends[1]
 
 
-def test_an_angle_that_turns_by_whole_steps_a_sample_is_as_coarse_as_the_drive_s():
+@pytest.mark.parametrize("counts", [2**12, 4000])
+def test_an_angle_that_turns_by_whole_steps_a_sample_is_as_coarse_as_the_drive_s(counts):
     """13 steps a sample exactly: no difference shows the step, and all rounding is periodic."""
-    step = 2.0 * np.pi / 2**12
+    step = 2.0 * np.pi / counts
     drive = at_speed("drive", np.linspace(-40.0, 60.0, 8000), step)
     even = at_speed("heat_run", 13.0 * step / 5e-5, step)
     fine = at_speed("heat_run", 13.3 * step / 5e-5, step / 2**9)
