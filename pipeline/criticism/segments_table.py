@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from pipeline.criticism.segment import Segment, Sensors, segment_of
 from pipeline.records.capture import Capture
 
 _FLUX_NOISE = 1e-3
+_OTHER_AXIS = 0.1
 _LEAST_NOISE = 1e-5
 _FEW_LEVELS = 4
 
@@ -25,10 +27,13 @@ def flux_table(capture: Capture, _: Machine) -> Segment | None:
     return None
 
 
-def _linkages(capture: Capture) -> Segment:
+def _linkages(capture: Capture) -> Segment | None:
+    """Flux linkages of both axes, or of a sweep along one, whose other axis stands still."""
     names = ("id_a", "iq_a", "psi_d_wb", "psi_q_wb")
     found = capture.arrays(*names)
-    noise = {name: _FLUX_NOISE * float(np.ptp(found[name])) for name in names}
+    noise = _axes_noise(found, names[:2]) | _axes_noise(found, names[2:])
+    if not all(noise.values()):
+        return None
     levels = levels_of(found["id_a"])
     # rows of one d current are held out together: a map is often its own mirror image in i_q
     blocks = levels if levels.max(initial=0) + 1 >= _FEW_LEVELS else None
@@ -36,6 +41,13 @@ def _linkages(capture: Capture) -> Segment:
     return segment_of(
         capture, "flux_map", "drive", 1.0, found, Sensors(noise), channels, None, blocks=blocks
     )
+
+
+def _axes_noise(found: Mapping[str, Array], names: tuple[str, ...]) -> dict[str, float]:
+    """A share of each axis's range, of a tenth of the other's at least: one instrument read both."""
+    ranges = {name: float(np.ptp(found[name])) for name in names}
+    least = _OTHER_AXIS * max(ranges.values())
+    return {name: _FLUX_NOISE * max(own, least) for name, own in ranges.items()}
 
 
 def _steady(capture: Capture) -> Segment | None:

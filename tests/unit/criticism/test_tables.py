@@ -14,10 +14,11 @@ from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model, values_of
 from pipeline.criticism.orders import holding_orders, sector_errors
 from pipeline.criticism.registry import effects
+from pipeline.criticism.segments import segments
 from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
 from pipeline.criticism.segments_table import flux_table, levels_of
-from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
 
 MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
 
@@ -67,6 +68,32 @@ def test_held_out_sectors_expose_orders_that_only_fit():
 def test_levels_are_parted_by_gaps_whatever_their_order():
     current = np.array([0.0, -10.01, -5.0, -9.99, 0.01, -5.02])
     assert levels_of(current).tolist() == [2, 0, 1, 0, 2, 1]
+
+
+@pytest.mark.parametrize("last_digit", [0.0, 1e-5])
+def test_a_meter_is_known_no_better_than_its_last_digit(last_digit):
+    """The same resistance at all angles is no resistance without noise."""
+    angle = np.arange(0.0, 180.0, 15.0)
+    lab = 6e-4 + 1.1e-4 * np.cos(np.radians(2.0 * angle))
+    lab = np.round(lab / last_digit) * last_digit if last_digit else lab
+    rab = np.full(angle.size, 0.62)
+    table = capture("lcr", theta_elec_deg=angle, lab_h=lab, rab_ohm=rab)
+    (segment,) = segments(Campaign("m", (table,)), MACHINE)
+    assert segment.noise["rab_ohm"] == pytest.approx(0.62e-4)
+    assert segment.noise["lab_h"] >= max(last_digit / np.sqrt(12.0), 7e-8)
+
+
+def test_a_sweep_of_one_axis_has_noise_on_the_other():
+    """i_q = 0 throughout, and ψ_q with it: noise of no range at all would be none."""
+    sweep, still = np.linspace(-10.0, 10.0, 21), np.zeros(21)
+    columns = {"id_a": sweep, "iq_a": still, "psi_d_wb": 0.02 + 3e-4 * sweep, "psi_q_wb": still}
+    told = flux_table(capture("flux_map", **columns), MACHINE)
+    assert told.noise["id_a"] == pytest.approx(0.02)
+    assert told.noise["psi_d_wb"] == pytest.approx(6e-6)
+    assert told.noise["iq_a"] == pytest.approx(0.1 * told.noise["id_a"])
+    assert told.noise["psi_q_wb"] == pytest.approx(0.1 * told.noise["psi_d_wb"])
+    standing_still = {**columns, "psi_d_wb": np.full(21, 0.02)}
+    assert flux_table(capture("flux_map", **standing_still), MACHINE) is None
 
 
 def test_steady_voltages_have_an_offset_a_level_and_are_held_out_by_level():
