@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
-from pipeline.criticism.noise import is_rounded, sensor_noise
+from pipeline.criticism.noise import is_rounded, resolution, sensor_noise
 from pipeline.criticism.segment import Segment, Sensors, electrical_orders, segment_of, slow_orders
 from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
@@ -33,6 +33,7 @@ from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Campaign, Capture
 
 _STEP_WINDOW_S = 0.002
+_LEAST_METER_NOISE = 1e-4
 _FEW = 12
 _WINDOWS = 48
 _WINDOWS_LOG = 32
@@ -257,6 +258,9 @@ def _settled(weak: Projection, amps: Array, noise: float) -> Projection:
 
 
 def _lcr(capture: Capture, _: Machine) -> Segment | None:
+    """A table over the angle; a reading scatters about its mean and two waves a turn, but is known
+    no better than its last digit and a ten-thousandth of it.
+    """
     if not capture.has("theta_elec_deg", "lab_h"):
         return None
     names = ["theta_elec_deg", "lab_h"] + [n for n in ("rab_ohm", "freq_hz") if capture.has(n)]
@@ -268,7 +272,9 @@ def _lcr(capture: Capture, _: Machine) -> Segment | None:
     noise = {}
     for name in names[1:]:
         fitted = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
-        noise[name] = float(np.sqrt(((found[name] - fitted) ** 2).sum() / (angle.size - 3)))
+        scatter = math.sqrt(float(((found[name] - fitted) ** 2).sum()) / (angle.size - 3))
+        least = _LEAST_METER_NOISE * float(np.abs(found[name]).max())
+        noise[name] = max(scatter, resolution(found[name]) / math.sqrt(12), least)
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
     return segment_of(capture, "lcr", "lcr", 1.0, found, Sensors(noise), channels, None)
 

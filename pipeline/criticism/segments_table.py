@@ -44,7 +44,7 @@ def _linkages(capture: Capture) -> Segment | None:
 
 
 def _axes_noise(found: Mapping[str, Array], names: tuple[str, ...]) -> dict[str, float]:
-    """A share of each axis's range, of a tenth of the other's at least: one instrument read both."""
+    """A share of an axis's range, or a tenth of the other's at least: one instrument reads both."""
     ranges = {name: float(np.ptp(found[name])) for name in names}
     least = _OTHER_AXIS * max(ranges.values())
     return {name: _FLUX_NOISE * max(own, least) for name, own in ranges.items()}
