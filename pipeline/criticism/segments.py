@@ -24,6 +24,7 @@ from pipeline.criticism.traces import (
     even_clock,
     prepared,
     shaft_angle,
+    tellable,
     thinned,
     window_of,
     with_angle,
@@ -35,18 +36,20 @@ from pipeline.records.capture import Campaign, Capture
 _STEP_WINDOW_S = 0.002
 _LEAST_METER_NOISE = 1e-4
 _FEW = 12
+_LEAST_WINDOW = 8
 _WINDOWS = 48
 _WINDOWS_LOG = 32
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     """Every usable capture as a segment, in path order; a capture that lacks what its test's
-    equation needs is left out.
+    equation needs, is too short, or whose clock does not rise, is left out.
     """
     made: list[Segment] = []
-    for capture in campaign.captures:
-        maker = _MAKERS.get(capture.meta.test)
-        found = None if maker is None else maker(capture, machine)
+    for recorded in campaign.captures:
+        maker = _MAKERS.get(recorded.meta.test)
+        capture = None if maker is None else tellable(recorded)
+        found = None if maker is None or capture is None else maker(capture, machine)
         parts = found if isinstance(found, tuple) else (found,)
         usable = (s for s in parts if s is not None and (s.weak is None or s.weak.starts.size))
         made += [_by_encoder(s, machine.encoder_rad) for s in usable]
@@ -158,6 +161,8 @@ def _slow_turn(
     if turns <= 0.0:
         return None
     factor = max(int(theta.size / turns / (24 * max(orders))), 1)
+    if theta.size // factor < _LEAST_WINDOW + 2:
+        return None
     noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
     steps = coarse_steps(found, noise)
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
@@ -166,7 +171,7 @@ def _slow_turn(
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
-    window = max(int(size / round(turns)), 8) if turns > 1.2 else size - 2
+    window = max(int(size / round(turns)), _LEAST_WINDOW) if turns > 1.2 else size - 2
     window = min(window, size - 2)
     # the first and the last sample have no neighbours
     starts = 1 + window_starts(keep[1:-1], window)
@@ -214,7 +219,7 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
         edges = np.abs(np.diff(volts)) > 8 * told.noise["v_pair_v"]
         keep[:-1] &= ~edges
         keep[1:] &= ~edges
-        window = max(min(round(_STEP_WINDOW_S / period), keep.size // 4), 8)
+        window = max(min(round(_STEP_WINDOW_S / period), keep.size // 4), _LEAST_WINDOW)
     else:
         window = window_of(period, keep.size)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.noise import rounding_step
 from pipeline.criticism.orders import holding_orders
+from pipeline.criticism.traces import tellable
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
@@ -26,8 +28,10 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
 
     Pole pairs come from the back-EMF against the angle, else from `start`, else the nameplate.
     """
+    slots, stated = campaign.nameplate("slots"), stated_u(campaign)
     pole_pairs = pole_pairs_of(campaign, start)
-    slots = campaign.nameplate("slots")
+    captures = tuple(c for c in map(tellable, campaign.captures) if c is not None)
+    campaign = replace(campaign, captures=captures)
     logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
     current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, ("ia_a", "ib_a"))
     current = current or _largest(tables, ("id_a", "iq_a"))
@@ -60,7 +64,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine:
         int(str(slots)) if slots else None,
         scales,
         orders,
-        stated_u(campaign),
+        stated,
         encoder_step(campaign),
     )
 
@@ -124,13 +128,16 @@ def base_scales(machine: Machine) -> dict[str, float]:
 
 
 def pole_pairs_of(campaign: Campaign, start: Constants) -> int:
-    """Electrical cycles a turn, counted in an open-circuit spin where there is one."""
-    for capture in campaign.of("open_circuit"):
-        if capture.has("vab_v", "vbc_v", "theta_mech_rad"):
+    """Electrical cycles a turn, counted in an open-circuit spin of a turn where there is one."""
+    for recorded in campaign.of("open_circuit"):
+        capture = tellable(recorded)
+        if capture is not None and capture.has("vab_v", "vbc_v", "theta_mech_rad"):
             found = capture.arrays("vab_v", "vbc_v", "theta_mech_rad")
+            turned = float(np.ptp(found["theta_mech_rad"])) if found["vab_v"].size else 0.0
+            if turned < 2.0 * math.pi:
+                continue
             plane = (2 * found["vab_v"] + found["vbc_v"]) / 3 + 1j * found["vbc_v"] / math.sqrt(3)
-            turned = np.ptp(np.unwrap(np.angle(plane)))
-            ratio = float(turned / np.ptp(found["theta_mech_rad"]))
+            ratio = float(np.ptp(np.unwrap(np.angle(plane)))) / turned
             if ratio > 0.5 and abs(ratio - round(ratio)) < 0.02:
                 return round(ratio)
     known = start.best("pole_pairs")
@@ -155,8 +162,9 @@ def _speed(capture: Capture) -> float:
         return float(np.nanquantile(np.abs(speed), 0.999))
     if capture.has("t_s", "theta_mech_rad"):
         found = capture.arrays("t_s", "theta_mech_rad")
-        speed = np.gradient(found["theta_mech_rad"], found["t_s"])
-        return float(np.nanquantile(np.abs(speed), 0.999))
+        if found["t_s"].size > 1 and (np.diff(found["t_s"]) > 0.0).all():
+            speed = np.gradient(found["theta_mech_rad"], found["t_s"])
+            return float(np.nanquantile(np.abs(speed), 0.999))
     return 0.0
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +17,51 @@ from pipeline.criticism.segment import Sensors
 from pipeline.numerics.projection import window_starts
 from pipeline.records.capture import Capture
 
+if TYPE_CHECKING:
+    import polars as pl
+
 _WINDOW_S = 0.02
 _WINDOW_SAMPLES = 40
 _SMOOTHING_S = 0.05
 SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 PAD = 24
+_SHORTEST = 24
+_WITHOUT_CLOCK = frozenset({"lcr", "flux_map"})
 _SLACK = 6.0
 _RIPPLE = 1.5
+
+
+def tellable(capture: Capture) -> Capture | None:
+    """The capture without columns that hold no value at the samples of its richest table; None
+    where nothing is left, and of a test with a clock, where that does not rise or is too short.
+    """
+    table = max(capture.tables, key=lambda t: (len(t.columns), t.height), default=None)
+    if table is None or table.height == 0:
+        return None
+    if capture.meta.test not in _WITHOUT_CLOCK and not _rises(table):
+        return None
+    kept = [[n for n in t.columns if _has_values(t, n, table)] for t in capture.tables]
+    if all(set(names) <= {"t_s"} for names in kept):
+        return None
+    if all(len(names) == len(t.columns) for names, t in zip(kept, capture.tables, strict=True)):
+        return capture
+    tables = tuple(t.select(names) for names, t in zip(kept, capture.tables, strict=True))
+    return replace(capture, tables=tables)
+
+
+def _rises(table: pl.DataFrame) -> bool:
+    if "t_s" not in table.columns or table.height < _SHORTEST:
+        return False
+    return bool((np.diff(table["t_s"].to_numpy()) > 0.0).all())
+
+
+def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame) -> bool:
+    """Whether a column has a finite value, and one of another clock has it while this one ran."""
+    good = np.isfinite(table[name].to_numpy())
+    if table is home or not good.any() or "t_s" not in table.columns:
+        return bool(good.any())
+    known, time = table["t_s"].to_numpy()[good], home["t_s"].to_numpy()
+    return bool(known[0] <= time[-1] and known[-1] >= time[0])
 
 
 def even_clock(

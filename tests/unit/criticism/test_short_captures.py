@@ -1,0 +1,72 @@
+"""Captures that hold too little for an equation: they are left out, and nothing breaks on them."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.segments import TESTS, segments
+from pipeline.criticism.size import machine_of
+from pipeline.criticism.traces import tellable
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.constants import Constants
+
+SIGNALS = ("id_a", "iq_a", "vd_v", "vq_v", "ia_a", "vab_v", "vbc_v", "torque_shaft_nm")
+TABLES = ("lab_h", "rab_ohm", "psi_d_wb", "psi_q_wb")
+TOO_SHORT = (0, 1, 2, 8, 20)
+
+
+def capture(test: str, n: int, time: np.ndarray, theta: np.ndarray, *more: pl.DataFrame) -> Capture:
+    random = np.random.default_rng(n)
+    columns = {name: random.normal(1.0, 0.1, n) for name in (*SIGNALS, *TABLES)}
+    angle = {"theta_mech_rad": theta, "theta_elec_deg": 7.0 * np.arange(n)}
+    table = pl.DataFrame({"t_s": time, **angle, **columns})
+    meta = CaptureMeta("m", test, pole_pairs=4, pair="ab", theta_elec_deg=0.0)
+    return Capture(f"{test}.csv", "0", "verified", meta, (table, *more))
+
+
+def made_of(one: Capture):
+    campaign = Campaign("m", (one,))
+    return segments(campaign, machine_of(campaign, Constants()))
+
+
+@pytest.mark.parametrize("n", TOO_SHORT)
+@pytest.mark.parametrize("test", sorted(TESTS))
+def test_a_capture_of_a_few_rows_is_left_out(test, n):
+    found = made_of(capture(test, n, 1e-3 * np.arange(n), 0.03 * np.arange(n)))
+    assert found == () or test in ("lcr", "flux_map")
+
+
+@pytest.mark.parametrize("test", sorted(TESTS - {"lcr", "flux_map"}))
+@pytest.mark.parametrize("stopped", [np.zeros(400), np.repeat(np.arange(200.0), 2)])
+def test_a_capture_whose_clock_does_not_rise_is_left_out(test, stopped):
+    assert made_of(capture(test, 400, stopped, 0.03 * np.arange(400))) == ()
+
+
+@pytest.mark.parametrize(("test", "n"), [*itertools.product(sorted(TESTS), (60, 400))])
+def test_a_shaft_that_does_not_turn_breaks_nothing(test, n):
+    """An open-circuit spin of a shaft at rest had infinitely many pole pairs."""
+    one = capture(test, n, 1e-3 * np.arange(n), np.zeros(n))
+    machine = machine_of(Campaign("m", (one,)), Constants())
+    assert machine.pole_pairs == 4
+    segments(Campaign("m", (one,)), machine)
+
+
+def test_a_column_that_no_row_of_the_capture_s_clock_holds_is_as_good_as_not_there():
+    """A thermometer whose own table ended before the others began."""
+    time = 1e-3 * np.arange(4000)
+    late = pl.DataFrame({"t_s": [-9.0, -8.0, -7.0], "temp_winding_degc": [25.0, 26.0, 27.0]})
+    one = capture("torque_map", 4000, time, 0.03 * np.arange(4000), late)
+    assert one.has("temp_winding_degc")
+    assert not tellable(one).has("temp_winding_degc")
+    (segment,) = made_of(one)
+    assert "temp_winding_degc" not in segment.recorded
+    assert np.isfinite(segment.weak.project(segment.recorded["iq_a"][None])).all()
+
+
+def test_a_capture_that_tells_all_it_says_is_not_copied():
+    one = capture("torque_map", 400, 1e-3 * np.arange(400), 0.03 * np.arange(400))
+    assert tellable(one) is one
