@@ -73,7 +73,7 @@ def separations(
         if columns is None:
             continue
         now, places = _now(effect, columns, fitted, wide)
-        freedom = len(effect.parameters_of(fitted.model.machine))
+        freedom = effect.dof(fitted.model.machine)
         base = _power(_noncentrality(now), freedom)
         ranked = sorted(
             (

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import ncx2
 
 from pipeline.criticism import experiments
+from pipeline.criticism.effect import Parameter
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.floors import noise_floor
 from pipeline.criticism.model import Model
@@ -16,6 +17,7 @@ from pipeline.criticism.planned import PLANNED, planned
 from pipeline.criticism.registry import effects
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.scores import candidates, widened
+from pipeline.criticism.segment import row_index
 from pipeline.criticism.system import Fitted, floors
 from tests.unit.criticism.machines import BASE, log, machine
 
@@ -24,12 +26,13 @@ ALL = effects()
 
 def state(name, size, others, segments):
     """A fit at known values that holds one effect, and the system with its rivals' columns."""
-    effect = ALL[name]
+    effect = ALL[name] if isinstance(name, str) else name
     model = Model(machine(), (effect,))
     parameter = effect.parameters[0]
     values = {**dict.fromkeys(c.name for c in _base()), **BASE}
     values = {k: 0.0 if v is None else v for k, v in values.items()}
-    values[f"{name}.{parameter.name}"] = size
+    values |= {f"{effect.name}.{p.name}": p.scan[0] for p in effect.parameters if p.choice}
+    values[f"{effect.name}.{parameter.name}"] = size
     fitted = Fitted(model, values, floors(segments, model, values), values)
     offered = candidates({other: ALL[other] for other in others}, fitted)
     return effect, fitted, widened(segments, fitted, offered), offered
@@ -85,10 +88,26 @@ def test_windage_and_eddy_drag_are_parted_by_more_speeds():
 
 
 def test_a_larger_effect_is_parted_with_more_power():
-    small, large = (told("windage", size, "iron_eddy") for size in (5e-4, 2e-3))
+    small, large = (told("windage", size, "iron_eddy") for size in (5e-5, 1e-4))
     power = {one.experiment: one.power for one in small}
-    for one in large:
-        assert one.power >= power.get(one.experiment, 0.0)
+    both = [one for one in large if one.experiment in power]
+    assert both
+    for one in both:
+        assert one.power > power[one.experiment]
+
+
+def test_a_choice_is_no_degree_of_freedom():
+    """A power for three parameters would be told where one is fitted."""
+    plain = ALL["windage"]
+    choices = tuple(
+        Parameter(name, "1", 1.0, 0.0, scan=(1.0, 0.0), choice=True) for name in ("here", "there")
+    )
+    choosing = replace(plain, parameters=(*plain.parameters, *choices))
+    without, with_choices = (told(one, 1e-4, "iron_eddy") for one in (plain, choosing))
+    assert without
+    assert [(one.experiment, one.power) for one in with_choices] == [
+        (one.experiment, pytest.approx(one.power, rel=1e-9)) for one in without
+    ]
 
 
 @pytest.mark.parametrize("test", sorted(PLANNED))
@@ -103,5 +122,8 @@ def test_a_planned_test_obeys_the_model_it_is_planned_with(test):
         assert segment.weak is not None
         assert segment.weak.starts.size
         weak = segment.weak.project(left)[:, :, 0]
-        group = noise_floor(segment, model, values, 1)
-        assert np.abs(weak).max() < 3.0 * group.max()
+        floor = noise_floor(segment, model, values, 1)
+        _, _, _, groups = row_index(segment)
+        plain = {channel: floor[n] for n, (channel, order) in enumerate(groups) if order == 0}
+        for place, channel in enumerate(segment.channels):
+            assert np.abs(weak[place]).max() < 3.0 * plain[channel]
