@@ -1,7 +1,9 @@
 """What a diagnosis is worth: against the truth where the captures tell it, else against its class.
 
 A document names with confidence when its verdict is `missing`; names under `unknown` are told as
-neighbours, with a remainder, and are not held against it.
+neighbours, with a remainder, and are not held against it. They count as found, since a reader is
+given them, but they are no exact set. Nothing hidden is rightly answered by `adequate` alone:
+captures of the whole programme suffice to say so.
 """
 
 from __future__ import annotations
@@ -29,11 +31,12 @@ AT_THE_FLOOR = 1.05
 class Judged:
     """One case's marks. Shares of a line are over the cases whose entry is not None.
 
-    `exact`: all that is hidden named and nothing else. `found`, `hidden`: how many of the hidden
-    effects were named. `flagged`: structure left over was reported. `sketch`: the unknown was
-    put down to the right variable. `floor`: held-out error of the last rung is at most 1.05 of
-    its floor. `slight`: of what is told as seen but too small to matter, whether the clearest is
-    hidden there, or a rival that these captures cannot exclude; None where nothing is told.
+    `exact`: all that is hidden named with confidence and nothing else. `found`, `hidden`: how many
+    of the hidden effects were named, under `unknown` too. `flagged`: structure left over was
+    reported. `sketch`: the unknown was put down to the right variable. `floor`: held-out error of
+    the last rung is at most 1.05 of its floor. `slight`: of what is told as seen but too small to
+    matter, whether the clearest is hidden there, or a rival that these captures cannot exclude;
+    None where nothing is told.
     """
 
     case: Case
@@ -70,7 +73,7 @@ def judged(case: Case, document: Mapping[str, Any]) -> Judged:
     return Judged(
         case,
         mark,
-        exact=bool(case.truth) and not stray and all(hit.values()),
+        exact=document["verdict"] == "missing" and bool(hit) and not stray and all(hit.values()),
         found=len(meant),
         hidden=len(case.truth),
         flagged=document["verdict"] == "unknown" or bool(document.get("remainder")),
@@ -104,7 +107,7 @@ def _mark(
     if stray:
         return "wrong"
     if not case.truth:
-        return "missed" if case.outside else "right"
+        return "missed" if case.outside or verdict == "insufficient" else "right"
     if not all(hit.values()):
         silent = not any(hit.values())
         return "right" if silent and case.nothing else "missed"

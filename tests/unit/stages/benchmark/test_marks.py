@@ -91,7 +91,7 @@ CROWD = case("crowd", truth=("windage",), accepted={"windage": ()}, allowed=("co
         (UNSEEN, document("adequate"), "right", 1),
         (UNSEEN, document("missing", "cogging"), "wrong", -5),
         (NULL, document("adequate"), "right", 1),
-        (NULL, document("insufficient"), "right", 1),
+        (NULL, document("insufficient"), "missed", 0),
         (NULL, document("unknown"), "unknown", 0),
         (NULL, document("missing", "cogging"), "wrong", -5),
         (STRANGE, document("adequate"), "missed", 0),
@@ -111,6 +111,13 @@ def test_sets_count_what_was_found_of_what_was_hidden() -> None:
     found = judged(PAIR, document("missing", "cogging"))
     assert (found.found, found.hidden, found.exact) == (1, 2, False)
     assert judged(PAIR, document("missing", "windage", "cogging")).exact
+
+
+def test_names_told_beside_an_unknown_remainder_are_found_but_no_exact_set() -> None:
+    found = judged(PAIR, document("unknown", "windage", "cogging"))
+    assert (found.mark, found.found, found.exact) == ("unknown", 2, False)
+    tied = judged(TIED, document("missing", "iron_eddy", confused={"iron_eddy": ["windage"]}))
+    assert (tied.found, tied.exact) == (1, True)
 
 
 def test_flag_and_sketch_of_the_unknown() -> None:
@@ -161,7 +168,7 @@ def test_shares_of_the_table() -> None:
     assert found["nothing hidden, clean: false name"] == (0, 1, True)
     assert found["nothing hidden, coloured: false name"] == (1, 1, False)
     assert found["2 to 5 effects: exact set"] == (0, 1, False)
-    assert found["2 to 5 effects: recall"] == (1, 2, False)
+    assert found["2 to 5 effects: recall (also under `unknown`)"] == (1, 2, False)
     assert found["outside the library: flagged"] == (1, 1, True)
     assert found["outside the library: right variable"] == (1, 1, True)
     assert found["ties: one singled out"] == (1, 1, False)
