@@ -1,4 +1,4 @@
-"""The effects: found, complete, zero at zero, and each equal to its closed form."""
+"""The effects: found, complete, and each equal to its closed form."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.criticism.effect import Recorded
 from pipeline.criticism.effects import cogging
-from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of, zero
+from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of
 from pipeline.criticism.registry import chosen, effects
 from pipeline.physics.glossary import COLUMNS, TESTS
 from pipeline.records.errors import UsageError
@@ -39,19 +39,6 @@ def test_an_effect_says_what_the_contract_asks_of_it(name):
         assert p.unit and p.typical > 0 and p.low < p.high
         assert p.negligible < p.typical
         assert p.scale == "1" or p.scale in machine().scales
-
-
-@pytest.mark.parametrize("name", LIBRARY)
-def test_zero_parameters_are_zero_effect(name):
-    """Every hook at zero amplitude leaves flux, drops and drags of the base as they are."""
-    effect, x = LIBRARY[name], operating()
-    base = evaluate(Model(machine(), ()), x, BASE)
-    model = Model(machine(), (effect,))
-    with_it = evaluate(model, operating(), {**BASE, **zero(effect, model)})
-    assert with_it.psi_wb == pytest.approx(base.psi_wb, abs=1e-18)
-    assert with_it.slope_wb == pytest.approx(0.0, abs=1e-18)
-    assert with_it.drop_v == pytest.approx(base.drop_v, abs=1e-15)
-    assert with_it.drag_nm == pytest.approx(base.drag_nm, abs=1e-15)
 
 
 @pytest.mark.parametrize("name", [n for n, e in LIBRARY.items() if e.coenergy])
@@ -116,7 +103,9 @@ def test_saturation_bends_the_flux_by_its_rational_curve(bend):
 
 @pytest.mark.parametrize(("bend", "d_bend"), [(0.0, 0.0), (1.5, 0.0), (0.0, 2.0), (1.5, 2.0)])
 def test_cross_saturation_bends_on_both_axes(bend, d_bend):
-    """ψ_q = −√(L_d L_q) i_max (odd s_d + even s_d²)/(1 + b_d s_d²) · 2 s_q/(1 + b s_q²)²."""
+    """ψ_q = −√(L_d L_q) i_max (odd s_d + even s_d²)/(1 + b_d s_d²) · 2 s_q/(1 + b s_q²)², and
+    ψ_d = −√(L_d L_q) i_max (odd + 2 even s_d − odd b_d s_d²)/(1 + b_d s_d²)² · s_q²/(1 + b s_q²).
+    """
     x = operating()
     q = {"odd": 0.2, "even": -0.1, "bend": bend, "d_bend": d_bend}
     size = machine().scales["current_a"]
@@ -125,6 +114,9 @@ def test_cross_saturation_bends_on_both_axes(bend, d_bend):
     closed = -math.sqrt(BASE["ld_h"] * BASE["lq_h"]) * size * beside * 2 * s
     flux, _ = effect_flux(LIBRARY["cross_saturation"], x, q)
     assert flux.imag == pytest.approx(closed / (1.0 + bend * s**2) ** 2, rel=1e-10)
+    slope = (0.2 - 0.2 * d - 0.2 * d_bend * d**2) / (1.0 + d_bend * d**2) ** 2
+    closed = -math.sqrt(BASE["ld_h"] * BASE["lq_h"]) * size * slope * s**2 / (1.0 + bend * s**2)
+    assert flux.real == pytest.approx(closed, rel=1e-9, abs=1e-15)
 
 
 def test_torque_comes_from_the_co_energy_of_the_linear_machine():
