@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import pytest
+
 import pipeline.criticism as room
 
 FILES = sorted(Path(room.__file__).parent.rglob("*.py"))
@@ -13,23 +15,94 @@ READS = {
     # what the station states of its own instruments
     *("voltage_kind", "u_rel_current", "u_rel_voltage", "u_rel_torque", "u_temp_degc", "extra"),
 }
+EXTRA = {"u_rel_lcr"}
 
 
 def _trees():
     return [(path.name, ast.parse(path.read_text(encoding="utf-8"))) for path in FILES]
 
 
+def _is_meta(node: ast.AST, names: set[str]) -> bool:
+    """Whether an expression is a capture's metadata: `x.meta`, or a name that stands for it."""
+    if isinstance(node, ast.NamedExpr):
+        return _is_meta(node.value, names)
+    if isinstance(node, ast.Attribute):
+        return node.attr == "meta"
+    return isinstance(node, ast.Name) and node.id in names
+
+
+def _aliases(tree: ast.AST) -> set[str]:
+    """Names that stand for metadata: assigned from it, or arguments annotated as it."""
+    names = {
+        node.arg
+        for node in ast.walk(tree)
+        if isinstance(node, ast.arg) and "CaptureMeta" in ast.unparse(node.annotation or node)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and _is_meta(node.value, names):
+            names |= {one.id for one in node.targets if isinstance(one, ast.Name)}
+        if isinstance(node, ast.NamedExpr) and _is_meta(node.value, names):
+            names.add(node.target.id)
+    return names
+
+
+def reads_of(tree: ast.AST) -> tuple[set[str], set[str]]:
+    """Keys of the metadata, and of its `extra`, that a module reads: `?` is a key not written out,
+    or the whole of it in the hands of something that is not looked into.
+    """
+    names = _aliases(tree)
+    parent = {id(child): node for node in ast.walk(tree) for child in ast.iter_child_nodes(node)}
+    read, extra = set(), set()
+    for node in ast.walk(tree):
+        above = parent.get(id(node))
+        if isinstance(node, ast.Attribute) and _is_meta(node.value, names):
+            read.add(node.attr)
+            if node.attr == "extra":
+                extra.add(_key(node, above))
+        elif _is_meta(node, names) and isinstance(getattr(node, "ctx", None), ast.Load):
+            own = isinstance(above, ast.Call) and getattr(above.func, "id", "").startswith("_")
+            named = isinstance(above, ast.Assign | ast.NamedExpr)
+            if not isinstance(above, ast.Attribute) and not own and not named:
+                read.add("?")
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "nameplate":
+            read.add(getattr(node.args[0], "value", "?"))
+    return read, extra
+
+
+def _key(extra: ast.AST, above: ast.AST | None) -> str:
+    """The key of `extra[KEY]`."""
+    if isinstance(above, ast.Subscript) and above.value is extra:
+        return str(getattr(above.slice, "value", "?"))
+    return "?"
+
+
+@pytest.mark.parametrize(
+    ("source", "read", "extra"),
+    [
+        ("capture.meta.test", {"test"}, set()),
+        ("meta = capture.meta\nmeta.lot", {"lot"}, set()),
+        ("if (said := capture.meta).operator: pass", {"operator"}, set()),
+        ("def f(m: CaptureMeta | None): return m.station", {"station"}, set()),
+        ("getattr(capture.meta, name)", {"?"}, set()),
+        ("asdict(capture.meta)", {"?"}, set()),
+        ("meta = capture.meta\nfor k in meta.extra: pass", {"extra"}, {"?"}),
+        ("capture.meta.extra['truth']", {"extra"}, {"truth"}),
+        ("more = capture.meta.extra\nmore['truth']", {"extra"}, {"?"}),
+        ("campaign.nameplate(key)", {"?"}, set()),
+    ],
+)
+def test_whoever_reads_metadata_by_another_name_is_seen(source, read, extra):
+    assert reads_of(ast.parse(source)) == (read, extra)
+
+
 def test_only_harmless_metadata_is_read():
     """`capture.meta.KEY` and `campaign.nameplate(KEY)` name nothing that tells the motor."""
-    read = set()
+    read, extra = set(), set()
     for _, tree in _trees():
-        for node in ast.walk(tree):
-            inner = node.value if isinstance(node, ast.Attribute) else None
-            if isinstance(inner, ast.Attribute) and inner.attr == "meta":
-                read.add(node.attr)
-            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "nameplate":
-                read.add(node.args[0].value)
+        here, more = reads_of(tree)
+        read, extra = read | here, extra | more
     assert read and read <= READS
+    assert extra and extra <= EXTRA
 
 
 def test_no_file_is_opened_but_a_users_effects():
