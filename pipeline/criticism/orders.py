@@ -14,6 +14,7 @@ from pipeline.records.capture import Capture
 
 _MOST = 12
 _CLEAR = 3.0
+_FEWEST_SECTORS = 6
 
 
 def holding_orders(
@@ -24,7 +25,8 @@ def holding_orders(
     Forward selection: the order that takes most of the square of what is left joins while the
     sectors of the turn, each predicted from all others, gain by more than `_CLEAR` times the
     scatter of their gains. With one parameter more a sector than there is evidence for, sectors
-    that were held out get worse at once, however well the rest is fitted.
+    that were held out get worse at once, however well the rest is fitted. Of fewer than six sectors
+    the scatter is not known well enough to tell of any order.
 
     References: [1] Chen, Billings & Luo, Int. J. Control 50 (1989), forward selection; [2] Hastie,
     Tibshirani & Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 7.10.
@@ -33,6 +35,8 @@ def holding_orders(
     if joined is None or not bases:
         return ()
     theta, current, design, sector = joined
+    if np.unique(sector).size < _FEWEST_SECTORS:
+        return ()
     cells = 2.0 * math.pi / float(np.median(np.abs(np.diff(np.unique(np.mod(theta, 2 * math.pi))))))
     top = min(highest, int(cells / 8))
     offered = [k for k in range(1, top + 1) if any(k % base == 0 for base in bases)]

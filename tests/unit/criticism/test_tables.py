@@ -56,6 +56,16 @@ def test_orders_that_repeat_are_found_and_noise_adds_none():
     assert holding_orders([held({}, 0.01)], (5, 6)) == ()
 
 
+@pytest.mark.parametrize("sectors", [1, 2, 5])
+def test_a_small_part_of_a_turn_tells_of_no_order(sectors):
+    """The scatter of one sector's gain is NaN, and no gain is below that."""
+    theta = np.linspace(0.01, sectors * 2.0 * np.pi / 24.0 - 0.01, 6000)
+    current = 0.05 + np.random.default_rng(1).normal(0.0, 0.01, theta.size)
+    part = capture("holding_current", theta_mech_rad=theta, iq_a=current)
+    assert set(standing(part, MACHINE).blocks.tolist()) == set(range(sectors))
+    assert holding_orders([part], (5, 6)) == ()
+
+
 def test_held_out_sectors_expose_orders_that_only_fit():
     some = [held({30: 0.1}, 0.01)]
     fitted, out = sector_errors(some, (30,))
