@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from typing import Any
 
 from pipeline.io.publish import canonical_json
@@ -59,6 +61,11 @@ class Case:
         """Name of the case: 16 hex digits of a digest of its content."""
         return hashlib.sha256(canonical_json(self.document())).hexdigest()[:16]
 
+    @property
+    def station_key(self) -> str:
+        """8 hex digits of a digest of the station that the case is recorded at."""
+        return _station_key(self.motor)
+
     def hidden_motor(self) -> Motor:
         """The motor with everything that is hidden in it."""
         from pipeline.simulator.outside import with_unknown
@@ -67,6 +74,15 @@ class Case:
         if self.outside is None:
             return motor
         return with_unknown(motor, self.outside, self.outside_size)
+
+
+@cache
+def _station_key(motor: str) -> str:
+    place = station(motor)
+    plan = [[stem, test, dict(how)] for stem, test, how in place.plan]
+    document = [repr(place.motor), asdict(place.bench), plan]
+    words = json.dumps(document, sort_keys=True, default=list)
+    return hashlib.sha256(words.encode()).hexdigest()[:8]
 
 
 def case_from(document: Mapping[str, Any]) -> Case:

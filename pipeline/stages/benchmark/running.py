@@ -46,8 +46,8 @@ class Book:
         return self.folder / "sealed" / f"{case.key}.json"
 
     def result(self, case: Case) -> Path:
-        """Where the diagnosis of a case lies; its name hangs on the case and the code."""
-        return self.folder / "results" / self.code / f"{case.key}.json"
+        """Where the diagnosis of a case lies; its name hangs on case, station and code."""
+        return self.folder / "results" / self.code / f"{case.key}-{case.station_key}.json"
 
     def document(self, case: Case) -> dict[str, Any] | None:
         """The diagnosis of a case, None where there is none yet."""

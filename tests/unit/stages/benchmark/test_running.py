@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import UsageError
 from pipeline.settings import BenchmarkSettings
+from pipeline.stages.benchmark import bench
+from pipeline.stages.benchmark import cases as cases_module
 from pipeline.stages.benchmark.blind import attempted, blind_process
 from pipeline.stages.benchmark.cases import Case
 from pipeline.stages.benchmark.command import BEGIN, END, main
@@ -98,6 +101,27 @@ def test_results_of_other_code_do_not_count(few: list[Case], tmp_path: Path) -> 
     assert Book(tmp_path, "old").document(few[0]) is not None
     assert len(code_digest()) == 12
     assert code_digest() == code_digest()
+
+
+def test_results_of_another_station_do_not_count(
+    few: list[Case], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a case nor the code holds what conf/motor says: another bench, another result."""
+    run(few[:1], Book(tmp_path, "code"), fake, blind=False)
+    now = Book(tmp_path, "code").result(few[0])
+    place = bench.station(few[0].motor)
+    for other in (
+        replace(place, motor=replace(place.motor, r_phase_ohm=1.01 * place.motor.r_phase_ohm)),
+        replace(place, bench=replace(place.bench, torque_noise_rel=1e-2)),
+        replace(place, plan=place.plan[:-1]),
+    ):
+        cases_module._station_key.cache_clear()
+        monkeypatch.setattr(cases_module, "station", lambda _, told=other: told)
+        assert Book(tmp_path, "code").result(few[0]) != now
+        assert Book(tmp_path, "code").document(few[0]) is None
+    cases_module._station_key.cache_clear()
+    monkeypatch.undo()
+    assert Book(tmp_path, "code").result(few[0]) == now
 
 
 def test_truth_lies_apart_from_results(few: list[Case], tmp_path: Path) -> None:
