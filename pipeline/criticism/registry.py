@@ -2,48 +2,72 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.util
 import pkgutil
 import sys
+from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import cache
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from typing import Any, NoReturn
 
 from pipeline.criticism import effects as effects_room
 from pipeline.criticism.effect import Effect
 from pipeline.records.errors import UsageError
 
 
-@cache
 def effects(effects_path: str | None = None) -> dict[str, Effect]:
     """Every effect by name, sorted; a user's file may not take the name of one of ours.
 
+    The folder is looked at anew every time, and files that have not changed are the same effects.
     Raises UsageError for a folder that is not there, a file without `EFFECT`, a name taken twice.
     """
+    return dict(_library(_user_files(effects_path)))
+
+
+@cache
+def _library(files: tuple[tuple[Path, str], ...]) -> Mapping[str, Effect]:
+    """Our effects and those of a user's files, which are known by path and digest."""
     found: dict[str, Effect] = {}
     for name in sorted(m.name for m in pkgutil.iter_modules(effects_room.__path__)):
         effect = importlib.import_module(f"{effects_room.__name__}.{name}").EFFECT
         found[effect.name] = effect
-    for path in _user_files(effects_path):
-        effect = _load(path)
+    for path, digest in files:
+        effect = _load(path, digest)
         if effect.name in found:
             raise UsageError(f"{path.name}: effect {effect.name} exists already", "rename it")
         found[effect.name] = effect
     return dict(sorted(found.items()))
 
 
-def _user_files(effects_path: str | None) -> list[Path]:
+def _user_files(effects_path: str | None) -> tuple[tuple[Path, str], ...]:
+    """The files of a user's folder, each with a digest of where it is and what it says."""
     if effects_path is None:
-        return []
-    folder = Path(effects_path)
+        return ()
+    folder = Path(effects_path).resolve()
     if not folder.is_dir():
         raise UsageError(f"effects_path {effects_path} is no folder", "name a folder of effects")
-    return sorted(p for p in folder.glob("*.py") if not p.name.startswith("_"))
+    paths = sorted(p for p in folder.glob("*.py") if not p.name.startswith("_"))
+    return tuple((path, _digest(path)) for path in paths)
 
 
-def _load(path: Path) -> Effect:
-    spec = importlib.util.spec_from_file_location(f"user_effect_{path.stem}", path)
+def _digest(path: Path) -> str:
+    return hashlib.sha256(str(path).encode() + b"\0" + path.read_bytes()).hexdigest()[:12]
+
+
+class _Anew(SourceFileLoader):
+    """Compiles a file as it is now: bytecode of the same second may be of another content."""
+
+    def path_stats(self, path: Any) -> NoReturn:
+        raise OSError(f"no bytecode of {path} is wanted")
+
+
+def _load(path: Path, digest: str) -> Effect:
+    name = f"user_effect_{path.stem}_{digest}"
+    spec = importlib.util.spec_from_file_location(name, path, loader=_Anew(name, str(path)))
     if spec is None or spec.loader is None:
         raise UsageError(f"{path.name} cannot be loaded", "is it a Python file?")
     module = importlib.util.module_from_spec(spec)

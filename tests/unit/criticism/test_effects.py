@@ -218,7 +218,6 @@ def test_a_users_file_counts_and_may_not_take_a_name(tmp_path: Path):
     assert "brake" in effects(str(tmp_path))
     assert chosen(("brake",), str(tmp_path))["brake"].hook == "torque"
     (tmp_path / "again.py").write_text(text)
-    effects.cache_clear()
     with pytest.raises(UsageError, match="windage exists already"):
         effects(str(tmp_path))
     with pytest.raises(UsageError, match="unknown effect friction"):
