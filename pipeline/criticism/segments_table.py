@@ -16,6 +16,8 @@ _FLUX_NOISE = 1e-3
 _OTHER_AXIS = 0.1
 _LEAST_NOISE = 1e-5
 _FEW_LEVELS = 4
+_ROWS_A_LEVEL = 3
+_CLEAR_OF_NOISE = 2.0
 
 
 def flux_table(capture: Capture, _: Machine) -> Segment | None:
@@ -57,7 +59,7 @@ def _steady(capture: Capture) -> Segment | None:
     current. The noise is the scatter of a level's voltages about a straight line over speed.
     """
     found = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
-    levels = levels_of(found["id_a"])
+    levels = set_levels(found["id_a"])
     count = int(levels.max(initial=0)) + 1
     freedom = found["vq_v"].size - 2 * count
     if freedom < count:
@@ -90,14 +92,37 @@ def _scatter(speed: Array, volts: Array) -> float:
     return float(left @ left)
 
 
-def levels_of(current: Array) -> NDArray[np.int64]:
+def set_levels(current: Array) -> NDArray[np.int64]:
+    """Number of the level [n] that was set for each current, noise and all.
+
+    The finest parting whose levels hold three rows on the average and lie further from each other
+    than twice the widest of them; a single level where there is none, however its noise is spread.
+    """
+    gaps = np.diff(np.sort(current))
+    gaps = gaps[gaps > _apart(current, 0.0)]
+    for least in np.unique(np.append(gaps, 0.0)):
+        levels = levels_of(current, float(least))
+        count = int(levels.max(initial=0)) + 1
+        if current.size < _ROWS_A_LEVEL * count:
+            continue
+        widest = max(float(np.ptp(current[levels == k])) for k in range(count))
+        if gaps[gaps > least].min(initial=math.inf) > _CLEAR_OF_NOISE * widest:
+            return levels
+    return np.zeros(current.size, dtype=np.int64)
+
+
+def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
     """Number of the level [n] that each current is at; levels are parted by a gap between them.
 
-    A gap is a step of the sorted currents of more than a hundredth of their range.
+    A gap is a step of the sorted currents over a hundredth of their range, and over `least`.
     """
     order = np.argsort(current, kind="stable")
-    parted = np.diff(current[order]) > 1e-2 * float(np.ptp(current))
+    parted = np.diff(current[order]) > _apart(current, least)
     number = np.concatenate([[0], np.cumsum(parted)])
     levels = np.empty(current.size, dtype=np.int64)
     levels[order] = number
     return levels
+
+
+def _apart(current: Array, least: float) -> float:
+    return max(1e-2 * float(np.ptp(current)), least)

@@ -17,7 +17,7 @@ from pipeline.criticism.registry import effects
 from pipeline.criticism.segments import segments
 from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
-from pipeline.criticism.segments_table import flux_table, levels_of
+from pipeline.criticism.segments_table import flux_table, levels_of, set_levels
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 
 MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
@@ -78,6 +78,28 @@ def test_held_out_sectors_expose_orders_that_only_fit():
 def test_levels_are_parted_by_gaps_whatever_their_order():
     current = np.array([0.0, -10.01, -5.0, -9.99, 0.01, -5.02])
     assert levels_of(current).tolist() == [2, 0, 1, 0, 2, 1]
+
+
+@pytest.mark.parametrize("set_a", [0.0, -8.0])
+def test_one_level_with_noise_is_one_level(set_a):
+    """Its own noise parts it at every hundredth of its range."""
+    random = np.random.default_rng(5)
+    current = set_a + random.normal(0.0, 0.02, 30)
+    speed = np.linspace(50.0, 300.0, 30)
+    assert levels_of(current).max() > 10
+    assert set_levels(current).max() == 0
+    volts = 0.05 * speed + random.normal(0.0, 1e-3, 30)
+    table = capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts)
+    assert flux_table(table, MACHINE).offsets.shape == (1, 30)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.1])
+def test_levels_that_were_set_are_told_through_their_noise(noise):
+    """Unevenly spaced, and as many rows as it takes at each."""
+    levels = np.repeat([0, 1, 2, 3], [3, 6, 4, 7])
+    current = np.array([-20.0, -8.0, -6.0, 0.0])[levels]
+    current = current + np.random.default_rng(6).normal(0.0, noise, current.size)
+    assert set_levels(current).tolist() == levels.tolist()
 
 
 @pytest.mark.parametrize("last_digit", [0.0, 1e-5])
