@@ -19,6 +19,8 @@ _DENSE = 2001
 _SURE = 1.96
 _ONE_SIDED = 0.1
 _INSIDE = 0.97
+# the last part of a range, and how much of a change in it is none
+_TAIL, _LEVEL = 0.1, 0.02
 _SLACK = 0.05
 _WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
@@ -189,17 +191,26 @@ def _run(port: Port, curve: Sequence[CurvePoint], found: Expression, carrier: in
         dense = np.array([p.at for p in curve])
         values = np.array([p.value for p in curve])
     top = int(np.argmax(np.abs(values)))
-    offset = 25.0 if variable.kind == "warm" else 0.0
-    unit = "degC" if variable.kind == "warm" else variable.unit
-    place = f"{abs(values[top]):.3g} {port.unit} at {abs(dense[top] + offset):.3g} {unit}"
+    warm = variable.kind == "warm"
+    at = f"{dense[top] + 25.0:.3g} degC" if warm else f"{abs(dense[top]):.3g} {variable.unit}"
+    place = f"{abs(values[top]):.3g} {port.unit} at {at}"
     if variable.kind == "turn":
         return f"at most {place}"
     parity = _parity(dense, values) if variable.kind == "signed" else ""
-    inside = abs(dense[top]) < _INSIDE * max(abs(low), abs(high))
-    ends = "with its maximum" if inside else "still growing at the end of the range,"
-    if variable.kind == "warm" or (values[top] * values[-1] > 0 and top == 0):
-        ends = "largest,"
-    return f"{parity}{ends} {place}"
+    return f"{parity}{'largest,' if warm else _ending(dense, np.abs(values))} {place}"
+
+
+def _ending(at: Array, size: Array) -> str:
+    """How a curve's size [n] runs out where its variable is largest."""
+    top = int(np.argmax(size))
+    end = 0 if abs(at[0]) > abs(at[-1]) or (at[0] < 0.0 and top == 0) else -1
+    before = float(np.interp(at[end] - _TAIL * (at[end] - at[-1 - end]), at, size))
+    level = size[end] <= (1.0 + _LEVEL) * before
+    if level and size[end] >= (1.0 - _LEVEL) * size[top]:
+        return "level towards the end of the range,"
+    if abs(at[top]) < _INSIDE * abs(at[end]):
+        return "largest," if top == 0 else "with its maximum"
+    return "largest," if level else "still growing at the end of the range,"
 
 
 def _parity(at: Array, values: Array) -> str:
