@@ -177,7 +177,7 @@ def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple
     where samples are too few for that.
 
     The torque is averaged in even bins of angle over whole turns; an order counts where its
-    amplitude is 6 times the spectrum's median (of a Rayleigh floor 1e-7 of orders pass that), in
+    amplitude is 6 times the spectrum's median (of a Rayleigh floor 2^-36 of orders pass that), in
     every capture of at least one turn.
     """
     found: set[int] | None = None
