@@ -254,13 +254,18 @@ def _by_angle(
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(2, weak.length - 2)[None, :]
     window = np.broadcast_to(first + np.arange(starts.size)[:, None], rows.shape).ravel()
-    turned = {"theta_elec_rad": fitted.model.machine.pole_pairs, "theta_mech_rad": 1}
+    # the bench's encoder has a zero of its own, which is known as an electrical angle alone
+    zero_rad = fitted.values["bench_angle_rad"] if segment.kind == "open" else 0.0
+    turned = {
+        "theta_elec_rad": fitted.model.machine.pole_pairs * theta - zero_rad,
+        "theta_mech_rad": theta,
+    }
     for place, channel in enumerate(segment.channels):
         inside = left[place][rows]
         inside = inside - inside.mean(axis=1, keepdims=True)
         noise = float(np.sqrt((inside**2).mean())) or 1.0
-        for variable, factor in turned.items():
-            share = np.mod(factor * theta[rows].ravel() / (2 * math.pi), 1.0)
+        for variable, angle in turned.items():
+            share = np.mod(angle[rows].ravel() / (2 * math.pi), 1.0)
             cell = np.minimum((share * cells[variable]).astype(np.int64), cells[variable] - 1)
             error = inside.ravel()
             part = (error, np.full(error.size, noise), cell.astype(float), window.astype(float))

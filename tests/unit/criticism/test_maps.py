@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from pipeline.criticism.model import Model
 from pipeline.criticism.registry import effects
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.system import Fitted, floors, system
+from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 
 N = 3000
@@ -132,3 +134,30 @@ def test_a_harmonic_shows_over_the_electrical_angle_with_its_size():
 def test_windows_that_share_samples_are_counted_once():
     assert disjoint(np.array([0, 5, 10, 12, 25]), 10).tolist() == [0, 10, 25]
     assert math.isclose(disjoint(np.array([3]), 10)[0], 3)
+
+
+@pytest.mark.parametrize("zero_rad", [0.0, 2.0])
+def test_an_open_circuit_spin_is_mapped_over_the_motor_s_own_angle(zero_rad):
+    """The bench's encoder has another zero than the drive's, by which the fit knows it."""
+    n, speed, at_rad = 8000, 40.0, 1.0
+    eps = 7 * speed * 5e-5 * np.arange(n)
+    voltage = 1j * 7 * speed * BASE["psi_wb"] + 0.05 * np.cos(eps - at_rad)
+    stationary = voltage * np.exp(1j * eps)
+    a, b, c = ((stationary * np.exp(-2j * np.pi * k / 3)).real for k in range(3))
+    theta = (eps + zero_rad) / 7
+    spin = replace(
+        log(n),
+        kind="open",
+        test="open_circuit",
+        recorded={"vab_v": a - b, "vbc_v": b - c, "vca_v": c - a, "theta_mech_rad": theta},
+        noise={"vab_v": 1e-3, "vbc_v": 1e-3, "vca_v": 1e-3, "theta_mech_rad": 1e-6},
+        channels=("vd_v", "vq_v"),
+        weak=projection(theta, np.arange(40, n - 440, 200), 400, ()),
+    )
+    values = {**BASE, "bench_angle_rad": zero_rad}
+    model = Model(machine(), ())
+    fit = Fitted(model, values, floors((spin,), model, values), values)
+    made = {(one.signal, one.x.variable): one for one in angle_maps((spin,), fit)}
+    one = made["vd_v", "theta_elec_rad"]
+    middle = 0.5 * (np.array(one.x.edges[1:]) + np.array(one.x.edges[:-1]))
+    assert one.mean == pytest.approx(0.05 * np.cos(middle - at_rad), abs=2e-3)
