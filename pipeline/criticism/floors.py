@@ -228,7 +228,9 @@ def channel_scale(segment: Segment, channel: str, model: Model, values: Values) 
         return model.machine.scales["torque_nm"] / values["j_kgm2"]
     if segment.kind in ("dq", "q", "open", "steady"):
         return model.machine.scales["voltage_v"]
-    return float(np.abs(segment.recorded[channel]).max())
+    # an axis that stands still has the scale of the other one
+    beside = segment.channels if segment.kind == "flux_map" else (channel,)
+    return max(float(np.abs(segment.recorded[name]).max()) for name in beside)
 
 
 def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:

@@ -9,6 +9,7 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.bounds import bounded_step, limits_of
+from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model, values_of
@@ -19,6 +20,8 @@ from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
 from pipeline.criticism.segments_table import flux_table, levels_of, set_levels
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
 
 MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
 
@@ -78,6 +81,19 @@ def test_held_out_sectors_expose_orders_that_only_fit():
 def test_levels_are_parted_by_gaps_whatever_their_order():
     current = np.array([0.0, -10.01, -5.0, -9.99, 0.01, -5.02])
     assert levels_of(current).tolist() == [2, 0, 1, 0, 2, 1]
+
+
+@pytest.mark.parametrize(("bend", "missing"), [(0.0, ()), (0.1, ("saturation",))])
+def test_a_sweep_of_one_axis_is_diagnosed(bend, missing):
+    """An axis that stands still at zero has no scale of its own."""
+    sweep = np.linspace(-10.0, 10.0, 41)
+    psi = 0.02 + 3e-4 * sweep * (1.0 - bend * sweep / 10.0)
+    psi = psi + np.random.default_rng(3).normal(0.0, 2e-6, sweep.size)
+    still = np.zeros(sweep.size)
+    table = capture("flux_map", id_a=sweep, iq_a=still, psi_d_wb=psi, psi_q_wb=still)
+    found = diagnose(Campaign("m", (table,)), ModelSpec("ideal"), Constants())
+    assert found.missing == missing
+    assert found.ladder[-1].held_out < 1.0
 
 
 @pytest.mark.parametrize("set_a", [0.0, -8.0])
