@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pipeline.criticism.effect import Array, Effect, Parameter, Recorded, Values
 
 
 def _load(r: Recorded, q: Values) -> Array:
-    """The true torque y(t + l) + τ y'(t + l) of what was stamped l late, to second order in l.
-
-    The lateness goes with a lag far below a sample, which it is not told from.
-    """
-    lag, period = q["lag_s"], r.ts_s
-    late = q["late"] * period * math.tanh(lag / period)
-    slope = np.gradient(r.torque_nm, period)
+    slope = np.gradient(r.torque_nm, r.ts_s)
     bend = np.zeros_like(r.torque_nm)
-    bend[1:-1] = np.diff(r.torque_nm, 2) / period**2
-    return r.torque_nm + (lag + late) * slope + late * (lag + 0.5 * late) * bend
+    bend[1:-1] = np.diff(r.torque_nm, 2) / r.ts_s**2
+    return r.torque_nm + q["lag_s"] * (slope + q["late"] * r.ts_s * bend)
 
 
 EFFECT = Effect(
@@ -30,16 +22,7 @@ EFFECT = Effect(
     experiment="steps of torque at constant speed",
     reference="Wegener & Andrae, Measurement 40 (2007), dynamic torque measurement",
     parameters=(
-        Parameter(
-            "lag_s",
-            "s",
-            10.0,
-            0.5,
-            "period_s",
-            low=0.0,
-            high=400.0,
-            words="time constant of the sensor alone",
-        ),
+        Parameter("lag_s", "s", 10.0, 0.5, "period_s", low=0.0, high=400.0),
         Parameter(
             "late",
             "1",
@@ -48,7 +31,7 @@ EFFECT = Effect(
             low=-2.0,
             high=2.0,
             scan=(0.0,),
-            words="sample periods that the torque is stamped late, beside the lag",
+            words="sample periods that the torque is stamped late",
         ),
     ),
     signals=("torque_shaft_nm", "iq_a"),
