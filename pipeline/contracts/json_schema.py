@@ -284,7 +284,8 @@ def diagnosis_schema() -> Schema:
             "ranking": _list(rank),
             "ladder": _list(step),
             "unknown": _or_null(unknown),
-        }
+        },
+        {"asked": _list(NAME)},
     )
     return _document("model-diagnosis/1", "What a model of a motor leaves out", body)
 

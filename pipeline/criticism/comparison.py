@@ -13,10 +13,10 @@ from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, in_common, leave_out, uncertainties
 from pipeline.criticism.mains import told_hum
-from pipeline.criticism.maps import all_maps, told_signal, unit_of
+from pipeline.criticism.maps import all_maps, unit_of
 from pipeline.criticism.model import BASE, PHYSICAL, Model
 from pipeline.criticism.optional import trimmed
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
@@ -132,7 +132,7 @@ def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator
         out = bool(np.isfinite(held.residual[mine]).all())
         residual = held.residual[mine] if out else around.residual[mine]
         unit, soft = around.unit[mine], around.soft[mine]
-        signal = told_signal(channel)
+        signal = told_signal(found[number], channel)
         yield SignalError(
             signal,
             found[number].capture,

@@ -19,7 +19,7 @@ from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
 from pipeline.criticism.scores import LEAST_SHARE, TIE, Candidate, Score, candidates
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import TESTS, segments
 from pipeline.criticism.selection import Rung, loss_without, search
 from pipeline.criticism.size import machine_of
@@ -93,7 +93,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         ranking,
         tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
         sketch if verdict == "unknown" else None,
-        left,
+        _as_told(found, left),
         (
             *_unused(campaign, found),
             *told_hum(start_fit.hum),
@@ -103,7 +103,14 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *held[0].notes,
             *(_wanted(library[name]) for name in unseen),
         ),
+        model.effects,
     )
+
+
+def _as_told(found: Sequence[Segment], left: Sequence[Remainder]) -> tuple[Remainder, ...]:
+    """What is left, with signals as outputs name them."""
+    names = {(s.capture, channel): told_signal(s, channel) for s in found for channel in s.channels}
+    return tuple(replace(one, signal=names[one.capture, one.signal]) for one in left)
 
 
 def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
@@ -149,6 +156,7 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
         None,
         (),
         (f"the captures cannot fit the base model: record {wanted}",),
+        model.effects,
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.floors import channel_scale
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.system import System
 from pipeline.records.diagnosis import Remainder
 
@@ -145,10 +145,14 @@ def _lost(less: Array, normal: Array) -> bool:
     return bool((np.diag(less) < 1e-5 * np.diag(normal)).any())
 
 
-def signal_errors(around: System, residual: Array) -> dict[str, float]:
+def signal_errors(segments: Sequence[Segment], around: System, residual: Array) -> dict[str, float]:
     """Rms error [unit of the signal] of each signal's window means."""
     found: dict[str, float] = {}
-    names = np.array([f"{channel}" if order == 0 else "" for _, channel, order in around.labels])
+    plain = (
+        told_signal(segments[number], channel) if order == 0 else ""
+        for number, channel, order in around.labels
+    )
+    names = np.array(list(plain))
     of_row = names[around.group]
     for name in sorted({n for n in names.tolist() if n}):
         mine = (of_row == name) & np.isfinite(residual)

@@ -29,7 +29,7 @@ def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRu
     return LadderRung(
         rung.added,
         held.total,
-        signal_errors(rung.around, residual),
+        signal_errors(found, rung.around, residual),
         {
             one.signal: RungError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
             for one in errors

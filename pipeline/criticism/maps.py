@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import Segment, slow_orders
+from pipeline.criticism.segment import Segment, slow_orders, told_signal
 from pipeline.criticism.system import Fitted, System
 from pipeline.numerics.cell_means import cell_means, visits_of
 from pipeline.physics.glossary import suffix_of
@@ -51,11 +51,6 @@ class Errors:
     at: Mapping[str, Array]
 
 
-def told_signal(channel: str) -> str:
-    """A channel as outputs name it: of a coasting shaft the equation gives an acceleration."""
-    return "alpha_mech_rad_s2" if channel == "omega_mech_rad_s" else channel
-
-
 def unit_of(signal: str) -> str:
     """The unit that a signal's name ends in."""
     return SUFFIX_UNITS.get(suffix_of(signal), "1")
@@ -67,7 +62,7 @@ def window_errors(found: Sequence[Segment], around: System, whitened: Array) -> 
     for place, (number, channel, order) in enumerate(around.labels):
         mine = around.group == place
         if order == 0 and found[number].weak is not None and mine.any():
-            parts.setdefault(told_signal(channel), []).append((number, mine))
+            parts.setdefault(told_signal(found[number], channel), []).append((number, mine))
     told = [window_variables(segment) for segment in found]
     return tuple(
         _errors_of(signal, groups, found, told, around, whitened)
@@ -269,7 +264,7 @@ def _by_angle(
             cell = np.minimum((share * cells[variable]).astype(np.int64), cells[variable] - 1)
             error = inside.ravel()
             part = (error, np.full(error.size, noise), cell.astype(float), window.astype(float))
-            yield told_signal(channel), variable, part
+            yield told_signal(segment, channel), variable, part
 
 
 def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:

@@ -76,6 +76,12 @@ class Segment:
         return int(next(iter(self.recorded.values())).size)
 
 
+def told_signal(segment: Segment, channel: str) -> str:
+    """A channel as outputs name it: of a coasting shaft the equation gives an acceleration."""
+    coasting = segment.kind == "shaft" and channel == "omega_mech_rad_s"
+    return "alpha_mech_rad_s2" if coasting else channel
+
+
 def segment_of(
     capture: Capture,
     kind: Kind,

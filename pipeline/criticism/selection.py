@@ -179,17 +179,23 @@ def _matters(fitted: Fitted, around: System, before: System, told: NDArray[np.bo
 
 def _sure(fitted: Fitted, around: System, held: HeldOut) -> bool:
     """Whether some amplitude of the newest effect is surely not zero: two standard uncertainties
-    from it, whichever capture is left out.
+    from it, whichever capture is left out. Of a coupling, its twist or gap as well.
 
     A large drag below the lowest speed that anything turned at mends how friction changes its
     sense at a reversal, and is known to no figure.
     """
     effect = fitted.model.effects[-1]
-    sizes = (p.name for p in effect.parameters_of(fitted.model.machine) if p.amplitude)
-    names = {f"{effect.name}.{name}" for name in sizes}
-    spread = uncertainties(around, held, len(around.columns))
-    told = zip(around.columns, spread.tolist(), strict=True)
-    return any(abs(fitted.values[c.name]) > _SURELY * u for c, u in told if c.name in names)
+    spread = uncertainties(around, held, len(around.columns)).tolist()
+    sure = {
+        column.name
+        for column, u in zip(around.columns, spread, strict=True)
+        if abs(fitted.values[column.name]) > _SURELY * u
+    }
+    known = effect.parameters_of(fitted.model.machine)
+    told = [p for p in known if f"{effect.name}.{p.name}" in sure]
+    twists = [p for p in known if p.negligible > 0 and not p.amplitude]
+    coupled = effect.closer is None or not twists or any(p in told for p in twists)
+    return coupled and any(p.amplitude for p in told)
 
 
 def _kin(effect: Effect, found: Sequence[Effect]) -> list[Effect]:

@@ -204,7 +204,10 @@ class UnknownStructure:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The verdict on one motor's model, with the ladder that leads to it."""
+    """The verdict on one motor's model, with the ladder that leads to it.
+
+    `asked`: effects that were asked for beside the `model`'s own; the first rung holds them.
+    """
 
     motor_id: str
     model: str
@@ -215,6 +218,13 @@ class Diagnosis:
     unknown: UnknownStructure | None
     remainder: tuple[Remainder, ...]
     notes: tuple[str, ...]
+    asked: tuple[str, ...] = ()
+
+    @property
+    def whole_model(self) -> str:
+        """The model as asked for, in words."""
+        signs = (f"- {name[1:]}" if name.startswith("-") else f"+ {name}" for name in self.asked)
+        return " ".join((f"model {self.model}", *signs))
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema model-diagnosis/1."""
@@ -222,6 +232,7 @@ class Diagnosis:
             "schema": "model-diagnosis/1",
             "motor_id": self.motor_id,
             "model": self.model,
+            "asked": list(self.asked),
             "verdict": self.verdict,
             "missing": list(self.missing),
             "ranking": [ranked.document() for ranked in self.ranking],

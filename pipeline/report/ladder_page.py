@@ -153,7 +153,7 @@ def _view(
     own = tuple(one for one in shown if one[0].split(".")[0] in came)
     return RungView(
         number,
-        title or f"model {result.model}",
+        title or result.whole_model,
         tuple(told[e] for e in came if e in told),
         f"{rung.held_out:.4g}",
         "" if below is None else _percent(rung.held_out, below.held_out),

@@ -55,7 +55,7 @@ def _lines(result: Diagnosis) -> list[str]:
     missing = ", ".join(result.missing)
     told = [f"{result.motor_id}: {result.verdict}" + (f": {missing}" if missing else "")]
     for rung in result.ladder:
-        added = ", ".join(rung.effects) or f"model {result.model}"
+        added = ", ".join(rung.effects) or result.whole_model
         told.append(f"  {added}: held-out error {rung.held_out:.4g} of the noise floor")
     for ranked in result.ranking[: len(result.missing)]:
         if ranked.confused_with:

@@ -64,4 +64,4 @@ def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bo
     fitted, around = trimmed(parts, begun.fitted, begun.around, effects)
     held = leave_out(around, len(own_columns(fitted.model)), parts)
     left = np.where(np.isfinite(held.residual), held.residual, around.residual)
-    return Fit(parts, fitted, around, signal_errors(around, left))
+    return Fit(parts, fitted, around, signal_errors(parts, around, left))

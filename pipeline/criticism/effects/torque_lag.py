@@ -8,6 +8,9 @@ from pipeline.criticism.effect import Array, Effect, Parameter, Recorded, Values
 
 
 def _load(r: Recorded, q: Values) -> Array:
+    """The true torque behind a lag τ stamped l late, or behind two lags τ and l: to second order
+    y + (τ + l) y' + τ l y''. What is told is the whole delay τ + l, which captures know well.
+    """
     slope = np.gradient(r.torque_nm, r.ts_s)
     bend = np.zeros_like(r.torque_nm)
     bend[1:-1] = np.diff(r.torque_nm, 2) / r.ts_s**2
@@ -16,7 +19,8 @@ def _load(r: Recorded, q: Values) -> Array:
 
 EFFECT = Effect(
     name="torque_lag",
-    words="recorded torque follows the true one as a first-order lag τ",
+    words="recorded torque is lag_s behind the true one: as a first-order lag, with a part of it "
+    "a late stamp or a second lag",
     signature="torque behind current after steps",
     tests=("torque_map",),
     experiment="steps of torque at constant speed",
@@ -31,7 +35,7 @@ EFFECT = Effect(
             low=-2.0,
             high=2.0,
             scan=(0.0,),
-            words="sample periods that the torque is stamped late",
+            words="τ l/(τ + l) of the two delays, in sample periods",
         ),
     ),
     signals=("torque_shaft_nm", "iq_a"),

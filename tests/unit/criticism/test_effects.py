@@ -207,6 +207,19 @@ def test_a_late_current_is_turned_back_and_not_lengthened():
     )
 
 
+def test_a_torque_behind_two_lags_is_brought_forward_by_both():
+    """Y + (τ + l) y' + τ l y'' of two lags in a row, for a torque that is slow beside them."""
+    ts, tau, lag, rate = 1e-4, 8e-4, 3e-4, 60.0
+    t = ts * np.arange(2000)
+    late = math.atan(rate * tau) + math.atan(rate * lag)
+    seen = np.sin(rate * t - late) / math.hypot(1.0, rate * tau) / math.hypot(1.0, rate * lag)
+    zero = np.zeros(t.size)
+    recorded = Recorded(zero.astype(complex), seen, zero, zero, ts, True, "drive")
+    q = {"lag_s": tau + lag, "late": tau * lag / (tau + lag) / ts}
+    true = LIBRARY["torque_lag"].load(recorded, q)
+    assert true[5:-5] == pytest.approx(np.sin(rate * t)[5:-5], abs=2e-4)
+
+
 def test_cogging_orders_are_multiples_of_poles_or_slots():
     """Order 13 stands out of this slow turn as well, but no magnet on a slot can make it."""
     assert cogging.orders(replace(machine(), torque_orders=(12, 13, 14, 84))) == (12, 14, 84)

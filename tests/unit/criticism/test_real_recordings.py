@@ -22,7 +22,7 @@ def found(folder, motor=None):
 
 
 def in_sample(made):
-    return signal_errors(made.around, made.around.residual)
+    return signal_errors(made.segments, made.around, made.around.residual)
 
 
 def parameters(made):

@@ -74,21 +74,33 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
     assert _holds(wide, np.array([3.0]), tried, after, (10.0, 10.0), doubts) is kept
 
 
-@pytest.mark.parametrize(("apart", "sure"), [(0.04, True), (0.06, False)])
-def test_an_effect_is_named_only_where_it_is_surely_there(apart, sure):
-    """Two captures, without the one or the other of which the share of 0.1 moves so far."""
+@pytest.mark.parametrize(
+    ("name", "values", "apart", "sure"),
+    [
+        ("windage", {"drag_nm": 0.1}, {"drag_nm": 0.04}, True),
+        ("windage", {"drag_nm": 0.1}, {"drag_nm": 0.06}, False),
+        ("presliding", {"torque_nm": 0.1, "travel_rad": 1e-3}, {"travel_rad": 1e-2}, True),
+        ("compliance", {"share": 0.1, "twist_rad": 1e-3}, {"share": 0.04}, True),
+        ("compliance", {"share": 0.1, "twist_rad": 1e-3}, {"share": 0.06}, False),
+        ("compliance", {"share": 0.1, "twist_rad": 1e-3}, {"twist_rad": 1e-3}, False),
+    ],
+)
+def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, sure):
+    """Two captures, without the one or the other of which the parameters move so far."""
     plain = missing_by(torque_shaft_nm=1.0).around
-    column = Column("compliance.share", 1e-3)
-    fitted = Fitted(Model(machine(), (effects()["compliance"],)), {"compliance.share": 0.1}, (), {})
+    full = {f"{name}.{key}": value for key, value in values.items()}
+    fitted = Fitted(Model(machine(), (effects()[name],)), full, (), {})
+    random = np.random.default_rng(4)
     around = replace(
         plain,
-        columns=(column,),
-        matrix=np.full((plain.size, 1), 1e3),
-        penalty=np.zeros(1),
-        pull=np.zeros(1),
+        columns=tuple(Column(key, 1e-3) for key in full),
+        matrix=random.normal(0.0, 1e5, (plain.size, len(full))),
+        penalty=np.zeros(len(full)),
+        pull=np.zeros(len(full)),
         around=fitted,
     )
-    held = HeldOut(plain.residual, 1.0, {0: np.array([apart]), 1: np.array([-apart])})
+    step = np.array([apart.get(key, 0.0) for key in values])
+    held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
     assert _sure(fitted, around, held) is sure
 
 
