@@ -13,7 +13,7 @@ from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
-from pipeline.criticism.judge import HeldOut, in_common, leave_out, remainder
+from pipeline.criticism.judge import HeldOut, in_common, leave_out, remainder, told_groups
 from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
@@ -24,7 +24,7 @@ from pipeline.criticism.segments import TESTS, segments
 from pipeline.criticism.selection import Rung, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, own_columns
+from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.criticism.unknown import unknown_structure
 from pipeline.criticism.wander import SIZE, wandering
 from pipeline.records.capture import Campaign
@@ -191,7 +191,8 @@ def trusted(
     """The ladder, and what is left over the floor at its end.
 
     Where that is structure that nothing here explains, the last rungs go that took less than a
-    tenth of the held-out error: beside an unknown, their names would be guesses. Where anything is
+    tenth of the held-out error, but for one that cleared all waves of the angle: beside an unknown,
+    their names would be guesses. Where anything is
     left, so does a further effect with which captures held out are not predicted better by a
     hundredth.
     """
@@ -203,7 +204,20 @@ def trusted(
             break
         if held[count - 1].total < (1.0 - LEAST_SHARE) * held[count - 2].total:
             break
+        if not worse and _clears_orders(found, rungs[count - 2].around, around):
+            break
     return kept, left
+
+
+def _clears_orders(found: Sequence[Segment], before: System, after: System) -> bool:
+    """Whether waves of the angle were left over the floor before a rung, and none after it.
+
+    Cogging is no guess where it takes every wave there was, however much a drag of nobody's
+    library leaves at order nought.
+    """
+    waves = np.array([order != 0 for _, _, order in after.labels])
+    was, now = (told_groups(around, found)[waves].any() for around in (before, after))
+    return bool(was and not now)
 
 
 def _explained(rungs: Sequence[Rung], left: Sequence[Remainder]) -> bool:

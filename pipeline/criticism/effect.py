@@ -161,8 +161,13 @@ class Operating:
 
     def one_sample(self) -> Operating:
         """The first sample alone [1]."""
-        arrays = {name: getattr(self, name)[:1] for name in _SAMPLED}
-        return replace(self, **arrays, psi_wb=None, torque_em_nm=None, run=None, kept={})
+        return replace(self.at(np.zeros(1, dtype=np.int64)), run=None)
+
+    def at(self, rows: NDArray[np.int64]) -> Operating:
+        """Some of the samples, for hooks that ask for nothing before or after a sample."""
+        arrays = {name: getattr(self, name)[rows] for name in _SAMPLED}
+        run = None if self.run is None else self.run[rows]
+        return replace(self, **arrays, psi_wb=None, torque_em_nm=None, run=run, kept={})
 
     @property
     def i_a(self) -> Complex:

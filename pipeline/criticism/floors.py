@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array, Effect, Values
+from pipeline.criticism.effect import Array, Effect, Operating, Values
 from pipeline.criticism.model import Model, evaluate, zero
 from pipeline.criticism.noise import rounding_error, unrounded
 from pipeline.criticism.operate import operate
@@ -116,8 +116,11 @@ def form_tolerance(
     return floor
 
 
-def reading_error(segment: Segment, model: Model, values: Values) -> Array:
-    """What no model of a bench gets right to, as weak samples [C, W, M].
+def reading_error(
+    segment: Segment, model: Model, values: Values, state: Operating | None = None
+) -> Array:
+    """What no model of a bench gets right to, as weak samples [C, W, M]; `state` is the segment's
+    true state [n], where it is known already.
 
     5e-5 of the reading in a window, since no sensor is more linear than that, and a part of the
     machine's own scale for what happens between samples: 1e-4 under a drive, 2e-5 on a bench. An
@@ -146,7 +149,8 @@ def reading_error(segment: Segment, model: Model, values: Values) -> Array:
     if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
         both[place] = np.hypot(both[place], _encoder_lines(segment, values))
-        both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values))
+        x = operate(segment, segment.recorded, model, values) if state is None else state
+        both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values, x))
     if segment.kind == "dq":
         jumps = _jumps(segment)[:, None]
         for place, channel in enumerate(segment.channels):
@@ -174,7 +178,7 @@ def _jumps(segment: Segment) -> Array:
     return error
 
 
-def _at_rest(segment: Segment, model: Model, values: Values) -> Array:
+def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
     """Torque [W] that friction may be out by where the shaft rests or creeps, as weak samples.
 
     A shaft that sticks is held by anything between plus and minus its friction [Armstrong-Hélouvry
@@ -183,20 +187,21 @@ def _at_rest(segment: Segment, model: Model, values: Values) -> Array:
     weak = segment.weak
     if weak is None:
         return np.zeros(segment.size)
+    slow = _CREEPS * model.machine.scales["speed_rad_s"]
+    creeping = np.flatnonzero(np.abs(x.omega_rad_s) < slow)
+    if creeping.size < 2:
+        return np.zeros(weak.starts.size)
     known = dict(values)
     for effect in model.effects:
         known = {**zero(effect, model), **known}
-    x = operate(segment, segment.recorded, model, known)
-    slow = _CREEPS * model.machine.scales["speed_rad_s"]
-    creeping = np.abs(x.omega_rad_s) < slow
-    if not creeping.any():
-        return np.zeros(weak.starts.size)
+    there = x.at(creeping)
     onward, back = (
-        evaluate(model, replace(x, omega_rad_s=np.full(creeping.size, speed)), known).drag_nm
+        evaluate(model, replace(there, omega_rad_s=np.full(creeping.size, speed)), known).drag_nm
         for speed in (slow, -slow)
     )
-    grip = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
-    out: Array = np.abs(weak.project(np.where(creeping, grip, 0.0)[None])[0, :, 0])
+    grip = np.zeros(segment.size)
+    grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
+    out: Array = np.abs(weak.project(grip[None])[0, :, 0])
     return out
 
 

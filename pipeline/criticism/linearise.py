@@ -85,7 +85,7 @@ def linearise(
     group, window, valid, groups = row_index(segment)
     sampler = _Sampler(segment, model, dict(values))
     here = sampler.here
-    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near)[valid])
+    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near, sampler.x)[valid])
     whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
     kept = np.zeros((int(valid.sum()), len(columns)))
     pending: list[tuple[int, Array]] = []

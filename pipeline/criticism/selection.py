@@ -84,7 +84,8 @@ def search(
         fitted, _ = _backward(segments, *chosen, base)
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))
-        fitted = _floored_anew(segments, fitted)
+        if found and (found[-1].hook == "sensor" or found[-1].closer is not None):
+            fitted = _floored_anew(segments, fitted)
         if tuple(e.name for e in found) in {r.added for r in rungs}:
             break
     return tuple(rungs)

@@ -8,10 +8,12 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _angle(x: Operating, q: Values) -> Array:
-    once = q["sine_rad"] * np.sin(x.theta_rad) + q["cosine_rad"] * np.cos(x.theta_rad)
-    twice = q["sine2_rad"] * np.sin(2 * x.theta_rad) + q["cosine2_rad"] * np.cos(2 * x.theta_rad)
-    error: Array = x.machine.pole_pairs * (once + twice)
-    return error
+    sine, cosine = np.sin(x.theta_rad), np.cos(x.theta_rad)
+    error: Array = q["sine_rad"] * sine + q["cosine_rad"] * cosine
+    if q["sine2_rad"] or q["cosine2_rad"]:
+        # of twice the angle: sin 2θ = 2 sin θ cos θ, cos 2θ = 1 - 2 sin² θ
+        error += 2.0 * q["sine2_rad"] * sine * cosine + q["cosine2_rad"] * (1.0 - 2.0 * sine**2)
+    return x.machine.pole_pairs * error
 
 
 EFFECT = Effect(
