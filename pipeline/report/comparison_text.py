@@ -60,9 +60,12 @@ def _ratio(error: SignalError) -> float:
 
 
 def _places(result: Comparison) -> list[str]:
-    """Variables that an error surely depends on, and the cell of speed and current it is in."""
+    """Variables that an error surely depends on, and the cell of speed and current it is in; of
+    signals that are over their noise floor in some capture, since below it there is no failure.
+    """
     lines = []
-    for signal in dict.fromkeys(d.signal for d in result.where):
+    over = {e.signal for e in result.errors if e.kind == "equation" and _ratio(e) > 1.0}
+    for signal in dict.fromkeys(d.signal for d in result.where if d.signal in over):
         sure = [d for d in result.where if d.signal == signal and _surely(d)]
         sure.sort(key=lambda d: -d.explained)
         told = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
