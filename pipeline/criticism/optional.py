@@ -38,7 +38,8 @@ def trimmed(
             fitted, around = less
             continue
         terms = {p.optional for p in effect.parameters_of(fitted.model.machine)}
-        for term in (*spare, *sorted(terms - {0, *spare})):
+        alone = spare if len(spare) > 1 else ()
+        for term in (*alone, *sorted(terms - {0, *spare})):
             less = _unless_worth(segments, fitted, around, name, (term,), price)
             fitted, around = less or (fitted, around)
     return fitted, around

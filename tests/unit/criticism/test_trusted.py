@@ -16,7 +16,7 @@ from pipeline.criticism.registry import effects
 from pipeline.criticism.selection import Rung, _holds, _sure
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.diagnosis import Remainder
-from tests.unit.criticism.machines import BASE, machine
+from tests.unit.criticism.machines import BASE, log, machine
 
 
 def missing_by(**spreads):
@@ -42,13 +42,34 @@ def missing_by(**spreads):
     return Rung((), around.around, around, ())
 
 
-@pytest.mark.parametrize(("after", "kept"), [(5.5, 2), (4.9, 3)])
+@pytest.mark.parametrize(("after", "kept"), [(5.5, 2), (4.97, 2), (4.9, 3)])
 def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, kept, monkeypatch):
     rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.diagnosis.remainder", lambda *_: over)
     totals = [HeldOut(rungs[0].around.residual, total) for total in (10.0, 5.0, after)]
     assert len(trusted((), rungs, totals)[0]) == kept
+
+
+def with_waves(*spreads: float) -> Rung:
+    """A rung that misses the torque by these χ²/n at the orders 0, 7 and 84 of a turn."""
+    names = ("plain", "seventh", "cogging")
+    rung = missing_by(**dict(zip(names, spreads, strict=True)))
+    labels = tuple((0, "torque_shaft_nm", order) for order in (0, 7, 84))
+    return replace(rung, around=replace(rung.around, labels=labels))
+
+
+@pytest.mark.parametrize(
+    ("left", "kept"), [((1e6, 0.5, 0.5), 2), ((1e6, 0.5, 20.0), 1), ((1e6, 20.0, 0.5), 1)]
+)
+def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeypatch):
+    """Cogging beside a brake of nobody's library, which is nearly all of the error."""
+    rungs = with_waves(1e6, 20.0, 5e3), with_waves(*left)
+    over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
+    monkeypatch.setattr("pipeline.criticism.diagnosis.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.diagnosis._explained", lambda *_: False)
+    held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 98.0)]
+    assert len(trusted((log(),), rungs, held)[0]) == kept
 
 
 @pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])

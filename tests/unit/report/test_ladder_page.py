@@ -198,8 +198,10 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
         SignalError("vq_v", "a.mcap", "held_out", 0.03, 0.01, 10, 9.0, "V"),
         SignalError("vq_v", "b.mcap", "fit", 0.04, 0.01, 10, 9.0, "V"),
         SignalError("iq_a", "a.mcap", "held_out", 0.02, 0.01, 10, 9.0, "A", "free_run"),
+        SignalError("vd_v", "a.mcap", "held_out", 0.009, 0.01, 10, 9.0, "V"),
     )
     where = (
+        Dependence("vd_v", "id_a", 0.8, 1e-9),
         Dependence("vq_v", "iq_a", 0.8, 1e-9),
         Dependence("vq_v", "t_s", 0.01, 1e-9),
         Dependence("vq_v", "theta_mech_rad", 0.3, None),
@@ -229,6 +231,7 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
     assert re.search(r"vq_v +35.4 mV +10.0 mV +3.5 +1 of 2 held out +b.mcap \(4.0\)", text)
     assert "iq_a, on its own" in text
     assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
+    assert "vd_v depends" not in text, "it is below its floor"
     assert re.search(r"r_ohm +320.0 ± 2.0 mΩ +310.0 ± 2.0 mΩ +-10.0", text)
     assert "1 parameters stayed within 3 u" in text
 

@@ -1,0 +1,62 @@
+"""Terms inside an effect that captures do not pay for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism import optional
+from pipeline.criticism.model import Model, zero
+from pipeline.criticism.optional import trimmed
+from pipeline.criticism.registry import effects
+from pipeline.criticism.system import Fitted
+from tests.unit.criticism.machines import BASE, machine
+
+SATURATION = effects()["saturation"]
+Q_FALL, Q_BEND, D_ODD, D_FALL, D_BEND = range(1, 6)
+NEEDED = {D_ODD: 20.0, Q_FALL: 0.1, Q_BEND: 0.0, D_FALL: 0.3, D_BEND: 0.0}
+"""What the misfit loses by the removal of each term."""
+
+
+class Around:
+    """A fit of 40 samples whose misfit is known."""
+
+    size = 40
+
+    def __init__(self, misfit: float) -> None:
+        self.misfit = misfit
+
+
+@pytest.mark.parametrize(
+    ("tangent", "refits"),
+    [
+        ((Q_FALL, Q_BEND, D_FALL, D_BEND), 1),
+        ((D_BEND, Q_FALL, Q_BEND, D_ODD), 6),
+        ((D_ODD,), 5),
+        ((), 0),
+    ],
+)
+def test_the_terms_that_pay_stay_whatever_the_tangent_says(tangent, refits, monkeypatch):
+    """Where d_odd and d_fall tie to first order, the tangent may take the wrong one."""
+    tried = []
+
+    def without(_segments, fitted, around, effect, terms):
+        tried.append(terms)
+        gone = tuple(sorted({*effect.left_out, *terms}))
+        less = Model(machine(), (replace(effect, left_out=gone),))
+        return Fitted(less, fitted.values, (), BASE), Around(
+            around.misfit + sum(NEEDED[term] for term in terms)
+        )
+
+    monkeypatch.setattr(optional, "_spare", lambda *_: tangent)
+    monkeypatch.setattr(optional, "_without", without)
+    model = Model(machine(), (SATURATION,))
+    start = Fitted(model, {**BASE, **zero(SATURATION, model)}, (), BASE)
+    fitted, around = trimmed((), start, Around(0.0), ("saturation",))
+    assert len(tried) == refits
+    gone = set(fitted.model.effects[0].left_out)
+    assert gone == ({*NEEDED} - {D_ODD} if tangent else set())
+    assert around.misfit == pytest.approx(sum(NEEDED[term] for term in gone))
+    assert np.log(Around.size) < NEEDED[D_ODD]
