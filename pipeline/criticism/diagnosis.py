@@ -49,9 +49,13 @@ _WITHIN = (
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
 )
 _SEEN = 3.0
+"""Standard deviations of a typical size from which on captures would show an effect."""
 _EXPLAINED = 0.5
+"""Share of the misfit that effects found may leave, and still explain what is left."""
 _AS_GOOD = 0.1
+"""Share of the fall that a rival's promise may be short of."""
 _NOTHING = 0.01
+"""Share of the held-out error that a further effect must take while anything is left."""
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:

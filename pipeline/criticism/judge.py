@@ -16,11 +16,13 @@ from pipeline.criticism.system import System
 from pipeline.records.diagnosis import Remainder
 
 _GROWTH = 5.0
+"""Growth of a variance without a capture from which on the capture carries the constant alone."""
 _MOST_BLOCKS = 10_000
 _OVER = 1.0
-_MATERIAL = 5e-4
-_MATERIAL_BENCH = 1e-2
-_MATERIAL_READING = 5e-3
+"""Excess of χ²/n that is told: a floor from the recording itself is good to a factor of two."""
+_MATERIAL, _MATERIAL_BENCH, _MATERIAL_READING = 5e-4, 1e-2, 5e-3
+"""Error that matters: of the machine's own scale, of a bench meter's largest reading, and of the
+largest voltage of a log, which is less than the machine's at standstill."""
 _VOLTS = ("vd_v", "vq_v")
 
 
@@ -47,8 +49,8 @@ class HeldOut:
 def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> HeldOut:
     """Predicts every capture from all the others, by one weighted step from the full fit.
 
-    Of `segments` that are parted in blocks, every block is predicted from all else. Noise weights
-    stay those of the full fit, so that a capture cannot vote on its own weight.
+    Of `segments` that are parted in blocks, every block is predicted from all else. The fit is
+    left out of to first order: noise floors, weights and shapes stay those of the full fit.
     """
     places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
     weight = around.weights(around.spreads(around.residual))

@@ -23,15 +23,19 @@ from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted, System, own_columns, system
 
 TIE = 12.0
+"""Difference of −2 log L below which captures do not part two explanations: 3.5 deviations."""
 LEAST_SHARE = 0.1
-WORTH = 30.0
-_CLEAR = 0.5
+"""Of what is over the floor, what an effect must take to be named for it."""
+WORTH, _CLEAR = 30.0, 0.5
+"""An excess that counts, as −2 log L; or a sample, where there are few."""
 _MOST_OF = 0.5
-_GLANCE = ((1.0,), 3)
-THOROUGH = ((1.0, 0.0), 20)
+"""Of what would be told as a remainder, what makes an effect matter at any size."""
+_GLANCE, THOROUGH = ((1.0,), 3), ((1.0, 0.0), 20)
+"""Exponents of the weights that a descent begins with, and its steps."""
 _PROMISING = 0.3
-# prices that evidence below the floor must be worth: noise that is not white is down there as well
+"""Prices that a glance must see for a thorough look."""
 _BELOW = 1.5
+"""Prices that evidence below the floor must be worth: noise that is not white is down there too."""
 
 
 @dataclass(frozen=True, slots=True)

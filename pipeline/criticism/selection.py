@@ -40,14 +40,19 @@ from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted, System, floors, floors_grown, own_columns, tolerances
 
 _MOST = 6
-_REFITS = 3
-_ROUNDS = 2
-_HELD = 0.5
+"""Rungs: the model as asked for and five effects."""
+_REFITS, _ROUNDS = 3, 2
+"""Candidates that are refitted at a time, and how often the next ones are."""
 _CLOSE = 0.7
+"""Share of the best fall of misfit that a candidate needs to be refitted beside it."""
+_HELD, _BESIDE = 0.5, 3.0
+"""Prices that captures held out must pay, and below the floor beside an effect of its own kind."""
 _KIN = 0.05
-_BESIDE = 3.0
+"""Share that the form of an effect of the same kind may be wrong by."""
 _SURELY = 2.0
+"""Standard uncertainties that an amplitude must be away from zero."""
 _OTHER_FLOOR = math.log(1.5)
+"""Change of some noise floor that calls for a fit by the new ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +68,9 @@ class Rung:
 def search(
     segments: Sequence[Segment], fitted: Fitted, library: Mapping[str, Effect]
 ) -> tuple[Rung, ...]:
-    """The ladder: adds the best effect, refits, checks backwards, until nothing passes."""
+    """The ladder: adds the best effect, refits, checks backwards, until nothing passes or five
+    effects are in.
+    """
     rungs: list[Rung] = []
     base = len(fitted.model.effects)
     for _ in range(_MOST):

@@ -22,10 +22,10 @@ from scipy.optimize import minimize
 from pipeline.criticism.curves import Variable
 from pipeline.criticism.effect import Array
 from pipeline.criticism.ports import Port
+from pipeline.criticism.scores import TIE
 from pipeline.criticism.system import System
 from pipeline.criticism.terms import CENTRED, POWER, SHAPES, WAVES, Term
 
-_TIE = 12.0
 _MOST = 4
 _TRIED = 6
 _WORTH = 0.01
@@ -202,7 +202,7 @@ def expression(pursuit: Pursuit) -> Expression:
         if not tried:
             break
         now = tried[0][0]
-        if cost - now < max(_TIE, _WORTH * (start - now)):
+        if cost - now < max(TIE, _WORTH * (start - now)):
             break
         chosen, cost = tried[0][1], now
     return _finished(pursuit, chosen, start)

@@ -14,14 +14,13 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.judge import told_groups
 from pipeline.criticism.linearise import Column, effect_columns
 from pipeline.criticism.ports import Port, ports, refined
-from pipeline.criticism.scores import LEAST_SHARE
+from pipeline.criticism.scores import LEAST_SHARE, TIE
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.sketch import Pursuit, expression
 from pipeline.criticism.system import Fitted, System, own_columns, system
 from pipeline.criticism.telling import told
 from pipeline.records.diagnosis import UnknownStructure
 
-_TIE = 12.0
 _NEAR = 0.05
 _PRIOR = 1.0
 _CARRIED = 5.0
@@ -140,7 +139,7 @@ def _ranked(
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
         held = reference - _held_out(wide, chosen, after, ridge, units)
-        if held > max(_TIE, LEAST_SHARE * excess):
+        if held > max(TIE, LEAST_SHARE * excess):
             found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
@@ -161,11 +160,11 @@ def _simplest(found: Sequence[Found]) -> Found:
 
     Of several that no evidence parts it is the one listed first, the commonest in machines.
     """
-    enough = found[0].held - max(_TIE, _NEAR * found[0].held)
+    enough = found[0].held - max(TIE, _NEAR * found[0].held)
     close = [one for one in found if one.held >= enough]
     fewest = min(len(one.port.columns) for one in close)
     simple = [one for one in close if len(one.port.columns) == fewest]
-    level = max(one.held for one in simple) - _TIE
+    level = max(one.held for one in simple) - TIE
     return min((one for one in simple if one.held >= level), key=lambda one: one.place)
 
 
