@@ -74,15 +74,17 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     stem = f"{file_stem(campaign.motor_id)}_unknown"
     rungs, held, left = _climbed(found, start_fit.fitted, library)
     sketch = _unknown(found, rungs, left, stem)
-    calm = None
-    if sketch is None and not _explained(rungs, left):
-        calm = wandering(found, rungs[-1].fitted, left)
+    large, calm = _large(found, rungs, left), None
+    if sketch is None and not _explained(rungs, large):
+        calm = wandering(found, rungs[-1].fitted, large)
     if calm is not None:
         found = calm
         rungs, held, left = _climbed(found, gauss_newton(found, start_fit.fitted)[0], library)
+        left = _large(found, rungs, left)
         sketch = _unknown(found, rungs, left, stem)
     within = None if sketch else _unknown(found, rungs, left, stem, in_parts=True)
     sketch = sketch or within
+    left = left if sketch else _large(found, rungs, left)
     last = rungs[-1]
     offered = candidates(library, last.fitted)
     missing = last.added
@@ -109,6 +111,19 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         ),
         model.effects,
     )
+
+
+def _large(
+    found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder]
+) -> tuple[Remainder, ...]:
+    """What is left and large for the machine as a whole.
+
+    What matters only beside the little voltage that there is at standstill may be an instrument's
+    wander as well as the machine: it is told where some state of the machine predicts it.
+    """
+    around = rungs[-1].around
+    large = remainder(around, found, around.residual, large=True)
+    return tuple(one for one in left if one in large)
 
 
 def _as_told(found: Sequence[Segment], left: Sequence[Remainder]) -> tuple[Remainder, ...]:

@@ -164,15 +164,16 @@ def signal_errors(segments: Sequence[Segment], around: System, residual: Array) 
 
 
 def remainder(
-    around: System, segments: Sequence[Segment], residual: Array
+    around: System, segments: Sequence[Segment], residual: Array, large: bool = False
 ) -> tuple[Remainder, ...]:
-    """Groups over their floor, significantly and by a size that matters, the worst first.
+    """Groups over their floor, significantly and by a size that matters, the worst first; `large`:
+    that matters to the machine as a whole.
 
     A floor that comes from the recording itself is no better than a factor 2 in variance, and
     error below a two-thousandth of the machine's voltage or torque is nobody's concern.
     """
     found = []
-    for place, chi2_per_n, size in _over(around, segments, residual, around.soft):
+    for place, chi2_per_n, size in _over(around, segments, residual, around.soft, large):
         number, channel, order = around.labels[place]
         found.append(Remainder(segments[number].capture, channel, order, chi2_per_n, size))
     return tuple(sorted(found, key=lambda r: (-r.chi2_per_n, r.capture, r.signal, r.order)))
@@ -189,7 +190,11 @@ def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_
 
 
 def _over(
-    around: System, segments: Sequence[Segment], residual: Array, soft: Array
+    around: System,
+    segments: Sequence[Segment],
+    residual: Array,
+    soft: Array,
+    large: bool = False,
 ) -> Iterator[tuple[int, float, float]]:
     """Place, χ²/n and size of every group over a floor that is `soft` [R] of what rows are over."""
     spreads, counts = around.spreads(residual / soft), around.counts
@@ -201,12 +206,12 @@ def _over(
         unit = float(((around.unit * soft)[mine] ** 2).mean())
         more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
-        if size > material_size(segments[number], channel, around):
+        if size > material_size(segments[number], channel, around, large):
             yield place, float(q), size
 
 
-def material_size(segment: Segment, channel: str, around: System) -> float:
-    """Error [unit of the signal] below which nobody would act.
+def material_size(segment: Segment, channel: str, around: System, large: bool = False) -> float:
+    """Error [unit of the signal] below which nobody would act, or that is `large` for the machine.
 
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
     """
@@ -214,7 +219,7 @@ def material_size(segment: Segment, channel: str, around: System) -> float:
     fitted = around.around
     scale = channel_scale(segment, channel, fitted.model, fitted.values)
     size = (_MATERIAL_BENCH if bench else _MATERIAL) * scale
-    if segment.kind == "dq" and channel in _VOLTS:
+    if segment.kind == "dq" and channel in _VOLTS and not large:
         reading = max(float(np.abs(segment.recorded[name]).max()) for name in _VOLTS)
         size = min(size, _MATERIAL_READING * reading)
     return size

@@ -46,7 +46,7 @@ def wandering(
         return None
     told = with_wander(segments, fitted.model, fitted.values)
     _, around = gauss_newton(told, fitted)
-    return None if remainder(around, told, around.residual) else told
+    return None if remainder(around, told, around.residual, large=True) else told
 
 
 def with_wander(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Segment, ...]:

@@ -91,4 +91,5 @@ def test_at_standstill_a_voltage_is_measured_by_what_is_there():
     volt, torque = (running.channels[n] for n in (0, 2))
     assert material_size(running, volt, around) == pytest.approx(5e-4 * 20.0)
     assert material_size(standing, volt, around) == pytest.approx(5e-3 * 0.2)
+    assert material_size(standing, volt, around, large=True) == pytest.approx(5e-4 * 20.0)
     assert material_size(standing, torque, around) == material_size(running, torque, around)
