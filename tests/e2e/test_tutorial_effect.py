@@ -22,8 +22,8 @@ def blocks(language):
     return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
 
 
-def document(folder):
-    path = folder / "comparison" / "braked.json"
+def document(folder, kind="comparison"):
+    path = folder / kind / "braked.json"
     return json.loads(path.read_text(encoding="utf-8"))
 
 
@@ -47,3 +47,8 @@ def test_the_error_falls_to_the_floor(tmp_path, monkeypatch):
     found = {name: one["value"] for name, one in after["model"]["parameters"].items()}
     assert found["eddy_brake.speed_rad_s"] == pytest.approx(motor.speed_rated_rad_s / 3, rel=0.03)
     assert found["eddy_brake.torque_nm"] == pytest.approx(0.03 * motor.torque_rated_nm, rel=0.03)
+    told = document(tmp_path / "reports" / "tutorial" / "without", "diagnosis")
+    assert (told["verdict"], told["missing"]) == ("unknown", ["cogging"])
+    (term,) = told["unknown"]["sketch"]
+    assert told["unknown"]["variables"] == ["omega_mech_rad_s"]
+    assert term["coefficient"] == pytest.approx(0.03 * motor.torque_rated_nm, rel=0.03)
