@@ -104,7 +104,7 @@ class Score:
         if self.shadow is not None:
             return f"{self.shadow} explains it better, and is too small to matter"
         if self.passes:
-            return "did not hold on captures held out"
+            return "refitted, it does not hold on captures held out, or may be zero"
         if self._below_floor:
             return "what it would explain lies below the noise floor"
         return "takes too small a share of what is over the noise floor"
