@@ -147,6 +147,11 @@ def test_torque_comes_from_the_co_energy_of_the_linear_machine():
             lambda x: 0.01 / (1.0 + (x.omega_rad_s / 7.0) ** 2) * np.sign(x.omega_rad_s),
         ),
         (
+            "stribeck",
+            {"excess_nm": 0.01, "speed_rad_s": 7.0, "exponent": 1.0, "tail": 0.5},
+            lambda x: 0.01 / (1.0 + abs(x.omega_rad_s) / 14.0) ** 2 * np.sign(x.omega_rad_s),
+        ),
+        (
             "unbalance",
             {"sin_nm": 0.01, "cos_nm": -0.02},
             lambda x: 0.01 * np.sin(x.theta_rad) - 0.02 * np.cos(x.theta_rad),
@@ -205,6 +210,15 @@ def test_a_late_current_is_turned_back_and_not_lengthened():
     assert LIBRARY["current_delay"].current(seen, {"delay_s": tau}) == pytest.approx(
         true, rel=1e-12
     )
+
+
+def test_an_encoder_off_its_centre_and_at_a_tilt_errs_once_and_twice_a_turn():
+    x = operating()
+    q = {"sine_rad": 2e-3, "cosine_rad": -1e-3, "sine2_rad": 5e-4, "cosine2_rad": 3e-4}
+    once = 2e-3 * np.sin(x.theta_rad) - 1e-3 * np.cos(x.theta_rad)
+    twice = 5e-4 * np.sin(2 * x.theta_rad) + 3e-4 * np.cos(2 * x.theta_rad)
+    found = LIBRARY["angle_eccentricity"].angle(x, q)
+    assert found == pytest.approx(7 * (once + twice), abs=1e-15)
 
 
 def test_a_torque_behind_two_lags_is_brought_forward_by_both():
