@@ -29,8 +29,8 @@ FORM = 0.02
 _LINE = 0.03
 _JUMP = 8.0
 _WHEN = 0.25
-_CREEPS = 1e-3
-"""Share of the machine's largest speed below which friction may hold the shaft as it likes."""
+_CREEPS, _REST_S = 1e-3, 5e-3
+"""Share of the machine's largest speed below which, for so long, friction may hold the shaft."""
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -188,7 +188,7 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     if weak is None:
         return np.zeros(segment.size)
     slow = _CREEPS * model.machine.scales["speed_rad_s"]
-    creeping = np.flatnonzero(np.abs(x.omega_rad_s) < slow)
+    creeping = np.flatnonzero(_lasting(np.abs(x.omega_rad_s) < slow, round(_REST_S / x.ts_s)))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
     known = dict(values)
@@ -203,6 +203,15 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
     out: Array = np.abs(weak.project(grip[None])[0, :, 0])
     return out
+
+
+def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest."""
+    edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
+    lasting = np.zeros(which.size, dtype=bool)
+    for first, end in edges.reshape(-1, 2).tolist():
+        lasting[first:end] = end - first >= least
+    return lasting
 
 
 def _encoder_lines(segment: Segment, values: Values) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.grams import Grams
+from pipeline.criticism.model import zero
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted, System, own_columns
 
@@ -43,6 +44,19 @@ def trimmed(
             less = _unless_worth(segments, fitted, around, name, (term,), price)
             fitted, around = less or (fitted, around)
     return fitted, around
+
+
+def whole(fitted: Fitted) -> Fitted:
+    """Where a fit with the terms begins that the machine's own effects were without: what did not
+    pay while something else was missing may pay now.
+    """
+    model = fitted.model
+    own = [e if e.hook == "sensor" else replace(e, left_out=()) for e in model.effects]
+    full = replace(model, effects=tuple(own))
+    values = dict(fitted.values)
+    for effect in own:
+        values = {**zero(effect, full), **values}
+    return replace(fitted, model=full, values=values)
 
 
 def _named(fitted: Fitted, name: str) -> Effect:

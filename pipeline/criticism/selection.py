@@ -22,7 +22,7 @@ from pipeline.criticism.judge import (
     told_groups,
     uncertainties,
 )
-from pipeline.criticism.optional import trimmed
+from pipeline.criticism.optional import trimmed, whole
 from pipeline.criticism.scores import (
     LEAST_SHARE,
     THOROUGH,
@@ -126,7 +126,7 @@ def _chosen(
         batch = list(passing[first : first + _REFITS])
         while (best := _refit_best(segments, fitted, batch, wide, found)) is not None:
             named = [effect.name for effect in best[0].model.effects]
-            finished = trimmed(segments, *gauss_newton(segments, best[0]), named)
+            finished = trimmed(segments, *gauss_newton(segments, whole(best[0])), named)
             if _sure(*finished, leave_out(finished[1], len(finished[1].columns), segments)):
                 return finished
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
@@ -155,7 +155,7 @@ def _refit_best(
     least = math.inf
     for score in close:
         effect = score.candidate.effect
-        tried = gauss_newton(segments, begun(fitted, score), before=wide)
+        tried = _refitted(segments, fitted, score, wide)
         # of two that tie, the one that some capture here was made to show
         unsought = TIE if set(effect.tests).isdisjoint(wide.tests) else 0.0
         cost = tried[1].misfit + score.price + unsought
@@ -171,6 +171,19 @@ def _refit_best(
         if _holds(wide, without, tried[1], after, promised, doubts):
             best, least = tried, cost
     return best
+
+
+def _refitted(
+    segments: Sequence[Segment], fitted: Fitted, score: Score, wide: System
+) -> tuple[Fitted, System]:
+    """The fit with a candidate, from what its score foresees; where that leads to no better fit,
+    from where the others are. Along a bent valley the tangent goes astray.
+    """
+    tried = gauss_newton(segments, begun(fitted, score), before=wide)
+    if tried[1].misfit + score.price < wide.misfit:
+        return tried
+    again = gauss_newton(segments, begun(fitted, replace(score, moves={})), before=wide)
+    return min(tried, again, key=lambda end: end[1].misfit)
 
 
 def _matters(fitted: Fitted, around: System, before: System, told: NDArray[np.bool_]) -> bool:
