@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism import optional
 from pipeline.criticism.model import Model, zero
-from pipeline.criticism.optional import trimmed
+from pipeline.criticism.optional import trimmed, whole
 from pipeline.criticism.registry import effects
 from pipeline.criticism.system import Fitted
 from tests.unit.criticism.machines import BASE, machine
@@ -60,3 +60,14 @@ def test_the_terms_that_pay_stay_whatever_the_tangent_says(tangent, refits, monk
     assert gone == ({*NEEDED} - {D_ODD} if tangent else set())
     assert around.misfit == pytest.approx(sum(NEEDED[term] for term in gone))
     assert np.log(Around.size) < NEEDED[D_ODD]
+
+
+def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
+    encoder = effects()["angle_eccentricity"]
+    less = replace(SATURATION, left_out=(D_ODD, D_BEND)), replace(encoder, left_out=(1,))
+    model = Model(machine(), less)
+    values = {**BASE, **zero(less[0], model), **zero(less[1], model), "saturation.q_fall": 0.2}
+    full = whole(Fitted(model, values, (), BASE))
+    assert [effect.left_out for effect in full.model.effects] == [(), (1,)]
+    assert full.values["saturation.q_fall"] == 0.2
+    assert full.values["saturation.d_odd"] == 0.0 and full.values["saturation.d_bend"] == 1.0

@@ -190,10 +190,9 @@ def test_friction_at_rest_may_be_anything_between_both_its_senses():
     late = window[length // 2 + smoothing :].sum()
     assert resting[-1] == pytest.approx(0.2 / 3**0.5 * late, rel=0.05)
     assert moving[-1] < 0.01 * resting[-1]
-    # within 0.25 rad/s of zero at 400 rad/s²: 25 samples around the 3000th
+    # it passes through zero at the 3000th sample, and rests there no longer than 1.25 ms
     near = int(np.argmin(np.abs(running.weak.starts + length // 2 - 3000)))
-    there = 25 * window[3000 - running.weak.starts[near]]
-    assert moving[near] == pytest.approx(0.2 / 3**0.5 * there, rel=0.1)
+    assert moving[near] < 0.01 * resting[-1]
 
 
 def test_a_wave_that_turns_many_times_a_sample_averages_out_of_a_coasting_shaft():

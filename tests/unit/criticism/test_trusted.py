@@ -13,7 +13,8 @@ from pipeline.criticism.judge import HeldOut
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
 from pipeline.criticism.registry import effects
-from pipeline.criticism.selection import Rung, _holds, _sure
+from pipeline.criticism.scores import Candidate, Score
+from pipeline.criticism.selection import Rung, _holds, _refitted, _sure
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, log, machine
@@ -123,6 +124,32 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     step = np.array([apart.get(key, 0.0) for key in values])
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
     assert _sure(fitted, around, held) is sure
+
+
+@pytest.mark.parametrize(
+    ("foreseen", "near", "begun", "end"),
+    [(50.0, 20.0, [0.4], 50.0), (95.0, 60.0, [0.4, 0.3], 60.0), (95.0, 99.0, [0.4, 0.3], 95.0)],
+)
+def test_a_refit_begins_again_where_the_tangent_goes_astray(
+    foreseen, near, begun, end, monkeypatch
+):
+    """From where the others are, if what the score foresees does not pay its price of 10."""
+    windage, asked = effects()["windage"], []
+    score = Score(
+        Candidate(windage, ()), 30.0, 10.0, {"windage.drag_nm": 0.1}, {"r_ohm": 0.1}, 1.0, 2.0
+    )
+
+    def gauss_newton(_segments, start, before):
+        asked.append(round(start.values["r_ohm"], 6))
+        misfit = foreseen if asked[-1] == 0.4 else near
+        return start, replace(before, residual=np.full(before.size, misfit))
+
+    monkeypatch.setattr("pipeline.criticism.selection.gauss_newton", gauss_newton)
+    monkeypatch.setattr(System, "misfit", property(lambda one: float(one.residual[0])))
+    wide = missing_by(torque_shaft_nm=100.0**2).around
+    fitted = Fitted(Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
+    assert _refitted((), fitted, score, wide)[1].misfit == end
+    assert asked == begun
 
 
 def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
