@@ -24,7 +24,7 @@ EFFECT = Effect(
     reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
-        Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=3.0, scan=(0.002, 0.01)),
+        Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=3.0, scan=(0.002, 0.01, 0.1)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
         Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
     ),
