@@ -51,11 +51,10 @@ def main(settings: RunSettings) -> Outcome:
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
     registry = _registry(settings)
-    output = output_folder(settings.output)
     cluster = Cluster(settings.scheduler, settings.tls_ca, settings.tls_cert, settings.tls_key)
-    crew = Crew(
-        open_pool(settings.executor, cluster), settings.workers or core_count(), output / CRUMBS
-    )
+    pool = open_pool(settings.executor, cluster)
+    output = output_folder(settings.output)
+    crew = Crew(pool, settings.workers or core_count(), output / CRUMBS)
     with crew:
         return _run(settings, registry, crew)
 
