@@ -36,7 +36,7 @@ def passed_on(x: Operating, share: float) -> Array:
     """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
 
     `share` of the inertia is at the far end. Three running means keep the encoder's rounding out
-    of it; twiced [3], so that a ringing stays as it is, to one per cent at a sixth of 1/block.
+    of it; twiced [3], so that a ringing stays as it is, to one per cent at a seventh of 1/block.
     """
     block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
     block -= 1 - block % 2
