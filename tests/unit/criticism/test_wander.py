@@ -99,3 +99,16 @@ def test_a_walk_far_beyond_the_noise_stays_a_remainder():
     segments = (walked(5, "torque_map", 60 * SIZE), walked(6, "drive", 60 * SIZE))
     fitted, left = around(segments)
     assert wandering(segments, fitted, left) is None
+
+
+@pytest.mark.parametrize(("large", "noise"), [(False, True), (True, False)])
+def test_what_is_small_for_the_machine_stops_no_wander(large: bool, noise: bool, monkeypatch):
+    """At standstill half a per cent of R i is told, which an instrument's walk leaves as well."""
+    segments = (walked(5, "torque_map"), walked(6, "drive"))
+    fitted, left = around(segments)
+
+    def still_left(*_, **asked):
+        return left if large or not asked.get("large") else ()
+
+    monkeypatch.setattr("pipeline.criticism.wander.remainder", still_left)
+    assert (wandering(segments, fitted, left) is not None) is noise
