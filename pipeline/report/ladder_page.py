@@ -21,7 +21,6 @@ VERDICT_WORDS = {
     "insufficient": "The captures cannot tell; record what is named below.",
 }
 SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
-ACCELERATION = "alpha_mech_rad_s2"
 MOST_RANKED = 12
 
 
@@ -83,24 +82,14 @@ def render_ladder(result: Diagnosis) -> str:
         remainder=[
             (
                 one.capture,
-                quantity_words(name),
+                quantity_words(one.signal),
                 str(one.order) if one.order else "mean",
                 significant(one.chi2_per_n, 3),
-                quantity(one.size, unit_of(name), 3),
+                quantity(one.size, unit_of(one.signal), 3),
             )
             for one in result.remainder
-            for name in [_shown_as(one.signal, result.ladder)]
         ],
     )
-
-
-def _shown_as(signal: str, ladder: Sequence[LadderRung]) -> str:
-    """The name, unit last, under which a signal's error is shown: of a speed it is that of its
-    slope, unless the ladder has errors of the speed itself.
-    """
-    if signal == SPEED and not any(SPEED in rung.errors for rung in ladder):
-        return ACCELERATION
-    return signal
 
 
 def _signals(result: Diagnosis) -> list[str]:
@@ -110,9 +99,8 @@ def _signals(result: Diagnosis) -> list[str]:
     if not result.ladder:
         return []
     first = result.ladder[0]
-    told = {_shown_as(name, result.ladder): None for name in [*first.errors, *first.signals]}
-    rungs = [{_shown_as(n, result.ladder) for n in [*r.errors, *r.signals]} for r in result.ladder]
-    names = [name for name in told if all(name in rung for rung in rungs)]
+    told = dict.fromkeys([*first.errors, *first.signals])
+    names = [n for n in told if all(n in r.errors or n in r.signals for r in result.ladder)]
     return sorted(names, key=lambda n: (n not in first.errors, -_over(first, n), n))
 
 
@@ -181,7 +169,7 @@ def _rmse(rung: LadderRung, name: str) -> float | None:
     """A signal's error, whether its floor is told or not [its unit]."""
     if name in rung.errors:
         return rung.errors[name].rmse
-    return rung.signals.get(SPEED if name == ACCELERATION else name)
+    return rung.signals.get(name)
 
 
 def _percent(now: float, before: float) -> str:
