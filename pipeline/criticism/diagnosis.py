@@ -13,7 +13,14 @@ from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
-from pipeline.criticism.judge import HeldOut, in_common, leave_out, remainder, told_groups
+from pipeline.criticism.judge import (
+    HeldOut,
+    in_common,
+    leave_out,
+    over_floor,
+    remainder,
+    told_groups,
+)
 from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.registry import effects
@@ -99,7 +106,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         ranking,
         tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
         sketch if verdict == "unknown" else None,
-        _as_told(found, left),
+        _as_told(found, last.around, left),
         (
             *_unused(campaign, found),
             *told_hum(start_fit.hum),
@@ -126,10 +133,16 @@ def _large(
     return tuple(one for one in left if one in large)
 
 
-def _as_told(found: Sequence[Segment], left: Sequence[Remainder]) -> tuple[Remainder, ...]:
-    """What is left, with signals as outputs name them."""
+def _as_told(
+    found: Sequence[Segment], around: System, left: Sequence[Remainder]
+) -> tuple[Remainder, ...]:
+    """All that is over its floor, first what is `left`, then what is too small to matter, with
+    signals as outputs name them.
+    """
     names = {(s.capture, channel): told_signal(s, channel) for s in found for channel in s.channels}
-    return tuple(replace(one, signal=names[one.capture, one.signal]) for one in left)
+    small = [one for one in over_floor(around, found, around.residual) if one not in left]
+    told = (*left, *(replace(one, matters=False) for one in small))
+    return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
 
 
 def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:

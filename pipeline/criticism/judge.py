@@ -172,11 +172,23 @@ def remainder(
     A floor that comes from the recording itself is no better than a factor 2 in variance, and
     error below a two-thousandth of the machine's voltage or torque is nobody's concern.
     """
+    return tuple(one for one in over_floor(around, segments, residual, large) if one.matters)
+
+
+def over_floor(
+    around: System, segments: Sequence[Segment], residual: Array, large: bool = False
+) -> tuple[Remainder, ...]:
+    """Groups significantly over their floor, whether their size matters or not, the worst first:
+    what explains a held-out error over the floor that `remainder` does not.
+    """
     found = []
-    for place, chi2_per_n, size in _over(around, segments, residual, around.soft, large):
+    for place, chi2_per_n, size, matters in _over(around, segments, residual, around.soft, large):
         number, channel, order = around.labels[place]
-        found.append(Remainder(segments[number].capture, channel, order, chi2_per_n, size))
-    return tuple(sorted(found, key=lambda r: (-r.chi2_per_n, r.capture, r.signal, r.order)))
+        capture = segments[number].capture
+        found.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
+    return tuple(
+        sorted(found, key=lambda r: (not r.matters, -r.chi2_per_n, r.capture, r.signal, r.order))
+    )
 
 
 def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_]:
@@ -185,7 +197,8 @@ def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_
     """
     told = np.zeros(len(around.labels), dtype=bool)
     as_whitened = np.ones(around.size)
-    told[[place for place, _, _ in _over(around, segments, around.residual, as_whitened)]] = True
+    over = _over(around, segments, around.residual, as_whitened)
+    told[[place for place, _, _, matters in over if matters]] = True
     return told
 
 
@@ -195,8 +208,10 @@ def _over(
     residual: Array,
     soft: Array,
     large: bool = False,
-) -> Iterator[tuple[int, float, float]]:
-    """Place, χ²/n and size of every group over a floor that is `soft` [R] of what rows are over."""
+) -> Iterator[tuple[int, float, float, bool]]:
+    """Place, χ²/n and size of every group over a floor that is `soft` [R] of what rows are over,
+    and whether that size matters.
+    """
     spreads, counts = around.spreads(residual / soft), around.counts
     for place, (number, channel, _) in enumerate(around.labels):
         n, q = counts[place], spreads[place]
@@ -206,8 +221,8 @@ def _over(
         unit = float(((around.unit * soft)[mine] ** 2).mean())
         more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
-        if size > material_size(segments[number], channel, around, large):
-            yield place, float(q), size
+        matters = size > material_size(segments[number], channel, around, large)
+        yield place, float(q), size, matters
 
 
 def material_size(segment: Segment, channel: str, around: System, large: bool = False) -> float:

@@ -128,13 +128,16 @@ class LadderRung:
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """One place where error over the noise floor is left: χ²/n and its size [unit of signal]."""
+    """One place where error over the noise floor is left: χ²/n, its size [unit of signal], and
+    whether that is as much as anybody would act on.
+    """
 
     capture: str
     signal: str
     order: int
     chi2_per_n: float
     size: float
+    matters: bool = True
 
     def document(self) -> dict[str, Any]:
         """The JSON form: an extension of `contract/outputs.md`."""
@@ -144,6 +147,7 @@ class Remainder:
             "order": self.order,
             "chi2_per_n": self.chi2_per_n,
             "size": self.size,
+            "matters": self.matters,
         }
 
 

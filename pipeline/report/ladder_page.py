@@ -86,6 +86,7 @@ def render_ladder(result: Diagnosis) -> str:
                 str(one.order) if one.order else "mean",
                 significant(one.chi2_per_n, 3),
                 quantity(one.size, unit_of(one.signal), 3),
+                "yes" if one.matters else "too small",
             )
             for one in result.remainder
         ],

@@ -32,11 +32,11 @@ class Judged:
     """One case's marks. Shares of a line are over the cases whose entry is not None.
 
     `exact`: all that is hidden named with confidence and nothing else. `found`, `hidden`: how many
-    of the hidden effects were named, under `unknown` too. `flagged`: structure left over was
-    reported. `sketch`: the unknown was put down to the right variable. `floor`: held-out error of
-    the last rung is at most 1.05 of its floor. `slight`: of what is told as seen but too small to
-    matter, whether the clearest is hidden there, or a rival that these captures cannot exclude;
-    None where nothing is told.
+    of the hidden effects were named, under `unknown` too. `flagged`: structure left over that
+    matters was reported; `left`: any. `sketch`: the unknown was put down to the right variable.
+    `floor`: held-out error of the last rung is at most 1.05 of its floor. `slight`: of what is told
+    as seen but too small to matter, whether the clearest is hidden there, or a rival that these
+    captures cannot exclude; None where nothing is told.
     """
 
     case: Case
@@ -48,6 +48,7 @@ class Judged:
     sketch: bool | None
     floor: bool | None
     slight: bool | None = None
+    left: bool = False
 
     @property
     def points(self) -> int:
@@ -70,16 +71,19 @@ def judged(case: Case, document: Mapping[str, Any]) -> Judged:
     meant = {name for name in hit.values() if name is not None}
     stray = [n for n in named if n not in meant and n not in case.allowed]
     mark = _mark(case, document["verdict"], hit, stray, confused)
+    over = document.get("remainder", ())
+    unknown = document["verdict"] == "unknown"
     return Judged(
         case,
         mark,
         exact=document["verdict"] == "missing" and bool(hit) and not stray and all(hit.values()),
         found=len(meant),
         hidden=len(case.truth),
-        flagged=document["verdict"] == "unknown" or bool(document.get("remainder")),
+        flagged=unknown or any(one["matters"] for one in over),
         sketch=_sketch(case, document),
         floor=_floor(document),
         slight=_slight(case, document),
+        left=unknown or bool(over),
     )
 
 

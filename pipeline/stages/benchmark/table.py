@@ -137,6 +137,8 @@ def _sizes(rows: list[Judged]) -> list[Line]:
         made.append(_line(f"{line}: unknown", here, lambda row: row.mark == "unknown"))
         made.append(_line(f"{line}: right, or told as too small to matter", here, _seen))
         made.append(_line(f"{line}: another told as too small to matter", here, _misread))
+        found = [row for row in here if row.right]
+        made.append(_line(f"{line}: right, and a remainder that matters", found, _flagged))
         if line.endswith("a*"):
             big = [row for row in here if row.case.of_typical >= MATTERS]
             made.append(_line(f"{line} and over 1 % of typical: right", big, _right))
@@ -145,6 +147,10 @@ def _sizes(rows: list[Judged]) -> list[Line]:
 
 def _seen(row: Judged) -> bool:
     return row.right or bool(row.slight)
+
+
+def _flagged(row: Judged) -> bool:
+    return row.flagged
 
 
 def _misread(row: Judged) -> bool:
@@ -180,12 +186,13 @@ def _others(rows: list[Judged]) -> list[Line]:
         _line("among 25 small others: wrong", _of(rows, "crowd"), _wrong),
         _line(f"wrong form: right name{_ANY}", forms, _all_found, least=0.95),
         _line(
-            "wrong form: remainder flagged, or none left",
+            "wrong form: remainder told, or none left",
             forms,
-            lambda row: row.flagged or bool(row.floor),
+            lambda row: row.left or bool(row.floor),
             least=1.0,
         ),
-        _line("outside the library: flagged", outside, lambda row: row.flagged, least=1.0),
+        _line("wrong form: remainder that matters", forms, _flagged),
+        _line("outside the library: flagged", outside, _flagged, least=1.0),
         _line("outside the library: wrong with confidence", outside, _wrong, most=0.01),
         _line("outside the library: right variable", sketches, _sketched, least=0.95),
         _line("ties: class right", ties, _right, least=1.0),

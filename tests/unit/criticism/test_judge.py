@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.judge import in_common, leave_out, material_size, uncertainties
+from pipeline.criticism.diagnosis import _as_told
+from pipeline.criticism.judge import (
+    in_common,
+    leave_out,
+    material_size,
+    over_floor,
+    remainder,
+    uncertainties,
+)
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
 from pipeline.criticism.system import Fitted, System, system
@@ -93,3 +101,24 @@ def test_at_standstill_a_voltage_is_measured_by_what_is_there():
     assert material_size(standing, volt, around) == pytest.approx(5e-3 * 0.2)
     assert material_size(standing, volt, around, large=True) == pytest.approx(5e-4 * 20.0)
     assert material_size(standing, torque, around) == material_size(running, torque, around)
+
+
+@pytest.mark.parametrize(("share", "matters"), [(0.8, False), (1.3, True)])
+def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(share, matters):
+    """A held-out error far over the floor has to be somewhere."""
+    running = log()
+    fitted = Fitted(Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    around = system((running,), fitted)
+    place = next(n for n, label in enumerate(around.labels) if label[1:] == ("torque_shaft_nm", 0))
+    mine = around.group == place
+    limit = material_size(running, "torque_shaft_nm", around)
+    small = np.where(mine, 0.1 * limit, 1.0)
+    quiet = replace(around, unit=small, residual=np.zeros(around.size))
+    left = np.where(mine, np.hypot(share, 0.1) * limit / small, 0.0)
+    (told,) = over_floor(quiet, (running,), left)
+    assert told.size == pytest.approx(share * limit)
+    assert told.matters == matters
+    assert remainder(quiet, (running,), left) == ((told,) if matters else ())
+    page = _as_told((running,), replace(quiet, residual=left), ())
+    assert [(one.signal, one.matters) for one in page] == [("torque_shaft_nm", False)]
+    assert over_floor(quiet, (running,), np.where(mine, 1.2, 0.0)) == ()

@@ -174,10 +174,12 @@ def test_errors_without_a_floor_are_on_the_page_and_all_together_in_the_chart() 
 def test_what_is_left_has_its_unit(signal: str, words: str, size: str) -> None:
     left = (
         Remainder("spin_down_0.mcap", signal, 0, 9.0, 276.0),
-        Remainder("lcr.csv", "lab_h", 2, 3.0, 1.3e-6),
+        Remainder("lcr.csv", "lab_h", 2, 3.0, 1.3e-6, matters=False),
     )
     html = render_ladder(replace(make_diagnosis(), remainder=left))
     assert words in html and size in html and "1.30 µH" in html
+    places = [html.index(word) for word in (size, "<td>yes", "1.30 µH", "<td>too small")]
+    assert places == sorted(places)
 
 
 def test_words_of_neighbouring_rungs_do_not_meet() -> None:

@@ -30,7 +30,7 @@ def document(
     held_out: float = 1.0,
     variables: tuple[str, ...] = (),
     parameters: dict[str, dict[str, dict[str, float]]] | None = None,
-    remainder: tuple[str, ...] = (),
+    remainder: tuple[bool, ...] = (),
 ) -> dict[str, Any]:
     return {
         "schema": "model-diagnosis/1",
@@ -46,7 +46,7 @@ def document(
         ],
         "ladder": [{"effects": list(missing), "held_out": held_out, "signals": {}}],
         "unknown": {"variables": list(variables)} if verdict == "unknown" else None,
-        "remainder": list(remainder),
+        "remainder": [{"matters": matters} for matters in remainder],
     }
 
 
@@ -126,7 +126,14 @@ def test_flag_and_sketch_of_the_unknown() -> None:
     assert (right.flagged, right.sketch) == (True, True)
     assert (other.flagged, other.sketch) == (True, False)
     assert judged(STRANGE, document("adequate")).sketch is False
-    assert judged(PLAIN, document("missing", "windage", remainder=("x",))).flagged
+    assert judged(PLAIN, document("missing", "windage", remainder=(True, False))).flagged
+
+
+def test_a_remainder_too_small_to_matter_is_told_and_no_flag() -> None:
+    small = judged(PLAIN, document("missing", "windage", remainder=(False,)))
+    assert (small.left, small.flagged) == (True, False)
+    assert not judged(PLAIN, document("missing", "windage")).left
+    assert judged(STRANGE, document("unknown")).left
 
 
 @pytest.mark.parametrize(
