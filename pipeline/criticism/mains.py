@@ -1,6 +1,6 @@
 """Mains hum in the recordings: found at its own frequencies, and taken as noise from then on.
 
-A line at 50 or 60 Hz, or a harmonic, that stands out of the residuals of several captures whatever
+A line at 50 or 60 Hz, or a harmonic, that stands out of the residuals of several captures, whatever
 the shaft does there, is the building's and not the machine's. Every capture may then have it, of
 that size and of any phase.
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import disturbed, residual
-from pipeline.criticism.segment import Segment, clock
+from pipeline.criticism.segment import PAIR_RAD, Segment, clock
 
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 _BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
@@ -37,6 +37,7 @@ _FINER = 2
 _STEADY = 0.5
 _LARGEST = 0.01
 _EVEN = 0.02
+_LINE_RAD = {"vab_v": PAIR_RAD["ab"], "vbc_v": PAIR_RAD["bc"], "vca_v": PAIR_RAD["ca"]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,33 +56,35 @@ class Hum:
 def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Hum, ...]:
     """The mains lines of every signal, from the residuals around a rough fit.
 
-    The mains are there if the power of a line is 20 times that beside it in three captures of one
-    signal. Then every signal has the line in which it stands out in half of the captures that could
-    show it: where an order of the turning shaft comes too near, or the rate of a map's levels, none
-    could.
+    The mains are there if the power of a line is 20 times that beside it in three captures, in
+    whatever signals. Then every signal has the line in which it stands out in half of the captures
+    that could show it: where an order of the turning shaft comes too near, or the rate of a map's
+    levels, none could.
     """
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
+    clear: dict[float, set[str]] = defaultdict(set)
     for segment in segments:
         spectrum = _Spectrum.of(segment)
-        long = spectrum.duration_s * LINES_HZ[0] >= _CYCLES
-        if segment.weak is None or not long or not spectrum.weight.any():
+        if segment.weak is None or not spectrum.weight.any():
             continue
         lines = [
             f
             for f in LINES_HZ
-            if 2.2 * f * segment.ts_s < 1.0
+            if spectrum.duration_s * f >= _CYCLES
+            and 2.2 * f * segment.ts_s < 1.0
             and not _turns_at(segment, f)
             and not spectrum.repeats_at(f)
         ]
-        left = residual(segment, model, values)
-        for channel, one in zip(segment.channels, left, strict=True):
+        for channel, one in _as_sensed(segment, model, values).items():
             most = (_LARGEST * _whole(channel, model.machine)) ** 2
             for freq, seen in zip(lines, spectrum.lines(one, lines, most), strict=True):
                 powers[segment.kind, channel, freq].append(seen)
+                if seen[0] > _STANDS_OUT * seen[1]:
+                    clear[freq].add(segment.capture)
     ratios = {
         key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
     }
-    there = {freq for (_, _, freq), r in ratios.items() if (r > _STANDS_OUT).sum() >= _CAPTURES}
+    there = {freq for freq, captures in clear.items() if len(captures) >= _CAPTURES}
     return tuple(
         Hum(*key, math.sqrt(float(np.median([line for line, _ in powers[key]]))))
         for key, ratio in ratios.items()
@@ -113,19 +116,39 @@ def told_hum(heard: Sequence[Hum]) -> tuple[str, ...]:
 
 def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Values) -> Segment:
     weak = segment.weak
-    mine = [h for h in heard if h.kind == segment.kind and h.signal in segment.channels]
+    mine = [h for h in heard if h.kind == segment.kind and h.signal in _sensors(segment)]
     if weak is None or not mine:
         return segment
     lines = []
     for hum in mine:
+        waves = hum.rms * _waves(segment, hum.freq_hz)
+        if segment.kind == "open":
+            lines.append(disturbed(segment, weak, model, values, hum.signal, waves))
+            continue
         both = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
-        place = segment.channels.index(hum.signal)
-        both[:, place] = weak.project(hum.rms * _waves(segment, hum.freq_hz))
+        both[:, segment.channels.index(hum.signal)] = weak.project(waves)
         lines.append(both)
     for name, rms, freq in _in_currents(segment, mine):
         waves = rms * _waves(segment, freq)
         lines.append(disturbed(segment, weak, model, values, name, waves))
     return replace(segment, lines=np.concatenate(lines))
+
+
+def _sensors(segment: Segment) -> tuple[str, ...]:
+    """Signals that hum is in: the channels, of an open winding its line voltages."""
+    if segment.kind != "open":
+        return segment.channels
+    return tuple(name for name in _LINE_RAD if name in segment.recorded)
+
+
+def _as_sensed(segment: Segment, model: Model, values: Values) -> dict[str, Array]:
+    """Residual [n] of every sensor; what the rotor's frame turns at its speed, turned back."""
+    left = residual(segment, model, values)
+    if segment.kind != "open":
+        return dict(zip(segment.channels, left, strict=True))
+    eps = model.machine.pole_pairs * segment.recorded["theta_mech_rad"] - values["bench_angle_rad"]
+    winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))
+    return {name: (winding * np.exp(-1j * _LINE_RAD[name])).real for name in _sensors(segment)}
 
 
 def _in_currents(segment: Segment, mine: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:

@@ -18,6 +18,8 @@ from pipeline.records.capture import Capture
 Kind = Literal[
     "dq", "q", "shaft", "motion", "open", "terminal", "lcr", "flux_map", "steady", "standing"
 ]
+PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
+"""Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
 _REFERENCE_DEGC = 25.0
 
 

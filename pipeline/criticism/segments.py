@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.noise import is_rounded, resolution, sensor_noise
-from pipeline.criticism.segment import Segment, Sensors, electrical_orders, segment_of, slow_orders
+from pipeline.criticism.segment import (
+    PAIR_RAD,
+    Segment,
+    Sensors,
+    electrical_orders,
+    segment_of,
+    slow_orders,
+)
 from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
 from pipeline.criticism.segments_table import flux_table
@@ -211,7 +218,7 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
     told = prepared(found, period)
-    fixed = {"pair_rad": _PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
+    fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:
             return None
@@ -250,9 +257,6 @@ def _steady(weak: Projection, theta: Array) -> NDArray[np.bool_]:
     second = theta[weak.starts + 2 * half - 1] - theta[weak.starts + half - 1]
     calm = np.abs(second - first) < 2e-3 * np.abs(first + second)
     return calm if calm.sum() >= 8 else np.ones(calm.size, dtype=bool)
-
-
-_PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 
 
 def _settled(weak: Projection, amps: Array, noise: float) -> Projection:

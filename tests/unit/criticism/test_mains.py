@@ -11,6 +11,7 @@ from pipeline.criticism.floors import noise_floor
 from pipeline.criticism.linearise import absorb, linearise
 from pipeline.criticism.mains import Hum, hum_of, told_hum, with_hum
 from pipeline.criticism.model import Model
+from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 
 PLAIN = Model(machine(), ())
@@ -22,9 +23,14 @@ def with_line(segment, name, rms, freq, phase):
     return replace(segment, recorded={**segment.recorded, name: segment.recorded[name] + wave})
 
 
-def logs(rms=0.0, freq=50.0, count=3):
+def recording(n=8000, seed=5):
+    """A log in white noise, of a capture of its own."""
+    return replace(log(n, seed, 1.0), capture=f"{seed}.mcap")
+
+
+def logs(rms=0.0, freq=50.0, count=3, n=8000):
     return [
-        with_line(log(seed=n, noise=1.0), "vq_v", rms, freq, 0.7 * n) for n in range(5, 5 + count)
+        with_line(recording(n, seed), "vq_v", rms, freq, 0.7 * seed) for seed in range(5, 5 + count)
     ]
 
 
@@ -42,12 +48,21 @@ def test_no_other_line_is_the_mains(freq):
 
 def test_white_noise_hums_in_none_of_forty_programmes():
     for first in range(0, 120, 3):
-        recorded = [log(seed=first + n, noise=1.0) for n in range(3)]
+        recorded = [recording(seed=first + n) for n in range(3)]
         assert hum_of(recorded, PLAIN, BASE) == ()
 
 
 def test_two_captures_alone_do_not_make_a_building():
     assert hum_of(logs(rms=0.02, count=2), PLAIN, BASE) == ()
+    twice = [one for one in logs(rms=0.02, count=2) for _ in range(3)]
+    assert hum_of(twice, PLAIN, BASE) == ()
+
+
+def test_captures_of_any_signal_make_a_building():
+    """Two drive logs and two spins of an open winding have it in signals of their own."""
+    made = [*logs(rms=0.02, count=2), *(spin(n, 0.02) for n in range(2))]
+    heard = hum_of(made, PLAIN, TURNED)
+    assert {("dq", "vq_v"), ("open", "vbc_v")} <= {(one.kind, one.signal) for one in heard}
 
 
 def test_once_a_turn_of_a_steady_shaft_is_not_taken_for_it():
@@ -70,13 +85,13 @@ def cut_to_windows(segment, rate_hz, kept=120):
 @pytest.mark.parametrize("rate_hz", [50.0, 60.0])
 def test_what_a_thinned_log_leaves_between_its_windows_is_no_hum(rate_hz):
     """The flux has moved on over every gap: spikes of the back-EMF's size, at the windows' rate."""
-    recorded = [cut_to_windows(log(seed=n, noise=1.0), rate_hz) for n in range(4)]
+    recorded = [cut_to_windows(recording(seed=n), rate_hz) for n in range(4)]
     assert hum_of(recorded, PLAIN, BASE) == ()
 
 
 def test_hum_is_heard_in_a_thinned_log():
     """On the log's own clock: where a third of every 30 ms is left out, cycles are left out."""
-    long = [with_line(log(40_000, n, 1.0), "vq_v", 0.1, 50.0, 0.7 * n) for n in range(3)]
+    long = logs(0.1, n=40_000)
     recorded = [cut_to_windows(one, 33.0, 400) for one in long]
     (hum,) = hum_of(recorded, PLAIN, BASE)
     assert (hum.signal, hum.freq_hz) == ("vq_v", 50.0)
@@ -143,6 +158,62 @@ def test_sensors_of_current_have_it_too_in_multiples_of_their_noise():
     humming = with_line(segment, "iq_a", rms, 50.0, 0.7)
     assert missed(humming, []) > 5.0
     assert missed(humming, [told]) < 1.5
+
+
+def spin(seed, rms=0.0, freq=50.0, zero_rad=0.3, n=40_000, rad_s=43.7):
+    """An open winding at speed in white noise, hum in one of its three line voltages."""
+    random = np.random.default_rng(seed)
+    time = 5e-5 * np.arange(n)
+    theta = rad_s * time
+    eps = 7 * theta - zero_rad
+    stationary = 1j * 7 * rad_s * BASE["psi_wb"] * np.exp(1j * eps)
+    a, b, c = ((stationary * np.exp(-2j * np.pi * k / 3)).real for k in range(3))
+    lines = {"vab_v": a - b, "vbc_v": b - c, "vca_v": c - a}
+    lines = {name: line + 5e-3 * random.standard_normal(n) for name, line in lines.items()}
+    made = replace(
+        log(n),
+        capture=f"spin_{seed}.mcap",
+        kind="open",
+        test="open_circuit",
+        recorded={**lines, "theta_mech_rad": theta},
+        noise={**dict.fromkeys(lines, 5e-3), "theta_mech_rad": 1e-6},
+        channels=("vd_v", "vq_v"),
+        weak=projection(theta, np.arange(40, n - 440, 200), 400, ()),
+    )
+    return with_line(made, "vbc_v", rms, freq, seed)
+
+
+TURNED = {**BASE, "bench_angle_rad": 0.3}
+
+
+def test_hum_of_an_open_winding_is_that_of_its_lines():
+    """In the rotor's frame it is two lines, at 50 Hz less and more than the field turns."""
+    heard = hum_of([spin(n, 0.02) for n in range(3)], PLAIN, TURNED)
+    assert {(one.kind, one.freq_hz) for one in heard} == {("open", 50.0)}
+    loud = max(heard, key=lambda one: one.rms)
+    # the mean of three lines is nothing: the one with hum keeps two thirds of it
+    assert loud.signal == "vbc_v"
+    assert loud.rms == pytest.approx(0.02 * 2 / 3, rel=0.1)
+    assert hum_of([spin(n) for n in range(3)], PLAIN, TURNED) == ()
+
+
+def test_an_open_winding_s_hum_no_longer_misses_the_floor():
+    one = spin(4, 0.02)
+    heard = hum_of([spin(n, 0.02) for n in range(3)], PLAIN, TURNED)
+    sigma = noise_floor(one, PLAIN, TURNED, 1)
+    spreads = []
+    for (known,) in ((one,), with_hum([one], heard, PLAIN, TURNED)):
+        rows = linearise(known, PLAIN, TURNED, [], sigma, np.zeros(sigma.size), TURNED)
+        spreads.append(float((rows.residual**2).mean()))
+    assert spreads[0] > 5.0
+    assert spreads[1] < 1.5
+
+
+def test_a_short_capture_tells_what_it_holds_twelve_cycles_of():
+    """150 ms are too short for 50 Hz and long enough for its third harmonic."""
+    short = logs(0.05, 150.0, n=3000)
+    assert {one.freq_hz for one in hum_of(short, PLAIN, BASE)} == {150.0}
+    assert hum_of(logs(0.05, 50.0, n=3000), PLAIN, BASE) == ()
 
 
 def test_absorbed_rows_have_the_likelihood_of_their_covariance():
