@@ -41,6 +41,7 @@ from pipeline.records.diagnosis import (
     Diagnosis,
     RankedEffect,
     Remainder,
+    Unexcited,
     UnknownStructure,
     Verdict,
 )
@@ -96,8 +97,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     offered = candidates(library, last.fitted)
     missing = last.added
     ranking = _ranking(rungs, held, offered, library, found)
-    unseen = _unseen(campaign, library, last, offered)
-    verdict = _verdict(missing, left, rungs, unseen)
+    unexcited = _unexcited(campaign, library, last, offered)
+    verdict = _verdict(missing, left, rungs, unexcited)
     return Diagnosis(
         campaign.motor_id,
         model.name,
@@ -114,8 +115,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *(() if within is None else (_WITHIN,)),
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
-            *(_wanted(library[name]) for name in unseen),
         ),
+        unexcited,
         model.effects,
     )
 
@@ -188,7 +189,7 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
         None,
         (),
         (f"the captures cannot fit the base model: record {wanted}",),
-        model.effects,
+        asked=model.effects,
     )
 
 
@@ -272,35 +273,29 @@ def _verdict(
     missing: Sequence[str],
     left: Sequence[Remainder],
     rungs: Sequence[Rung],
-    unseen: Sequence[str],
+    unexcited: Sequence[Unexcited],
 ) -> Verdict:
     if left and not _explained(rungs, left):
         return "unknown"
     if missing:
         return "missing"
-    return "insufficient" if unseen else "adequate"
+    return "insufficient" if unexcited else "adequate"
 
 
-def _unseen(
+def _unexcited(
     campaign: Campaign, library: dict[str, Effect], last: Rung, offered: Sequence[Candidate]
-) -> tuple[str, ...]:
+) -> tuple[Unexcited, ...]:
     """Effects that no capture here would show at typical size, for want of their test."""
     present = {capture.meta.test for capture in campaign.captures}
     inside = {effect.name for effect in last.fitted.model.effects}
     return tuple(
-        name
+        Unexcited(name, effect.tests, effect.experiment)
         for name, effect in library.items()
         if name not in inside
         and effect.tests
         and not present.issuperset(effect.tests[:1])
         and detectable(effect, last.fitted, last.around, offered) < _SEEN
     )
-
-
-def _wanted(effect: Effect) -> str:
-    """What to record for an effect that no capture here would show, by the test's name."""
-    tests = " or ".join(effect.tests)
-    return f"no test here excites {effect.name}: record {tests} ({effect.experiment})"
 
 
 def _ranking(

@@ -207,6 +207,31 @@ class UnknownStructure:
 
 
 @dataclass(frozen=True, slots=True)
+class Unexcited:
+    """An effect of which these captures can say nothing: the tests that would show it, by name, and
+    what to do in them.
+    """
+
+    effect: str
+    tests: tuple[str, ...]
+    experiment: str
+
+    @property
+    def words(self) -> str:
+        """What to record, in one line."""
+        tests = " or ".join(self.tests)
+        return f"no test here excites {self.effect}: record {tests} ({self.experiment})"
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {
+            "effect": self.effect,
+            "tests": list(self.tests),
+            "experiment": self.experiment,
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
     """The verdict on one motor's model, with the ladder that leads to it.
 
@@ -222,6 +247,7 @@ class Diagnosis:
     unknown: UnknownStructure | None
     remainder: tuple[Remainder, ...]
     notes: tuple[str, ...]
+    unexcited: tuple[Unexcited, ...] = ()
     asked: tuple[str, ...] = ()
 
     @property
@@ -243,5 +269,6 @@ class Diagnosis:
             "ladder": [rung.document() for rung in self.ladder],
             "unknown": None if self.unknown is None else self.unknown.document(),
             "remainder": [left.document() for left in self.remainder],
-            "notes": list(self.notes),
+            "unexcited": [one.document() for one in self.unexcited],
+            "notes": [*self.notes, *(one.words for one in self.unexcited)],
         }

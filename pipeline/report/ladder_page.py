@@ -10,7 +10,7 @@ from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect
 from pipeline.report.axis import quantity_words, unit_of
 from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, heatmap
-from pipeline.report.notes import told_and_unseen
+from pipeline.report.notes import told_and_folded
 from pipeline.report.page import render
 from pipeline.report.rung_chart import rung_chart
 
@@ -64,12 +64,12 @@ def render_ladder(result: Diagnosis) -> str:
     reach = _reaches(result.ladder)
     views = [_view(result, n, signals, reach) for n in range(len(result.ladder))]
     over = _over_floors(result.ladder, signals)
-    notes, unseen = told_and_unseen(result.notes)
+    notes, folded = told_and_folded(result)
     return render(
         "ladder.html.jinja",
         result=result,
         notes=notes,
-        unseen=unseen,
+        folded=folded,
         verdict_words=VERDICT_WORDS[result.verdict],
         chart=rung_chart([_short(view) for view in views], over),
         rungs=views,

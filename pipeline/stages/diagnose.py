@@ -11,7 +11,7 @@ from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome, Stopwatch
-from pipeline.report.notes import told_and_unseen
+from pipeline.report.notes import told_and_folded
 from pipeline.settings import DiagnoseSettings
 from pipeline.stages.criticism import Judged, each_motor
 
@@ -73,5 +73,5 @@ def _lines(result: Diagnosis) -> list[str]:
     if result.unknown is not None and result.unknown.sketch:
         told.append(f"  {result.unknown.expression}")
         told.append(f"  an effect to start from: diagnosis/effects/{result.unknown.effect}.py")
-    told.extend(f"  {note}" for note in told_and_unseen(result.notes)[0])
+    told.extend(f"  {note}" for note in told_and_folded(result)[0])
     return told

@@ -10,6 +10,7 @@ from pipeline.records.diagnosis import (
     RankedEffect,
     Remainder,
     RungError,
+    Unexcited,
     UnknownStructure,
 )
 from pipeline.records.error_map import Bins, ErrorMap, Histogram
@@ -77,5 +78,6 @@ def make_diagnosis(motor_id: str = "joint-P1", *, unknown: bool = False) -> Diag
         (make_rung((), 1.0), make_rung(("dead_time",), 0.02)),
         sketch if unknown else None,
         (Remainder("drive_0.mcap", "vq_v", 0, 3.5, 4e-3),),
-        ("no test here excites compliance: a torque step",),
+        (),
+        (Unexcited("compliance", ("torque_map",), "a torque step"),),
     )

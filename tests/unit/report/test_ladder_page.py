@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
-from pipeline.records.diagnosis import LadderRung, Remainder
+from pipeline.records.diagnosis import LadderRung, Remainder, Unexcited
 from pipeline.report.comparison_text import comparison_text
 from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, colour, heatmap
 from pipeline.report.ladder_page import render_ladder
-from pipeline.report.notes import told_and_unseen
+from pipeline.report.notes import told_and_folded
 from pipeline.report.rung_chart import rung_chart
 from tests.unit.ladders import make_diagnosis, make_map, make_turn
 
@@ -46,17 +46,18 @@ def test_every_number_of_the_ladder_is_on_the_page() -> None:
     assert html.count('<svg class="heat"') == 4
 
 
-UNSEEN = (
-    "no test here excites backlash: record drive or torque_map (reversals (load side))",
-    "no test here excites windage: record spin_down or drive (from the highest speed)",
-    "no test here excites cogging: record cogging or holding_current (a slow turn)",
-    "no test here excites torque_lag: record torque_map (steps of torque)",
+UNEXCITED = (
+    Unexcited("backlash", ("drive", "torque_map"), "reversals (load side)"),
+    Unexcited("windage", ("spin_down", "drive"), "from the highest speed"),
+    Unexcited("cogging", ("cogging", "holding_current"), "a slow turn"),
+    Unexcited("torque_lag", ("torque_map",), "steps of torque"),
 )
 
 
 def test_effects_that_no_test_excites_are_told_by_the_test_to_record() -> None:
     """Thirty lines of one kind bury the verdict; a few are told as they are."""
-    told, single = told_and_unseen(("odd in iq_a", *UNSEEN))
+    result = replace(make_diagnosis(), notes=("odd in iq_a",), unexcited=UNEXCITED)
+    told, single = told_and_folded(result)
     assert told == (
         "odd in iq_a",
         "no test here excites 4 effects, of which nothing can be said:",
@@ -64,10 +65,17 @@ def test_effects_that_no_test_excites_are_told_by_the_test_to_record() -> None:
         "record cogging to excite cogging",
         "record torque_map to excite torque_lag",
     )
-    assert single == UNSEEN
-    assert told_and_unseen(UNSEEN[:3]) == (UNSEEN[:3], ())
-    html = render_ladder(replace(make_diagnosis(), notes=UNSEEN))
-    box, each = html.split("how to excite each of the 4")
+    words = (
+        "no test here excites backlash: record drive or torque_map (reversals (load side))",
+        "no test here excites windage: record spin_down or drive (from the highest speed)",
+        "no test here excites cogging: record cogging or holding_current (a slow turn)",
+        "no test here excites torque_lag: record torque_map (steps of torque)",
+    )
+    assert single == words
+    few = replace(result, unexcited=UNEXCITED[:3])
+    assert told_and_folded(few) == (("odd in iq_a", *words[:3]), ())
+    assert result.document()["notes"] == ["odd in iq_a", *words]
+    box, each = render_ladder(result).split("how to excite each of the 4")
     assert "record drive to excite backlash, windage" in box
     assert "excites windage" not in box and "excites windage: record spin_down" in each
 
