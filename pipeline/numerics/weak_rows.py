@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 LEAST_SAMPLES = 9
 EVEN_SPACING = 1e-3
+STRETCH = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,24 +135,38 @@ def _kernels(t_s: Array, sizes: NDArray[np.int64]) -> Array:
 def smooth_speed(t_s: Array, angle: Array, width_s: float) -> Array:
     """Rate [n] of an angle [n]: slope of the straight line through the samples of `width_s`.
 
-    Raises ValueError where the record is shorter than two windows.
+    Raises ValueError where the record is shorter than the window.
     """
     reach = max(2, round(0.5 * width_s / float(np.median(np.diff(t_s)))))
-    if t_s.size < 2 * reach + 1:
+    size = 2 * reach + 1
+    if t_s.size < size:
         raise ValueError("the record is shorter than the window of its speed")
-    low = np.clip(np.arange(t_s.size) - reach, 0, t_s.size - 2 * reach - 1)
-    high = low + 2 * reach + 1
-    slope, offset = np.polyfit(t_s - t_s[0], angle, 1)
-    t = t_s - t_s.mean()
-    x = angle - slope * (t_s - t_s[0]) - offset
-    count = float(2 * reach + 1)
+    slopes = _slopes(t_s, angle, size)
+    centred: Array = slopes[np.clip(np.arange(t_s.size) - reach, 0, slopes.size - 1)]
+    return centred
 
-    def total(values: Array) -> Array:
-        running = np.concatenate([[0.0], np.cumsum(values)])
-        summed: Array = running[high] - running[low]
-        return summed
 
-    mean_t, mean_x = total(t) / count, total(x) / count
-    spread = total(t * t) / count - mean_t**2
-    rate: Array = (total(t * x) / count - mean_t * mean_x) / spread + float(slope)
-    return rate
+def _slopes(t_s: Array, y: Array, size: int) -> Array:
+    """Slopes [n - size + 1] of the lines through every `size` neighbouring samples.
+
+    Sums over a window are differences of running sums. These start anew, about the mean, every
+    `STRETCH` windows: over a long record they grow until rounding hides what one window adds.
+    """
+    count, step = t_s.size - size + 1, STRETCH * size
+    length = step + size - 1
+
+    def stretches(values: Array) -> Array:
+        whole = np.pad(values, (0, -count % step), mode="edge")
+        rows = np.lib.stride_tricks.sliding_window_view(whole, length)[::step]
+        about: Array = rows - rows.mean(axis=1, keepdims=True)
+        return about
+
+    def means(values: Array) -> Array:
+        running = np.cumsum(np.pad(values, ((0, 0), (1, 0))), axis=1)
+        mean: Array = ((running[:, size:] - running[:, :-size]) / size).ravel()[:count]
+        return mean
+
+    t, x = stretches(t_s), stretches(y)
+    mean_t = means(t)
+    slopes: Array = (means(t * x) - mean_t * means(x)) / (means(t * t) - mean_t**2)
+    return slopes

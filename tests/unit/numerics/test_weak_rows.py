@@ -59,3 +59,11 @@ def test_smooth_speed_is_the_slope(jitter: float) -> None:
     speed = smooth_speed(t, 1e3 + 250.0 * t - 40.0 * t**2, 0.01)
     inner = slice(10, -10)
     assert speed[inner] == pytest.approx((250.0 - 80.0 * t)[inner], rel=5e-4)
+
+
+def test_smooth_speed_of_a_long_record_is_that_of_a_short_one() -> None:
+    """After ten minutes at 10 kHz a window adds less than a sum over the record is rounded to."""
+    t = np.arange(6_000_000) * 1e-4
+    speed = smooth_speed(t, 100.0 * t + 0.5 * np.sin(30.0 * t), 0.005)
+    inner = slice(100, -100)
+    assert speed[inner] == pytest.approx((100.0 + 15.0 * np.cos(30.0 * t))[inner], abs=0.02)
