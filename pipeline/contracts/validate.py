@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 
+from pipeline.contracts.gates import missing_values
 from pipeline.contracts.protocol import warning
 from pipeline.contracts.registry import gates
 from pipeline.contracts.schemas import check_columns, check_metadata, check_tables
@@ -26,6 +28,7 @@ def validate(
     another's masks, so that their order does not matter. Raises CaptureError that says every
     reason for the refusal at once. A gate that breaks on what it was not made for refuses the
     capture too, for it has not been judged; it goes unsaid where another gate knows the reason.
+    Slow streams that were written into a fast table have a table of their own in the end.
     """
     check_metadata(capture.meta)
     check_columns(capture)
@@ -49,7 +52,9 @@ def validate(
             findings.extend(passed.findings)
     if refusals or broken:
         raise merged(refusals or broken)
-    return capture.with_masks(*masks), tuple(findings)
+    settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
+    parted = _streams_apart(capture, settings["dense_share"])
+    return parted.with_masks(*masks), tuple(findings)
 
 
 def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
@@ -67,6 +72,30 @@ def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:
     remedy = "find out why the channel gave nothing, or leave it out of the file"
     found = warning(capture, "empty_column", words, remedy)
     return replace(capture, tables=tuple(tables)), [found]
+
+
+def _streams_apart(capture: Capture, dense_share: float) -> Capture:
+    """The capture with every slow stream of a fast table in a further table, on its own clock.
+
+    A stream is slow where fewer than `dense_share` of the rows hold a value, most of them with
+    blank rows in between, and another column is there in more. Rows that need every column keep
+    to the fast clock then, on which the slow one is interpolated.
+    """
+    tables, streams = [], []
+    for table in capture.tables:
+        slow = _slow_columns(table, dense_share) if "t_s" in table.columns else []
+        streams += [table.select("t_s", name).filter(pl.col(name).is_finite()) for name in slow]
+        tables.append(table.drop(slow))
+    return replace(capture, tables=(*tables, *streams)) if streams else capture
+
+
+def _slow_columns(table: pl.DataFrame, dense_share: float) -> list[str]:
+    places = {n: np.flatnonzero(np.isfinite(table[n].to_numpy())) for n in table.columns}
+    dense = [n for n, rows in places.items() if rows.size >= dense_share * table.height]
+    if not set(dense) - {"t_s"}:
+        return []
+    blanks = {n: rows for n, rows in places.items() if n not in dense and rows.size > 1}
+    return [name for name, rows in blanks.items() if np.median(np.diff(rows)) > 1.0]
 
 
 def _broken(name: str, error: Exception) -> CaptureError:

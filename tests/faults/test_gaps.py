@@ -56,6 +56,29 @@ def test_slow_channel_in_a_fast_table(rng: np.random.Generator) -> None:
     assert (findings, passed.masks) == ((), ())
 
 
+@pytest.mark.parametrize("name", ["temp_winding_degc", "temp_magnet_degc"])
+def test_slow_channel_is_there_on_the_fast_clock(name: str, rng: np.random.Generator) -> None:
+    """Let through: a temperature every hundredth row costs none of the rows in between."""
+    capture = drive(MOTOR, rng)
+    current = column(capture, "iq_a")
+    slow = 20.0 + 1e-4 * np.arange(current.size)
+    slow[np.arange(current.size) % 100 != 0] = np.nan
+    passed, findings = validate(with_column(capture, name, slow), {})
+    data = passed.arrays("iq_a", name)
+    last = current.size - (current.size - 1) % 100
+    assert (findings, data["iq_a"].size) == ((), current.size)
+    assert data[name][:last] == pytest.approx(20.0 + 1e-4 * np.arange(last))
+
+
+def test_a_channel_that_ends_early_is_no_slow_one(rng: np.random.Generator) -> None:
+    """Let through: nothing is drawn over rows in which a fast channel was not recorded."""
+    capture = drive(MOTOR, rng)
+    torque = np.full(column(capture, "iq_a").size, 0.1)
+    torque[1000:-1000] = np.nan
+    passed, _ = validate(with_column(capture, "torque_shaft_nm", torque), {})
+    assert np.isnan(passed.arrays("iq_a", "torque_shaft_nm")["torque_shaft_nm"][1000:-1000]).all()
+
+
 def test_dead_channel(rng: np.random.Generator) -> None:
     """Refused: a torque of zero in every row of a torque map."""
     capture = torque_map(MOTOR, rng)
