@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.terminals import PAIR_ANGLE_RAD, PAIRS
+from pipeline.fit.terminals import PAIR_ANGLE_RAD, PAIRS, bridged
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
@@ -94,7 +94,7 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
         channels,
         data.get("theta_mech_rad"),
         data.get("omega_mech_rad_s"),
-        None if temp_column is None else data[temp_column],
+        None if temp_column is None else bridged(data["t_s"], data[temp_column]),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.instruments import Shift, current_source, temperature_source, voltage_source
-from pipeline.fit.terminals import PAIRS, first_temperature, pair_of, pair_signals
+from pipeline.fit.terminals import PAIRS, bridged, first_temperature, pair_of, pair_signals
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import find_plateaus
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
@@ -75,13 +75,13 @@ def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, .
 def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> list[Point]:
     column = first_temperature(capture, "winding")
     data = pair_signals(capture, pair, *((column,) if column else ()))
+    temps = np.full(data["t_s"].size, temp_degc)
+    if column is not None and np.isfinite(data[column]).any():
+        temps = bridged(data["t_s"], data[column])
     points = []
     for plateau in find_plateaus(data["i_a"]):
         v, i = data["v_v"][plateau.rows], data["i_a"][plateau.rows]
-        temp = temp_degc
-        if column is not None:
-            temps = data[column][plateau.rows]
-            temp = float(np.nanmean(temps)) if np.isfinite(temps).any() else temp_degc
+        temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
         means = (float(v.mean()), float(i.mean()))
         points.append(Point(index, pair, *means, temp, *errors, capture.meta))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.terminals import first_temperature, pair_of, pair_signals
+from pipeline.fit.terminals import bridged, first_temperature, pair_of, pair_signals
 from pipeline.numerics.plateaus import block_means, find_plateaus
 from pipeline.physics.conventions import phase_from_line
 from pipeline.records.capture import Capture
@@ -199,11 +199,8 @@ def _blocks(
 
 def _bridged(data: dict[str, Array], name: str) -> bool:
     """Draws a slow channel's gaps as straight lines in place; False where it holds no value."""
-    there = np.isfinite(data[name])
-    if not there.any():
-        return False
-    data[name] = np.interp(data["t_s"], data["t_s"][there], data[name][there])
-    return True
+    data[name] = bridged(data["t_s"], data[name])
+    return bool(np.isfinite(data[name]).any())
 
 
 def ambient_degc(record: HeatRecord) -> float | None:

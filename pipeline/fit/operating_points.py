@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.fit.instruments import current_source, temperature_source, torque_source
 from pipeline.fit.instruments import voltage_source as source_of_voltage
+from pipeline.fit.terminals import bridged
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
 from pipeline.records.capture import Capture
@@ -140,6 +141,7 @@ def _columns(capture: Capture) -> dict[str, Array]:
         data.setdefault(name, blank)
     if not capture.has("id_a"):
         data["id_a"] = np.zeros(blank.size)
+    data["temp_magnet_degc"] = bridged(data["t_s"], data["temp_magnet_degc"])
     ok = np.isfinite(data["iq_a"]) & np.isfinite(data["id_a"])
     return {name: column[ok] for name, column in data.items()}
 

@@ -59,3 +59,16 @@ def first_temperature(capture: Capture, *places: str) -> str | None:
         if capture.has(name) and np.isfinite(capture.arrays(name)[name]).any():
             return name
     return None
+
+
+def bridged(t_s: Array, values: Array) -> Array:
+    """A slow channel [n] at all times [n, s]: straight lines between its values, its ends held.
+
+    A temperature before its first and after its last reading is that reading. As it was where no
+    value is there.
+    """
+    there = np.isfinite(values)
+    if not there.any():
+        return values
+    drawn: Array = np.interp(t_s, t_s[there], values[there])
+    return drawn

@@ -74,6 +74,17 @@ def test_two_magnet_temperatures_give_the_coefficient_at_25_degc():
     assert "assumed" in alone["psi_pm_wb"].note
 
 
+def test_a_magnet_temperature_that_stops_early_is_held():
+    """Read at 65 degC at the first speed alone; at the second it is not taken at ambient."""
+    whole = spin_capture((60.0, 120.0), temp=65.0)
+    temps = whole.tables[0]["temp_magnet_degc"].to_numpy().copy()
+    temps[5000:] = np.nan
+    table = whole.tables[0].with_columns(temp_magnet_degc=temps)
+    short = replace(whole, tables=(table,), meta=replace(whole.meta, ambient_degc=20.0))
+    one, other = (estimates(open_circuit.ESTIMATOR, c)["psi_pm_wb"] for c in (short, whole))
+    assert one.number == pytest.approx(other.number, rel=1e-9)
+
+
 def test_a_gear_is_no_pole_pair_count():
     geared = spin_capture((40.0, 120.0))
     table = geared.tables[0].with_columns(pl.col("theta_mech_rad") / 1.07)

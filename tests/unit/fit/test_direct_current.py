@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,18 @@ def test_resistance_is_brought_to_25_degc():
         1.0196 * 0.01 * 45 / 259.5 / (1 + 45 / 259.5), rel=0.02
     )
     assert sources["voltage@s"] > 0.0 > sources["current@s"]
+
+
+def test_a_thermometer_that_stops_early_is_held():
+    """Read at 70 degC until the last plateau begins; ambient is 20 degC, and never meant."""
+    whole = dc_capture("ab", 1.2, temp=70.0)
+    temps = whole.tables[0]["temp_winding_degc"].to_numpy().copy()
+    temps[-220:] = np.nan
+    table = whole.tables[0].with_columns(temp_winding_degc=temps)
+    short = replace(whole, tables=(table,), meta=replace(whole.meta, ambient_degc=20.0))
+    for name in ("r_ab_ohm", "r_phase_ohm"):
+        one, other = (estimates(resistance.ESTIMATOR, c)[name] for c in (short, whole))
+        assert one.number == pytest.approx(other.number, rel=1e-9)
 
 
 def test_one_level_leaves_the_drop_as_an_allowance():
