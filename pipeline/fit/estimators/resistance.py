@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,15 +114,15 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
     matrix = np.column_stack([published(row) for row in np.eye(columns.size)])
     covariance = matrix @ fit.covariance @ matrix.T
     values = published(fit.coefficients)
-    allowances = _allowances(points, columns, options)
     if columns.drops:
         names += ("voltage_offset_v",)
+    allowances = _allowances(points, columns, names, matrix, options)
     notes.append(unstated_note(used))
     estimates = {}
     for k, name in enumerate(names):
         u = math.sqrt(max(float(covariance[k, k]), 0.0))
         parts = [Contribution(f"scatter:{NAME}:{name}", u, "A"), *shared[k]]
-        parts += allowances.get(name, [])
+        parts += allowances[name]
         estimates[name] = _estimate(name, float(values[k]), parts, points, used, notes)
     if size == 3:
         estimates["resistance_imbalance"] = _imbalance(names, values, covariance, points, used)
@@ -133,29 +132,41 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
 
 
 def _allowances(
-    points: Sequence[Point], columns: Columns, options: Mapping[str, float]
+    points: Sequence[Point],
+    columns: Columns,
+    names: Sequence[str],
+    matrix: Array,
+    options: Mapping[str, float],
 ) -> dict[str, list[Contribution]]:
-    """Type B allowances for what the captures cannot tell: V0 and the pairs not measured."""
-    found: dict[str, list[Contribution]] = {}
-    largest = {pair: max(abs(p.i_a) for p in points if p.pair == pair) for pair in columns.pairs}
-    r_scale = float(np.mean([abs(p.v_v / p.i_a) for p in points]))
-    for name, share in (("r_phase_ohm", 0.5), ("r_ll_ohm", 1.0)):
-        found[name] = []
-        if len(columns.pairs) < 3:
+    """Type B allowances for what the captures cannot tell: V0 and the pairs not measured.
+
+    `matrix` [names, columns] holds the published values' shares of the pairs. V0 is that of one
+    inverter and one set of leads, so what it adds to the pairs adds up in what is made of them.
+    """
+    found: dict[str, list[Contribution]] = {name: [] for name in names}
+    if len(columns.pairs) < 3:
+        r_scale = float(np.mean([abs(p.v_v / p.i_a) for p in points]))
+        for name, share in (("r_phase_ohm", 0.5), ("r_ll_ohm", 1.0)):
             u = share * r_scale * options["u_rel_imbalance"]
             found[name].append(Contribution("assumed:resistance_imbalance", u, "B"))
-    blind = [p for p in points if voltage_source(p.meta) not in columns.drops]
-    for pair in columns.pairs:
-        if not any(p.pair == pair for p in blind):
-            continue
-        commanded = any(p.meta.voltage_kind == "commanded" for p in blind)
-        drop_v = options["drop_commanded_v" if commanded else "drop_measured_v"]
-        part = Contribution("assumed:voltage_offset_v", drop_v / largest[pair], "B")
-        found.setdefault(f"r_{pair}_ohm", []).append(part)
-        for name, share in (("r_phase_ohm", 0.5), ("r_ll_ohm", 1.0)):
-            u = share * part.u / len(columns.pairs)
-            found[name].append(replace(part, u=u, source=f"{part.source}:{pair}"))
+    drops = np.array([_unknown_drop_ohm(points, columns, pair, options) for pair in columns.pairs])
+    for name, shares in zip(names, matrix[:, : drops.size], strict=True):
+        if u := float(shares @ drops):
+            found[name].append(Contribution("assumed:voltage_offset_v", u, "B"))
     return found
+
+
+def _unknown_drop_ohm(
+    points: Sequence[Point], columns: Columns, pair: str, options: Mapping[str, float]
+) -> float:
+    """What a V0 that was not fitted may add to the resistance of a pair, 0 where it was."""
+    own = [p for p in points if p.pair == pair]
+    blind = [p for p in own if voltage_source(p.meta) not in columns.drops]
+    if not blind:
+        return 0.0
+    commanded = any(p.meta.voltage_kind == "commanded" for p in blind)
+    drop_v = options["drop_commanded_v" if commanded else "drop_measured_v"]
+    return drop_v / max(abs(p.i_a) for p in own)
 
 
 def _estimate(

@@ -11,6 +11,7 @@ from pipeline.fit.estimators import (
     resistance,
     soak,
 )
+from pipeline.fit.terminals import PAIRS
 from tests.unit.fit.signals import capture, estimates, near
 
 
@@ -76,6 +77,22 @@ def test_one_level_leaves_the_drop_as_an_allowance():
     parts = {part.source: part for part in found["r_ab_ohm"].budget}
     assert parts["assumed:voltage_offset_v"].u == pytest.approx(0.0005 / 2.0, rel=1e-3)
     assert parts["assumed:voltage_offset_v"].kind == "B"
+
+
+def test_an_inverters_drop_that_is_not_told_adds_up_over_the_pairs():
+    """One inverter, 0.3 V at 2 A on every pair: 0.15 ohm on each, 0.075 ohm on each phase."""
+    one_level = {"levels": (2.0, -2.0)}
+    captures = [dc_capture(pair, 1.0, seed=k, **one_level) for k, pair in enumerate(PAIRS)]
+    commanded = [replace(c, meta=replace(c.meta, voltage_kind="commanded")) for c in captures]
+    found = estimates(resistance.ESTIMATOR, *commanded)
+    expected = {"r_ll_ohm": 0.15, "r_phase_ohm": 0.075} | {f"r_{p}_ohm": 0.075 for p in "abc"}
+    for name, u in expected.items():
+        parts = {part.source: part.u for part in found[name].budget}
+        assert parts["assumed:voltage_offset_v"] == pytest.approx(u, rel=1e-2)
+    moved = [dc_capture(pair, 1.0, seed=k, v0=0.3, **one_level) for k, pair in enumerate(PAIRS)]
+    read = estimates(resistance.ESTIMATOR, *moved)
+    for name, u in expected.items():
+        assert read[name].number - found[name].number == pytest.approx(u, rel=1e-2)
 
 
 def test_no_plateau_names_the_experiment():
