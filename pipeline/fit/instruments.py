@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.capture import Capture, CaptureMeta
-from pipeline.records.uncertainty import Budget, Contribution
+from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 Shift = Mapping[str, float]
@@ -104,5 +104,5 @@ def contributions(
 
 
 def budget_of(parts: Iterable[Contribution]) -> Budget:
-    """The parts sorted by source, so that equal work gives equal bytes."""
-    return tuple(sorted((p for p in parts if p.u != 0.0), key=lambda part: part.source))
+    """One part a source, parts of equal sources added with their signs (`propagate`), none of 0."""
+    return tuple(part for part in propagate([(1.0, tuple(parts))]) if part.u != 0.0)

@@ -19,7 +19,7 @@ from pipeline.fit.estimators.spin_down import ESTIMATOR as SPIN_DOWN
 from pipeline.fit.estimators.torque_map import ESTIMATOR as TORQUE_MAP
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.orders import OrderLine, Spectrum, half_peak_to_peak
-from pipeline.records.capture import Campaign, Capture
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import type_b
@@ -93,26 +93,6 @@ def test_torque_constant_at_25_degrees() -> None:
     assumed = fitted(TORQUE_MAP, captures).estimates[0]
     share = next(p.u for p in assumed.budget if p.source == "assumed:temp_coeff_magnet")
     assert abs(share) / truth == pytest.approx(35.0 * 5e-4 / (1 - 0.0385), rel=0.05)
-
-
-def with_slow_magnet_temperature(capture: Capture, every: int) -> Capture:
-    """The capture with the magnet's temperature on a slower clock, whose last row comes early."""
-    fast = capture.tables[0]
-    slow = fast.select("t_s", "temp_magnet_degc")[::every]
-    return replace(capture, tables=(fast.drop("temp_magnet_degc"), slow))
-
-
-def test_a_slow_thermometer_serves_the_last_step_as_well() -> None:
-    """At 60 degC, read every 50 rows: the last step's last rows have no reading after them."""
-    motor = replace(design("gimbal-5208"), effects={})
-    plan = (("hot", "torque_map", {"temp_magnet_degc": 60.0}),)
-    captures = campaign_of(campaign(motor, EXACT_BENCH, 1, plan))
-    slow = replace(
-        captures,
-        captures=tuple(with_slow_magnet_temperature(c, 50) for c in captures.captures),
-    )
-    kt, usual = (fitted(TORQUE_MAP, c).estimates[0].number for c in (slow, captures))
-    assert kt == pytest.approx(usual, rel=2e-4)
 
 
 def test_saturation_does_not_bend_the_torque_constant() -> None:
