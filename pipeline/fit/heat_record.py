@@ -17,6 +17,7 @@ from pipeline.records.estimate import Estimate, derived
 
 Array = NDArray[np.float64]
 BLOCKS = 300
+GAP = 1.5
 DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 TURNING = ("psi_pm_wb", "pole_pairs", "ld_h", "lq_h")
 REFERENCE = ("r_phase_ohm", "r_a_ohm", "r_b_ohm", "r_c_ohm", "angle_offset_elec_rad")
@@ -166,7 +167,8 @@ def _blocks(
 ) -> HeatRecord | None:
     """Means over equal blocks of the longest settled stretch of current.
 
-    Steady is within 2 % of the largest current: one step of a coarse converter is no change.
+    Steady is within 2 % of the largest current: one step of a coarse converter is no change. A
+    block over a gap in time is left out: its mean is of no one moment.
     """
     needed = ("t_s", "along_va", "square_a2", "temp_winding_degc")
     good = np.all([np.isfinite(data[n]) for n in needed], axis=0)
@@ -182,7 +184,8 @@ def _blocks(
         return None
     longest = max(flowing, key=lambda p: p.size)
     size = max(1, longest.size // BLOCKS)
-    mean = {n: block_means(v[longest.rows], size) for n, v in data.items()}
+    whole = _unbroken(data["t_s"][longest.rows], size)
+    mean = {n: block_means(v[longest.rows], size)[whole] for n, v in data.items()}
     return HeatRecord(
         capture,
         mean["t_s"],
@@ -195,6 +198,14 @@ def _blocks(
         turning,
         shares,
     )
+
+
+def _unbroken(t_s: Array, size: int) -> NDArray[np.bool_]:
+    """Which blocks of `size` rows of a clock [n, s] take no more than `GAP` times what is usual."""
+    last = t_s[size - 1 :: size]
+    spans = last - t_s[::size][: last.size]
+    usual: NDArray[np.bool_] = spans <= GAP * np.median(spans)
+    return usual
 
 
 def _bridged(data: dict[str, Array], name: str) -> bool:

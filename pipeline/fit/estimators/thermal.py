@@ -222,21 +222,22 @@ def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
     matrix[:, 1, 0], matrix[:, 1, 1] = c, -(c + d)
     half_trace = 0.5 * (matrix[:, 0, 0] + matrix[:, 1, 1])
     root = np.sqrt(0.25 * (matrix[:, 0, 0] - matrix[:, 1, 1]) ** 2 + b * c) + 1e-12
-    step = float(np.median(np.diff(t_s)))
-    fast, slow = np.exp((half_trace - root) * step), np.exp((half_trace + root) * step)
+    steps = np.diff(t_s)[:, None]
+    fast, slow = np.exp((half_trace - root) * steps), np.exp((half_trace + root) * steps)
     # Sylvester's formula for the exponential of a 2 x 2 matrix with two real rates.
     shifted = matrix - (half_trace - root)[:, None, None] * np.eye(2)
     exponential = (
-        fast[:, None, None] * np.eye(2) + ((slow - fast) / (2.0 * root))[:, None, None] * shifted
+        fast[..., None, None] * np.eye(2)
+        + ((slow - fast) / (2.0 * root))[..., None, None] * shifted
     )
     determinant = (a + b) * (c + d) - b * c + 1e-300
     steady = np.stack([k * (c + d) / determinant, k * c / determinant], axis=1)
-    drive = steady - np.einsum("mij,mj->mi", exponential, steady)
+    drive = steady - np.einsum("nmij,mj->nmi", exponential, steady)
     means = 0.5 * (losses_w[1:] + losses_w[:-1])
     course = np.empty((t_s.size, variants.shape[0], 2))
     course[0] = state = variants[:, 5:7]
     for row, watt in enumerate(means):
-        state = np.einsum("mij,mj->mi", exponential, state) + drive * watt
+        state = np.einsum("mij,mj->mi", exponential[row], state) + drive[row] * watt
         course[row + 1] = state
     turned: Array = course.transpose(2, 1, 0)
     return turned

@@ -12,6 +12,8 @@ from pipeline.fit.estimators import (
 )
 from pipeline.records.capture import Capture
 from pipeline.records.constants import Constants
+from tests.recovery.cases_electrical import LONG_HEAT
+from tests.recovery.simulated import recorded
 from tests.unit.fit.signals import capture, estimates, known_value
 
 
@@ -103,3 +105,18 @@ def test_thermal_resistance_of_one_time_constant():
     table = short.tables[0].head(600)
     brief = Capture("short", "0" * 64, "verified", short.meta, (table,))
     assert estimates(thermal.ESTIMATOR, brief)["rth_winding_k_w"].status == "not_identifiable"
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.1, 0.19), (0.02, 0.06)])
+def test_a_gap_in_the_log_is_no_jump_of_the_temperature(begin, end):
+    """The logger was away for up to a tenth of a run of two bodies; the motor was not."""
+    captures, _ = recorded(LONG_HEAT, 3)
+    run = captures.captures[0]
+    table = run.tables[0]
+    share = pl.col("t_s") / table["t_s"].max()
+    left = table.filter((share < begin) | (share > end))
+    held = Capture("gap", run.sha256, "verified", run.meta, (left,))
+    whole, broken = (estimates(thermal.ESTIMATOR, c)["rth_winding_k_w"] for c in (run, held))
+    assert "two nodes" in whole.note
+    assert broken.number == pytest.approx(whole.number, rel=4e-3)
+    assert broken.u_a < 1.2 * whole.u_a
