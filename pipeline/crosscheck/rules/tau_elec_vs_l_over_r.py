@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +65,9 @@ def step_time_constants_s(t_s: Array, v_v: Array, i_a: Array) -> list[float]:
     constants and its current moves by 20 times what the line leaves over.
     """
     moves = np.abs(np.diff(v_v))
-    edges = np.flatnonzero(moves > 0.5 * moves.max()) + 1
+    edges = np.flatnonzero(moves > 0.5 * moves.max(initial=0.0)) + 1
     found = []
-    for start, stop in zip(edges, [*edges[1:], v_v.size], strict=True):
+    for start, stop in pairwise([*edges, v_v.size]):
         t, i = t_s[start : stop - 1] - t_s[start], i_a[start : stop - 1]
         if t.size < 50:
             continue
@@ -87,7 +88,7 @@ def _smallest_steps(campaign: Campaign) -> list[Capture]:
         meta = capture.meta
         if meta.pair is None or meta.theta_elec_deg is None:
             continue
-        height = float(np.nanmax(np.abs(_trace(capture)[2])))
+        height = float(np.max(np.abs(_trace(capture)[2]), initial=0.0))
         place = (meta.pair, meta.theta_elec_deg)
         if place not in smallest or height < smallest[place][0]:
             smallest[place] = (height, capture)
@@ -95,9 +96,18 @@ def _smallest_steps(campaign: Campaign) -> list[Capture]:
 
 
 def _trace(capture: Capture) -> tuple[Array, Array, Array]:
+    """Time, voltage and current of the pair, by whichever of its two lines; blanks left out.
+
+    KeyError where the capture holds neither line's current.
+    """
     pair = capture.meta.pair or "ab"
-    data = capture.arrays("t_s", f"v{pair}_v", f"i{pair[0]}_a")
-    return data["t_s"], data[f"v{pair}_v"], data[f"i{pair[0]}_a"]
+    line = next((p for p in pair if capture.has(f"i{p}_a")), pair[0])
+    names = ("t_s", f"v{pair}_v", f"i{line}_a")
+    data = capture.arrays(*names)
+    t_s, v_v, i_a = (data[name] for name in names)
+    there = np.isfinite(v_v) & np.isfinite(i_a)
+    sign = 1.0 if line == pair[0] else -1.0
+    return t_s[there], v_v[there], sign * i_a[there]
 
 
 def _expected_s(capture: Capture, ld_h: float, lq_h: float, r_phase_ohm: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -289,3 +290,25 @@ def test_the_current_s_own_time_constant() -> None:
     leads = judge("tau_elec_vs_l_over_r", constants(), current_step(LD / (1.08 * R)))
     assert leads.status == "fail"
     assert leads.value == pytest.approx(1.0 / 1.08, abs=0.005)
+
+
+def test_either_line_shows_the_step() -> None:
+    """The current of terminal b, which leaves the motor there, and some values missing."""
+    capture = current_step(LD / R).captures[0]
+    table = capture.tables[0].select(
+        "t_s",
+        pl.when(pl.col("t_s") > 1.19e-2).then(math.nan).otherwise("vab_v").alias("vab_v"),
+        (-pl.col("ia_a")).alias("ib_a"),
+    )
+    other = Campaign("m", (replace(capture, tables=(table,)),))
+    assert judge("tau_elec_vs_l_over_r", constants(), other).status == "pass"
+
+
+def test_a_voltage_without_an_edge_has_no_time_constant() -> None:
+    """A command that stands from the first row on is not evaluated."""
+    capture = current_step(LD / R).captures[0]
+    held = capture.tables[0].with_columns(pl.lit(1.0).alias("vab_v"))
+    campaign = Campaign("m", (replace(capture, tables=(held,)),))
+    check = judge("tau_elec_vs_l_over_r", constants(), campaign)
+    assert check.status == "not_evaluated"
+    assert "settle" in check.meaning
