@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.operating_points import magnet_temperature
+from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.records.capture import Capture
@@ -96,7 +97,7 @@ def shaft_rows(
     means become columns. `cogging_orders` and `ripple_orders` [per mechanical turn] make columns of
     torque against angle, the latter in proportion to q current.
     Windows in which the shaft all but stands (friction undetermined), and those of a coast-down in
-    which it is still being driven, are dropped and counted.
+    which it is still being driven or held at its speed, are dropped and counted.
     """
     parts = [part for part in map(_part, captures) if part is not None]
     if not parts:
@@ -176,6 +177,16 @@ def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
     return weak_rows(t_s, WIDTHS_S[-1], OVERLAP)
 
 
+def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
+    """Windows [w] with a row that belongs to no coast."""
+    outside = np.ones(speed.size, dtype=bool)
+    for rows, _ in coasting_rows(speed):
+        outside[rows] = False
+    before = np.concatenate([[0], np.cumsum(outside)])
+    held: NDArray[np.bool_] = before[weak.starts + weak.sizes] > before[weak.starts]
+    return held
+
+
 def _rows(
     index: int,
     part: _Part,
@@ -190,6 +201,7 @@ def _rows(
     if part.kind == COAST:
         gaining = weak.integral(theta, 2) * weak.integral(theta, 1) > 0.0
         slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5
+        slow |= _held(weak, speed)
     clock = np.floor((weak.centres_s - weak.centres_s[0]) / CLUSTER_S)
     turning = np.exp(1j * theta)
     driven = float(part.kind == DRIVE)

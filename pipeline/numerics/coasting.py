@@ -7,10 +7,34 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.plateaus import true_runs
+
 Array = NDArray[np.float64]
 Deceleration = Callable[[Array], Array]
 
 GRID = 3000
+REST, TOP, LEAST_TOP = 0.005, 0.995, 0.05
+
+
+def coasting_rows(speed: Array) -> list[tuple[slice, int]]:
+    """Rows and sense (+1, -1) of every coast that a smooth speed [n, any unit] holds.
+
+    A coast falls from its highest speed to `REST` of the fastest of all. It begins in the last
+    row within `TOP` of its highest speed, for the shaft may have been held there before; one
+    whose highest speed is below `LEAST_TOP` of the fastest is none.
+    """
+    fastest = float(np.max(np.abs(speed), initial=0.0))
+    if fastest == 0.0:
+        return []
+    found = []
+    for sense in (1, -1):
+        along = speed * sense
+        for start, stop in true_runs(along >= REST * fastest):
+            top = float(along[start:stop].max())
+            if top >= LEAST_TOP * fastest:
+                high = np.flatnonzero(along[start:stop] >= TOP * top)
+                found.append((slice(start + int(high[-1]), stop), sense))
+    return found
 
 
 def coast_down(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.fit.drag import DRAG_FORMS, STRIBECK
 from pipeline.fit.instruments import budget_of
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.numerics.coasting import coast_down
+from pipeline.numerics.coasting import coast_down, coasting_rows
 from pipeline.numerics.least_squares import (
     NonlinearFit,
     autocorrelation_time,
@@ -42,7 +42,6 @@ EXPERIMENT = (
     "theta_mech_rad logged, once in each sense"
 )
 MOST_SAMPLES = 4000
-SLOWEST_SHARE = 0.005
 SHARED = ("coulomb", "viscous")
 EXTRAS = ("windage", *STRIBECK[::3])
 EXPLAINED = 1.05
@@ -91,7 +90,8 @@ class Motion:
             return total
 
         theta, speed = coast_down(coast.t_s, max(float(own[1]), 1e-6 * fast), deceleration)
-        out = own[0] + theta if coast.of_angle else speed + own[0]
+        # A tachometer's zero error looks as T_c/B does, so it is taken as none.
+        out = own[0] + theta if coast.of_angle else speed
         for value, name in zip(own[2:], self.ripples, strict=True):
             out = out + value * _ripple(name, coast.theta_rad)
         predicted: Array = out
@@ -136,25 +136,16 @@ def _coasts(capture: Capture) -> list[Coast]:
     t, y = data["t_s"][fine], data[column][fine]
     if t.size < 3 * LEAST_SAMPLES:
         return []
+    angle = y if of_angle else np.append(0.0, np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t)))
     try:
-        speed = (
-            smooth_speed(t, y, max(0.01, 20.0 * float(np.median(np.diff(t))))) if of_angle else y
-        )
+        speed = smooth_speed(t, angle, max(0.01, 20.0 * float(np.median(np.diff(t)))))
     except ValueError:
         return []
-    fastest = float(np.max(np.abs(speed)))
-    found = []
-    for sense in (1, -1):
-        along = speed * sense
-        if float(along.max()) < 0.05 * fastest:
-            continue
-        first = int(np.argmax(along >= 0.995 * float(along.max())))
-        after = np.flatnonzero(along[first:] < max(SLOWEST_SHARE * fastest, 1e-12))
-        last = first + int(after[0]) if after.size else t.size
-        if last - first >= 3 * LEAST_SAMPLES:
-            rows = slice(first, last)
-            found.append(_coast(capture.path, t[rows], y[rows], sense, along[rows], of_angle))
-    return found
+    return [
+        _coast(capture.path, t[rows], y[rows], sense, sense * speed[rows], of_angle)
+        for rows, sense in coasting_rows(speed)
+        if rows.stop - rows.start >= 3 * LEAST_SAMPLES
+    ]
 
 
 def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bool) -> Coast:
