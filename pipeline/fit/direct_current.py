@@ -146,7 +146,8 @@ def columns_of(points: Sequence[Point]) -> Columns:
 class DirectCurrentFit:
     """R at 25 degC of each pair and the rest of `Columns` [k], with the covariance of the scatter.
 
-    `alpha_1_k` is the copper coefficient found; `residuals` [n] are those of the points.
+    `alpha_1_k` is the copper coefficient found; `residuals` [n] are those of the points. `dof` is
+    that of the scatter: infinite where it is what the plateaus' own noise makes, else the points'.
     """
 
     coefficients: Array
@@ -155,7 +156,7 @@ class DirectCurrentFit:
     u_alpha_1_k: float
     residuals: Array
     full_rank: bool
-    dof: int
+    dof: float
 
 
 def fit_direct_current(
@@ -186,7 +187,8 @@ def fit_direct_current(
     scatter = fit.covariance - np.outer(last, last) / slack[-1] ** 2
     residuals = fit.residuals[:-1]
     dof = len(points) - fit.rank + (1 if math.isfinite(u_alpha_rel) else 0)
-    scatter = scatter * _birge(residuals / sigma, dof)
+    factor = _birge(residuals / sigma, dof)
+    scatter = scatter * factor
     u_alpha = 2.0 * COPPER_COEFFICIENT_25_1_K * math.sqrt(max(float(scatter[-1, -1]), 0.0))
     size = columns.size
     return DirectCurrentFit(
@@ -196,7 +198,7 @@ def fit_direct_current(
         u_alpha,
         residuals,
         fit.full_rank,
-        dof,
+        float(dof) if factor > 1.0 else math.inf,
     )
 
 

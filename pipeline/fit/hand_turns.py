@@ -20,12 +20,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What one voltage channel says: cycles a turn, flux amplitude [Wb, phase peak], traces."""
+    """What one voltage channel says: cycles a turn, flux amplitude [Wb, phase peak], traces.
+
+    `dof` are the degrees of freedom of `u_psi_wb`, infinite where the noise is known beforehand.
+    """
 
     channel: str
     cycles: float
     psi_wb: float
     u_psi_wb: float
+    dof: float
     t_s: Array
     flux_wb: Array
     fitted_wb: Array
@@ -116,11 +120,12 @@ def _amplitude(
     drift, a, b = (float(c) for c in fit.coefficients)
     amplitude = math.hypot(a, b)
     slope = np.array([0.0, a, b]) / max(amplitude, 1e-300)
-    u = math.sqrt(float(slope @ fit.covariance @ slope) * autocorrelation_time(fit.residuals))
+    tau = autocorrelation_time(fit.residuals)
+    u = math.sqrt(float(slope @ fit.covariance @ slope) * tau)
+    dof = max(fit.dof / tau, 1.0)
     fitted = drift * spin.t_s + a * np.cos(phase) + b * np.sin(phase)
-    return Turn(
-        channel.name, cycles, amplitude, u, spin.t_s, flux, fitted + float(np.mean(flux - fitted))
-    )
+    level = float(np.mean(flux - fitted))
+    return Turn(channel.name, cycles, amplitude, u, dof, spin.t_s, flux, fitted + level)
 
 
 def _by_vector(spin: Spin) -> list[Turn]:
@@ -202,7 +207,8 @@ def _by_swings(spin: Spin, channel: Channel) -> Turn | None:
     # Trapezoids take (omega T)²/12 off a sine; the extreme falls up to T/2 beside a sample.
     step = float(np.max(np.abs(np.diff(flux)))) / amplitude
     u = math.hypot(u, amplitude * step**2 / 12.0)
-    return Turn(channel.name, cycles, amplitude, u, spin.t_s, straight, np.zeros(0))
+    dof = float(ends.dof) if _excess(ends) > 1.0 else math.inf
+    return Turn(channel.name, cycles, amplitude, u, dof, spin.t_s, straight, np.zeros(0))
 
 
 def _one_swing(
@@ -218,7 +224,7 @@ def _one_swing(
         return None
     seen = abs(float(flux[turning[0]]) - 0.5 * float(flux[0] + flux[-1]))
     amplitude, u = 0.5 * seen + 0.25 * hidden_wb, 0.25 * hidden_wb
-    return Turn(channel.name, 1.0, amplitude, u, spin.t_s, flux, np.zeros(0))
+    return Turn(channel.name, 1.0, amplitude, u, math.inf, spin.t_s, flux, np.zeros(0))
 
 
 def _rest(v: Array) -> tuple[float, float]:

@@ -24,7 +24,11 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Contribution
+from pipeline.records.uncertainty import (
+    Contribution,
+    effective_dof,
+    standard_uncertainty,
+)
 
 NAME = "hand_turn"
 GIVES = ("pole_pairs", "psi_pm_wb")
@@ -86,7 +90,7 @@ def _pole_pairs(turns: Sequence[tuple[Capture, Turn]]) -> Estimate:
 def _flux(
     turns: Sequence[tuple[Capture, Turn]], known: Constants, options: Mapping[str, float]
 ) -> Estimate:
-    """Weighted mean of the channels at 25 degC."""
+    """Weighted mean of the channels at 25 degC; its scatter is their own, or how they differ."""
     captures = tuple({c.path: c for c, _ in turns}.values())
     coefficient = known.best("temp_coeff_magnet_1_k")
     alpha = options["alpha_assumed_1_k"] if coefficient is None else coefficient.number
@@ -105,14 +109,18 @@ def _flux(
         notes.append("magnets taken at ambient, no temp_magnet_degc")
     share = np.array(weights) / np.sum(weights)
     value = float(share @ np.array(values))
-    u = math.sqrt(1.0 / float(np.sum(weights)))
+    own = tuple(
+        Contribution(f"{k}", float(w) * turn.u_psi_wb, "A", turn.dof)
+        for k, (w, (_, turn)) in enumerate(zip(share, turns, strict=True))
+    )
+    u, dof = standard_uncertainty(own), effective_dof(own)
     if len(values) > 1:
-        spread = float(share @ (np.array(values) - value) ** 2) / (len(values) - 1)
-        u = max(u, math.sqrt(spread))
+        spread = math.sqrt(float(share @ (np.array(values) - value) ** 2) / (len(values) - 1))
+        u, dof = max((u, dof), (spread, len(values) - 1.0))
     excess = float(share @ np.array(excesses))
     u_alpha = options["u_alpha_assumed_1_k"] if coefficient is None else coefficient.u
     parts = [
-        Contribution(f"scatter:{NAME}:psi", u, "A", float(max(len(values) - 1, 1))),
+        Contribution(f"scatter:{NAME}:psi", u, "A", dof),
         Contribution(MAGNET_SOURCE, -value * excess * u_alpha, "B"),
     ]
     for source, gain in instrument_uncertainties(captures, ("voltage",)).items():

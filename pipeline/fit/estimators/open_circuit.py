@@ -171,18 +171,19 @@ def _flux_estimates(
     extra: list[Contribution] = []
     words = [n for n in notes if n]
     if measured:
-        value = float(free.coefficients[0])
-        u_psi = free.u(0) * math.sqrt(_birge(free))
+        value, chosen = float(free.coefficients[0]), free
     else:
         alpha = options["alpha_assumed_1_k"]
         factor = 1.0 + alpha * excess
         fixed = linear_fit(factor[:, None], psi, sigma)
-        value, u_psi = float(fixed.coefficients[0]), fixed.u(0) * math.sqrt(_birge(fixed))
+        value, chosen = float(fixed.coefficients[0]), fixed
         weight = 1.0 / sigma**2
         lever = float(np.sum(weight * excess * factor) / np.sum(weight * factor**2))
         extra = [Contribution(MAGNET_SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
         words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
-    parts = [Contribution(f"scatter:{NAME}:psi", u_psi, "A"), *extra]
+    widened, dof = _birge(chosen)
+    parts = [Contribution(f"scatter:{NAME}:psi", chosen.u(0) * math.sqrt(widened), "A", dof)]
+    parts += extra
     parts += [Contribution(source, value * u, "B") for source, u in shared["voltage"]]
     parts += [Contribution(source, -value * alpha * u, "B") for source, u in shared["temperature"]]
     note = "; ".join(words)
@@ -195,7 +196,7 @@ def _flux_estimates(
     if not measured:
         found[name] = not_identifiable(name, "1/K", NAME, WARM)
         return found
-    scatter = Contribution(f"scatter:{NAME}:alpha", u_alpha * math.sqrt(_birge(free)), "A")
+    scatter = Contribution(f"scatter:{NAME}:alpha", u_alpha * math.sqrt(widened), "A", dof)
     offset = [Contribution(s, alpha**2 * u, "B") for s, u in shared["temperature"]]
     budget = budget_of([scatter, *offset])
     found[name] = Estimate(name, alpha, "1/K", "measured", NAME, budget, at, paths, note)
@@ -210,11 +211,15 @@ def _slope(fit: LinearFit) -> tuple[float, float]:
     return alpha, math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0))
 
 
-def _birge(fit: LinearFit) -> float:
-    """Variance factor where the speeds scatter more than their noise (Birge), else 1."""
+def _birge(fit: LinearFit) -> tuple[float, float]:
+    """Variance factor where the speeds scatter more than their noise (Birge), else 1; and its dof.
+
+    The noise of a speed is known from all its rows; what widens it, from the few speeds alone.
+    """
     if fit.dof < 2 or not math.isfinite(fit.chi2_dof):
-        return 1.0
-    return fit.chi2_dof if fit.chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / fit.dof) else 1.0
+        return 1.0, math.inf
+    wide = fit.chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / fit.dof)
+    return (fit.chi2_dof, float(fit.dof)) if wide else (1.0, math.inf)
 
 
 def _instrument_shares(

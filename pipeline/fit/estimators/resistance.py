@@ -121,11 +121,13 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
     estimates = {}
     for k, name in enumerate(names):
         u = math.sqrt(max(float(covariance[k, k]), 0.0))
-        parts = [Contribution(f"scatter:{NAME}:{name}", u, "A"), *shared[k]]
+        parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", fit.dof), *shared[k]]
         parts += allowances[name]
         estimates[name] = _estimate(name, float(values[k]), parts, points, used, notes)
     if size == 3:
-        estimates["resistance_imbalance"] = _imbalance(names, values, covariance, points, used)
+        estimates["resistance_imbalance"] = _imbalance(
+            names, values, covariance, fit.dof, points, used
+        )
     return Fit(
         tuple(estimates.get(n) or _absent(n) for n in GIVES), (_evidence(points, fit.residuals),)
     )
@@ -199,6 +201,7 @@ def _imbalance(
     names: Sequence[str],
     values: Array,
     covariance: Array,
+    dof: float,
     points: Sequence[Point],
     captures: Sequence[Capture],
 ) -> Estimate:
@@ -213,7 +216,7 @@ def _imbalance(
     top, low = rows[int(phases.argmax())], rows[int(phases.argmin())]
     spread = covariance[top, top] + covariance[low, low] - 2.0 * covariance[top, low]
     u = RANGE_OF_THREE * math.sqrt(max(float(spread), 0.0)) / mean
-    part = Contribution(f"scatter:{NAME}:resistance_imbalance", u, "A")
+    part = Contribution(f"scatter:{NAME}:resistance_imbalance", u, "A", dof)
     value = float(np.ptp(phases)) / mean
     note = "read high by chance where the phases differ by less than u"
     return _estimate("resistance_imbalance", value, [part], points, captures, [note])

@@ -61,7 +61,7 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
 
     used = captures_of(campaign, points)
     shared = contributions(evaluate, instrument_uncertainties(used))[0]
-    scatter = Contribution(f"scatter:{NAME}:{GIVEN}", fit.u_alpha_1_k, "A")
+    scatter = Contribution(f"scatter:{NAME}:{GIVEN}", fit.u_alpha_1_k, "A", fit.dof)
     temps = [p.temp_degc for p in points]
     estimate = Estimate(
         GIVEN,

@@ -19,6 +19,9 @@ from tests.unit.fit.signals import capture, estimates
 # Open circuit
 
 
+SPEEDS = ((60.0, 120.0), (-60.0, -120.0), (50.0, 100.0))
+
+
 def spin_capture(speeds, *, p=5, psi=4e-3, wobble=0.0, swap=False, temp=25.0, h5=0.03, seed=0):
     """Flux psi (cos e + h5/5 cos 5e + 0.01/7 cos 7e) of each phase, differentiated by hand."""
     rng = np.random.default_rng(seed)
@@ -83,6 +86,15 @@ def test_a_magnet_temperature_that_stops_early_is_held():
     short = replace(whole, tables=(table,), meta=replace(whole.meta, ambient_degc=20.0))
     one, other = (estimates(open_circuit.ESTIMATOR, c)["psi_pm_wb"] for c in (short, whole))
     assert one.number == pytest.approx(other.number, rel=1e-9)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-3])
+def test_speeds_that_disagree_have_the_freedom_of_their_number(apart):
+    """Two speeds a capture, whose fluxes differ beyond their noise or do not."""
+    captures = [spin_capture(s, psi=4e-3 * (1 + k * apart), seed=7) for k, s in enumerate(SPEEDS)]
+    psi = estimates(open_circuit.ESTIMATOR, *captures)["psi_pm_wb"]
+    dof = next(p.dof for p in psi.budget if p.source == "scatter:open_circuit:psi")
+    assert dof == (2 * len(SPEEDS) - 1 if apart else math.inf)
 
 
 def test_a_gear_is_no_pole_pair_count():

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from pipeline.fit.estimators import (
@@ -93,6 +95,17 @@ def test_an_inverters_drop_that_is_not_told_adds_up_over_the_pairs():
     read = estimates(resistance.ESTIMATOR, *moved)
     for name, u in expected.items():
         assert read[name].number - found[name].number == pytest.approx(u, rel=1e-2)
+
+
+@pytest.mark.parametrize(("contact_v", "dof"), [(0.0, math.inf), (0.01, 9.0)])
+def test_scatter_between_plateaus_has_the_plateaus_freedom(contact_v, dof):
+    """Twelve plateaus less R, offset and V0, where contacts make them differ; else their rows'."""
+    levels = (1.0, -1.0, 1.5, -1.5, 2.0, -2.0) * 2
+    whole = dc_capture("ab", 1.0, levels=levels)
+    jitter = contact_v * np.random.default_rng(1).standard_normal(len(levels) + 1)
+    table = whole.tables[0].with_columns(pl.col("vab_v") + np.repeat(jitter, 200))
+    found = estimates(resistance.ESTIMATOR, replace(whole, tables=(table,)))["r_ab_ohm"]
+    assert next(p.dof for p in found.budget if p.source == "scatter:resistance:r_ab_ohm") == dof
 
 
 def test_no_plateau_names_the_experiment():

@@ -77,3 +77,15 @@ def test_a_short_cycle_of_one_pole_pair_is_told_where_the_voltage_is_clean():
     """Noise of 0.1 mV: 25 degrees short is seen at every start angle."""
     for run in all_starts(1, turns=0.93, noise_v=1e-4):
         assert run["pole_pairs"].status == "not_identifiable"
+
+
+@pytest.mark.parametrize("p", [7, 14])
+def test_one_voltage_has_the_freedom_of_its_own_rows(p):
+    """Its scatter is seen in hundreds of rows, so 95 % are two u and not the 13 of one difference.
+
+    Four of 24 turns outside would be three chances in a hundred.
+    """
+    fluxes = [run["psi_pm_wb"] for run in all_starts(p, noise_v=3e-3)]
+    ends = [psi.interval() for psi in fluxes]
+    assert all(high - low < 6.0 * psi.u for psi, (low, high) in zip(fluxes, ends, strict=True))
+    assert sum(low <= PSI <= high for low, high in ends) > STARTS - 4
