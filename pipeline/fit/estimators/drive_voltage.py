@@ -17,6 +17,7 @@ from pipeline.fit.instruments import (
     unstated_note,
     voltage_source,
 )
+from pipeline.fit.magnet_coefficient import magnet_coefficient
 from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.clusters import cluster_covariance
@@ -24,12 +25,13 @@ from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, lin
 from pipeline.numerics.plateaus import decimated
 from pipeline.numerics.selection import needed_columns
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed, weak_rows
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Contribution
+from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 
@@ -41,8 +43,6 @@ EXPERIMENT = (
 )
 WIDTHS_S = (0.03, 0.1)
 CLUSTER_S = 0.25
-COPPER_1_K = 1.0 / 259.5
-MAGNET_1_K = -0.0011
 U_UNKNOWN_K = 15.0
 HOLD = "assumed:voltage_hold"
 D_FLUX = "d flux"
@@ -84,8 +84,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     rows = _rows(campaign.of("drive"), pole_pairs_of(known, campaign.nameplate("pole_pairs")))
     if rows is None or rows.voltage_v.size < 20 or float(np.ptp(rows.speed_rad_s)) == 0.0:
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, EXPERIMENT) for n in GIVES))
-    alpha = known.best("temp_coeff_magnet_1_k")
-    magnet = MAGNET_1_K if alpha is None else alpha.number
+    magnet, magnet_parts = magnet_coefficient(known)
     chosen = _chosen(rows, magnet, options["level"])
     design = _design(rows, magnet, chosen, {})
     found = linear_fit(design, rows.voltage_v)
@@ -94,7 +93,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
     ones = np.ones(rows.voltage_v.size)
     covariance, dof = cluster_covariance(design, found.residuals, ones, rows.cluster)
-    estimates = _estimates(rows, found, covariance, dof, magnet, chosen)
+    estimates = _estimates(rows, found, covariance, dof, (magnet, magnet_parts), chosen)
     return Fit(estimates, _evidence(rows, found))
 
 
@@ -215,7 +214,10 @@ def _design(
     rows: VoltageRows, magnet: float, chosen: Sequence[str], shift: Mapping[str, float]
 ) -> Array:
     _, current, warmer = _gains(rows, shift)
-    cold = rows.current_a * (1.0 + COPPER_1_K * warmer) + COPPER_1_K * rows.warm_current_k_a
+    cold = (
+        rows.current_a * (1.0 + COPPER_COEFFICIENT_25_1_K * warmer)
+        + COPPER_COEFFICIENT_25_1_K * rows.warm_current_k_a
+    )
     speed = rows.speed_rad_s * (1.0 + magnet * warmer) + magnet * rows.warm_speed_k_rad_s
     extra = [rows.columns[name] for name in chosen]
     columns = [speed, cold * current, rows.columns["inductive"] * current, rows.columns["drop"]]
@@ -240,22 +242,26 @@ def _estimates(
     found: LinearFit,
     covariance: Array,
     dof: int,
-    magnet: float,
+    coefficient: tuple[float, Budget],
     chosen: Sequence[str],
 ) -> tuple[Estimate, ...]:
+    magnet, magnet_parts = coefficient
+
     def values(shift: Mapping[str, float]) -> Array:
         voltage = _gains(rows, shift)[0] * rows.voltage_v
-        return linear_fit(_design(rows, magnet, chosen, shift), voltage).coefficients[:2]
+        warm = magnet + shift.get("magnet", 0.0)
+        return linear_fit(_design(rows, warm, chosen, shift), voltage).coefficients[:2]
 
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
+    per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = tuple(sorted(c.path for c in rows.captures))
     words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
     if chosen:
         words.append(f"the data also demand {', '.join(chosen)}")
     unstated = unstated_note(rows.captures, ("voltage", "current"))
     words += [unstated] if unstated else []
-    coefficient = {GIVES[0]: abs(magnet), GIVES[1]: COPPER_1_K}
+    per_kelvin = {GIVES[0]: abs(magnet), GIVES[1]: COPPER_COEFFICIENT_25_1_K}
     place = {GIVES[0]: "temp_magnet_degc", GIVES[1]: "temp_winding_degc"}
     estimates = []
     for i, name in enumerate(GIVES):
@@ -265,9 +271,10 @@ def _estimates(
             estimates.append(not_identifiable(name, _unit(name), NAME, note))
             continue
         parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof), *type_b[i]]
+        parts += propagate([(float(per_alpha[i]), magnet_parts)])
         note = "; ".join(words)
         if not all(c.has(place[name]) for c in rows.captures):
-            unsure = value * coefficient[name] * U_UNKNOWN_K
+            unsure = value * per_kelvin[name] * U_UNKNOWN_K
             parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))
             note += f"; {place[name]} not logged, taken as 25 ± {U_UNKNOWN_K:g} K"
         if i == 0:

@@ -16,6 +16,7 @@ from pipeline.fit.instruments import (
     unstated_note,
     voltage_source,
 )
+from pipeline.fit.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.terminals import first_temperature
 from pipeline.numerics.plateaus import decimated
@@ -27,7 +28,9 @@ from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import (
     Contribution,
     effective_dof,
+    propagate,
     standard_uncertainty,
+    type_b,
 )
 
 NAME = "hand_turn"
@@ -37,7 +40,6 @@ EXPERIMENT = (
     "record a hand_turn: terminals open, shaft turned by hand through exactly one turn from rest "
     "to rest, a line voltage, theta_mech_rad if there is a sensor"
 )
-MAGNET_SOURCE = "assumed:temp_coeff_magnet_1_k"
 TURN = 2.0 * math.pi
 Array = NDArray[np.float64]
 
@@ -118,11 +120,10 @@ def _flux(
         spread = math.sqrt(float(share @ (np.array(values) - value) ** 2) / (len(values) - 1))
         u, dof = max((u, dof), (spread, len(values) - 1.0))
     excess = float(share @ np.array(excesses))
-    u_alpha = options["u_alpha_assumed_1_k"] if coefficient is None else coefficient.u
-    parts = [
-        Contribution(f"scatter:{NAME}:psi", u, "A", dof),
-        Contribution(MAGNET_SOURCE, -value * excess * u_alpha, "B"),
-    ]
+    assumed = type_b(SOURCE, options["u_alpha_assumed_1_k"])
+    of_alpha = assumed if coefficient is None else coefficient.budget
+    parts = [Contribution(f"scatter:{NAME}:psi", u, "A", dof)]
+    parts += propagate([(-value * excess, of_alpha)])
     for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
         mine = [voltage_source(c.meta) == source for c, _ in turns]
         parts.append(Contribution(source, value * gain * float(share[mine].sum()), "B"))
@@ -170,7 +171,7 @@ ESTIMATOR = Estimator(
     rank=1,
     options={
         "temp_assumed_degc": 25.0,
-        "alpha_assumed_1_k": -0.0011,
-        "u_alpha_assumed_1_k": 4e-4,
+        "alpha_assumed_1_k": USUAL_1_K,
+        "u_alpha_assumed_1_k": U_USUAL_1_K,
     },
 )

@@ -15,6 +15,7 @@ from pipeline.fit.instruments import (
     instrument_uncertainties,
     unstated_note,
 )
+from pipeline.fit.magnet_coefficient import magnet_coefficient
 from pipeline.fit.operating_points import Point, operating_points, pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign, Capture
@@ -32,7 +33,6 @@ EXPERIMENT = (
     "rated, at zero d current and at rated d current"
 )
 FRAME = "assumed:frame_angle"
-MAGNET_COEFFICIENT_1_K = -0.0011
 HOLD = "assumed:voltage_hold"
 
 
@@ -67,8 +67,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         why = "pole pairs unknown" if points else "no settled points with voltages"
         note = f"{why}; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, "H", NAME, note) for n in GIVES))
-    alpha = known.best("temp_coeff_magnet_1_k")
-    magnet = MAGNET_COEFFICIENT_1_K if alpha is None else alpha.number
+    magnet = magnet_coefficient(known)[0]
     words = f"{table.note()}; {_timing_words(captures)}"
     points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
     fluxes = flux_pairs(points, pairs)

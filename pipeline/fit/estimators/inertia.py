@@ -25,6 +25,7 @@ from pipeline.fit.instruments import (
     torque_source,
     unstated_note,
 )
+from pipeline.fit.magnet_coefficient import magnet_coefficient
 from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
@@ -49,7 +50,6 @@ LONGER = (
     "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
     "with iq_a and theta_mech_rad"
 )
-MAGNET_COEFFICIENT_1_K = -0.0011
 NUISANCES = (
     "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
     "d current sin", "q current cubed", "d squared q current", "d q current cubed",
@@ -66,6 +66,7 @@ class Torque:
     reluctance_nm_a2: float
     reluctance_budget: Budget
     magnet_1_k: float
+    magnet_budget: Budget
     words: str
 
 
@@ -108,21 +109,20 @@ def _torque(known: Constants) -> Torque | None:
     kt = torque_constant(known)
     if kt is None:
         return None
-    alpha = known.best("temp_coeff_magnet_1_k")
-    magnet = MAGNET_COEFFICIENT_1_K if alpha is None else alpha.number
+    magnet = magnet_coefficient(known)
     words = f"torque constant from {kt.method}"
     reluctance = known.best("kt_reluctance_nm_a2")
     if reluctance is not None:
         return Torque(
-            kt.number, kt.budget, reluctance.number, reluctance.budget, magnet, words
+            kt.number, kt.budget, reluctance.number, reluctance.budget, *magnet, words
         )  # fmt: skip
     ld, lq, pairs = known.best("ld_h"), known.best("lq_h"), known.best("pole_pairs")
     if ld is not None and lq is not None and pairs is not None:
         scale = 1.5 * pairs.number
         budget = propagate([(scale, ld.budget), (-scale, lq.budget)])
         value = scale * (ld.number - lq.number)
-        return Torque(kt.number, kt.budget, value, budget, magnet, words)
-    return Torque(kt.number, kt.budget, 0.0, (), magnet, f"{words}, reluctance torque unknown")
+        return Torque(kt.number, kt.budget, value, budget, *magnet, words)
+    return Torque(kt.number, kt.budget, 0.0, (), *magnet, f"{words}, reluctance torque unknown")
 
 
 def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -141,9 +141,10 @@ def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> 
     warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])[rows.capture]
     kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
     reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
+    magnet = torque.magnet_1_k + shift.get("magnet", 0.0)
     warm = rows.warm_current_k_a + rows.q_current_a * warmer
     driven: Array = (
-        kt * current * (rows.q_current_a + torque.magnet_1_k * warm)
+        kt * current * (rows.q_current_a + magnet * warm)
         + reluctance * current**2 * rows.product_a2
         - load * rows.load_nm
     )
@@ -159,6 +160,7 @@ def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimat
     per_kt = (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a)
     step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
     per_rel = (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step)
+    per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     constants, scatter = found.constants(found.coefficients), found.scatter()
     paths = tuple(sorted(c.path for c in rows.captures))
     note = _note(rows, torque, found)
@@ -179,6 +181,7 @@ def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimat
                 (1.0, (*parts, *type_b[i])),
                 (float(per_kt[i]), torque.kt_budget),
                 (float(per_rel[i]), torque.reluctance_budget),
+                (float(per_alpha[i]), torque.magnet_budget),
             ]
         )
         value = float(constants[i])

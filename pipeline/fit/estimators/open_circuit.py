@@ -21,6 +21,7 @@ from pipeline.fit.instruments import (
     unstated_note,
     voltage_source,
 )
+from pipeline.fit.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.spin_angle import METHOD, Group, angle_offset, count_pole_pairs
 from pipeline.fit.terminals import first_temperature
@@ -39,7 +40,6 @@ EXPERIMENT = (
     "theta_mech_rad, temp_magnet_degc"
 )
 WARM = "repeat an open_circuit capture with the magnets at least 10 K warmer, temp_magnet_degc in"
-MAGNET_SOURCE = "assumed:temp_coeff_magnet_1_k"
 ORDERS = (5, 7, 11, 13)
 KE_NAMES: tuple[CouplingName, ...] = (
     "ke_phase_peak_v_s_rad",
@@ -179,7 +179,7 @@ def _flux_estimates(
         value, chosen = float(fixed.coefficients[0]), fixed
         weight = 1.0 / sigma**2
         lever = float(np.sum(weight * excess * factor) / np.sum(weight * factor**2))
-        extra = [Contribution(MAGNET_SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
+        extra = [Contribution(SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
         words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
     widened, dof = _birge(chosen)
     parts = [Contribution(f"scatter:{NAME}:psi", chosen.u(0) * math.sqrt(widened), "A", dof)]
@@ -326,7 +326,7 @@ ESTIMATOR = Estimator(
         "temp_assumed_degc": 25.0,
         "least_span_k": 8.0,
         "worst_u_alpha_1_k": 3e-4,
-        "alpha_assumed_1_k": -0.0011,
-        "u_alpha_assumed_1_k": 4e-4,
+        "alpha_assumed_1_k": USUAL_1_K,
+        "u_alpha_assumed_1_k": U_USUAL_1_K,
     },
 )

@@ -14,6 +14,7 @@ from pipeline.fit.instruments import (
     instrument_uncertainties,
     unstated_note,
 )
+from pipeline.fit.magnet_coefficient import SOURCE, magnet_coefficient
 from pipeline.fit.operating_points import Point, PointTable, operating_points, pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.torque_slope import Slope, slope_without_d
@@ -24,7 +25,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Contribution, propagate
+from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 
@@ -43,11 +44,8 @@ EXPERIMENT = (
     "record a torque_map: the dynamometer holds a speed while positive and negative q currents "
     "are stepped, at two or more d currents, in both senses of rotation"
 )
-MAGNET_COEFFICIENT_1_K = -0.0011
-U_MAGNET_COEFFICIENT_1_K = 0.0005
 FORM_SHARE = 0.1
 BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
-ASSUMED_COEFFICIENT = "assumed:temp_coeff_magnet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,19 +96,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if len(points) < groups + 3 or np.ptp([p.iq_a for p in points]) == 0.0:
         note = f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
-    alpha, alpha_parts = _magnet_coefficient(known)
+    alpha, alpha_parts = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
     estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts)
     return Fit(estimates, _evidence(points, model, alpha, chosen))
-
-
-def _magnet_coefficient(known: Constants) -> tuple[float, tuple[Contribution, ...]]:
-    found = known.best("temp_coeff_magnet_1_k")
-    if found is not None:
-        return found.number, found.budget
-    assumed = Contribution(ASSUMED_COEFFICIENT, U_MAGNET_COEFFICIENT_1_K, "B")
-    return MAGNET_COEFFICIENT_1_K, (assumed,)
 
 
 def _base(points: Sequence[Point], alpha_1_k: float) -> tuple[list[str], Array]:
@@ -188,20 +178,20 @@ def _estimates(
     model: Regression,
     chosen: Sequence[str],
     alpha: float,
-    alpha_parts: Sequence[Contribution],
+    alpha_parts: Budget,
 ) -> tuple[Estimate, ...]:
     gains = instrument_uncertainties(captures, ("current", "torque", "temperature"))
 
     def values(shift: Mapping[str, float]) -> Array:
         shifted = [p.shifted(shift) for p in points]
-        again = _regress(shifted, alpha + shift.get(ASSUMED_COEFFICIENT, 0.0), chosen)
-        bent = _slope(shifted, alpha + shift.get(ASSUMED_COEFFICIENT, 0.0), chosen, again)
+        again = _regress(shifted, alpha + shift.get(SOURCE, 0.0), chosen)
+        bent = _slope(shifted, alpha + shift.get(SOURCE, 0.0), chosen, again)
         return np.array([bent.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
 
     slope_k = _slope(points, alpha, chosen, model)
     type_b = contributions(values, gains)
-    slope = float((values({ASSUMED_COEFFICIENT: 1e-4}) - values({}))[0]) / 1e-4
-    type_b[0] += propagate([(slope, tuple(alpha_parts))])
+    slope = float((values({SOURCE: 1e-4}) - values({}))[0]) / 1e-4
+    type_b[0] += propagate([(slope, alpha_parts)])
     type_b[0].append(Contribution("assumed:torque_form", slope_k.form_nm_a, "B"))
     note = _note(captures, table, points, chosen)
     paths = tuple(sorted({p.capture.path for p in points}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -11,6 +12,8 @@ import pytest
 from pipeline.fit.estimators.hand_turn import ESTIMATOR
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import type_b
 
 PSI = 5e-3
 STARTS = 24
@@ -89,3 +92,17 @@ def test_one_voltage_has_the_freedom_of_its_own_rows(p):
     ends = [psi.interval() for psi in fluxes]
     assert all(high - low < 6.0 * psi.u for psi, (low, high) in zip(fluxes, ends, strict=True))
     assert sum(low <= PSI <= high for low, high in ends) > STARTS - 4
+
+
+def test_a_measured_magnet_coefficient_stays_the_same_error():
+    """Turned at 45 degC: 20 K of the coefficient's own errors, and nothing assumed beside them."""
+    turn = by_hand(7, 0.3)
+    warm = replace(turn, meta=replace(turn.meta, ambient_degc=45.0))
+    coefficient = Estimate(
+        "temp_coeff_magnet_1_k", -0.0011, "1/K", "measured", "given", type_b("x", 1e-5)
+    )
+    fit = ESTIMATOR.fit(Campaign("m", (warm,)), Constants((coefficient,)), dict(ESTIMATOR.options))
+    psi = next(e for e in fit.estimates if e.name == "psi_pm_wb")
+    parts = {part.source: part.u for part in psi.budget}
+    assert parts["x"] == pytest.approx(-20.0 * 1e-5 * psi.number)
+    assert not any(source.startswith("assumed:") for source in parts)

@@ -17,6 +17,7 @@ from pipeline.fit.estimators.inductance_rated import ESTIMATOR as INDUCTANCE_RAT
 from pipeline.fit.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.fit.estimators.spin_down import ESTIMATOR as SPIN_DOWN
 from pipeline.fit.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.fit.magnet_coefficient import SOURCE, U_USUAL_1_K
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.orders import OrderLine, Spectrum, half_peak_to_peak
 from pipeline.records.capture import Campaign
@@ -74,25 +75,6 @@ def test_torque_constant_and_reluctance() -> None:
     shares = {part.source: part.u / kt.number for part in kt.budget}
     assert shares["torque@sim-1"] == pytest.approx(0.002, rel=1e-6)
     assert shares["current@sim-1"] == pytest.approx(-0.002, rel=1e-3)
-
-
-def test_torque_constant_at_25_degrees() -> None:
-    """At 60 degC the magnet has lost 3.85 %; the constant of 25 degC is what is published."""
-    motor = replace(design("gimbal-5208"), effects={})
-    warm = {"temp_magnet_degc": 60.0}
-    plan = (("hot", "torque_map", warm), ("back", "torque_map", {**warm, "speed": -0.3}))
-    captures = campaign_of(campaign(motor, EXACT_BENCH, 1, plan))
-    coefficient = Estimate(
-        "temp_coeff_magnet_1_k", -0.0011, "1/K", "measured", "given", type_b("x", 1e-5)
-    )
-    known = Constants((coefficient,))
-    kt = fitted(TORQUE_MAP, captures, known).estimates[0]
-    truth = 1.5 * motor.pole_pairs * motor.psi_pm_wb
-    assert kt.number == pytest.approx(truth, rel=5e-4)
-    assert next(p.u for p in kt.budget if p.source == "x") != 0.0
-    assumed = fitted(TORQUE_MAP, captures).estimates[0]
-    share = next(p.u for p in assumed.budget if p.source == "assumed:temp_coeff_magnet")
-    assert abs(share) / truth == pytest.approx(35.0 * 5e-4 / (1 - 0.0385), rel=0.05)
 
 
 def test_saturation_does_not_bend_the_torque_constant() -> None:
@@ -414,16 +396,19 @@ def test_drag_of_another_form_is_not_called_viscous() -> None:
 
 
 def test_back_emf_constant_from_a_drive() -> None:
+    """One log at 25, one at 42 degC: what is assumed of the magnet is in u until it is measured."""
     motor = design("gimbal-5208")
-    known = chain(recorded(), DRIVE_VOLTAGE)
-    ke = known.best("ke_phase_peak_v_s_rad")
-    assert ke is not None
-    low, high = ke.interval()
-    assert low <= motor.pole_pairs * motor.psi_pm_wb <= high
-    assert ke.u < 0.003 * ke.number
-    assert number(known, "drive_voltage", "r_phase_ohm") == pytest.approx(
-        motor.r_phase_ohm, rel=0.02
+    coefficient = Estimate(
+        "temp_coeff_magnet_1_k", -0.0011, "1/K", "measured", "given", type_b("x", 1e-5)
     )
+    for given, source in ((Constants((coefficient,)), "x"), (Constants(), SOURCE)):
+        ke, r_phase = fitted(DRIVE_VOLTAGE, recorded(), given).estimates
+        low, high = ke.interval()
+        assert low <= motor.pole_pairs * motor.psi_pm_wb <= high
+        share = next(p.u for p in ke.budget if p.source == source)
+        assert ke.u < 0.003 * ke.number or source == SOURCE
+        assert abs(share) > 5.0 * (1e-5 if source == "x" else U_USUAL_1_K) * ke.number
+        assert r_phase.number == pytest.approx(motor.r_phase_ohm, rel=0.02)
 
 
 def test_angle_counts_where_the_bench_lags() -> None:
