@@ -31,12 +31,17 @@ class Failure(NamedTuple):
     remedy: str
 
 
+def homes() -> Mapping[str, str]:
+    """The module of every estimator of the room, by the estimator's name."""
+    names = sorted(m.name for m in pkgutil.iter_modules(estimators_room.__path__))
+    places = [f"{estimators_room.__name__}.{name}" for name in names]
+    return {importlib.import_module(place).ESTIMATOR.name: place for place in places}
+
+
 @cache
 def estimators() -> tuple[Estimator, ...]:
     """Every estimator of the room, ordered so that each comes after those it uses."""
-    names = sorted(m.name for m in pkgutil.iter_modules(estimators_room.__path__))
-    modules = [importlib.import_module(f"{estimators_room.__name__}.{name}") for name in names]
-    found = {module.ESTIMATOR.name: module.ESTIMATOR for module in modules}
+    found = {name: importlib.import_module(place).ESTIMATOR for name, place in homes().items()}
     givers: dict[str, list[str]] = {}
     for estimator in found.values():
         for constant in estimator.gives:

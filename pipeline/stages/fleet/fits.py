@@ -1,8 +1,9 @@
 """Fits of one motor that need not be done again while nothing that they were made from changes.
 
-A fit hangs on the estimator's own source and all that it imports, on its options, on the captures
-as they were read and judged, and on the constants that the estimator declares to use. So a changed
-estimator is fitted again with those that use what it gives, if that has changed, and no other.
+A fit hangs on the source of the estimator's file and all that it imports, on its options, on the
+captures as they were read and judged, and on the constants that the estimator declares to use. So a
+changed estimator is fitted again with those that use what it gives, if that has changed, and no
+other.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.registry import homes
 from pipeline.io.code_version import closure_digest, rooms_digest
 from pipeline.io.publish import write_whole
 from pipeline.records.capture import Campaign
@@ -40,6 +42,7 @@ class FitMemory:
     def __init__(self, output: Path, campaign: Campaign, gates: Mapping[str, Any]) -> None:
         self._path = output / FOLDER / "fits" / f"{file_stem(campaign.motor_id)}.fits"
         self._kept = _load(self._path)
+        self._homes = homes()
         self._used: dict[str, tuple[str, bytes, bytes]] = {}
         inputs = [
             [c.path, c.sha256, c.integrity, asdict(c.meta), [m.dropped for m in c.masks]]
@@ -56,7 +59,7 @@ class FitMemory:
     ) -> Fit:
         """The fit that is kept, or a new one."""
         uses = [repr(estimate) for estimate in known.estimates]
-        code = closure_digest(estimator.fit.__module__)
+        code = closure_digest(self._homes.get(estimator.name, estimator.fit.__module__))
         key = digest_of(self._campaign, code, dict(options), uses)
         kept = self._kept.get(estimator.name)
         if kept is not None and kept[0] == key:
