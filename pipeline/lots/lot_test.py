@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import nctdtr, stdtr, stdtrit
 
 Array = NDArray[np.float64]
-MIN_LOTS = 8
 
 
 class Tested(NamedTuple):

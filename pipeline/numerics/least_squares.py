@@ -1,8 +1,7 @@
 """Linear and nonlinear least squares with honest standard errors.
 
 Residuals of a bench are often correlated (filters, drift, quantisation), which a plain covariance
-ignores: `autocorrelation_time` says how many samples count as one, `hac_covariance` gives the
-sandwich that holds whatever the colour.
+ignores: `autocorrelation_time` says how many samples count as one.
 """
 
 from __future__ import annotations
@@ -90,27 +89,6 @@ def autocorrelation_time(residuals: Array, longest: int | None = None) -> float:
     ends = np.flatnonzero(pairs <= 0.0)
     stop = int(ends[0]) if ends.size else pairs.size
     return max(1.0, float(2.0 * pairs[:stop].sum() - 1.0))
-
-
-def hac_covariance(design: Array, residuals: Array, lags: int | None = None) -> Array:
-    """Covariance [k, k] of least-squares coefficients under any stationary correlation.
-
-    bread (X'X)^-1, meat = sum of lagged scores with Bartlett weights, `lags` by default
-    4 (n/100)^(2/9). References: Newey and West, Econometrica 55(3), 1987.
-    """
-    n, k = design.shape
-    lags = int(4.0 * (n / 100.0) ** (2.0 / 9.0)) if lags is None else lags
-    scale = np.linalg.norm(design, axis=0)
-    scale[scale == 0.0] = 1.0
-    scaled = design / scale
-    bread = np.linalg.pinv(scaled.T @ scaled)
-    score = scaled * residuals[:, None]
-    meat = score.T @ score
-    for lag in range(1, min(lags, n - 1) + 1):
-        cross = score[lag:].T @ score[:-lag]
-        meat = meat + (1.0 - lag / (lags + 1.0)) * (cross + cross.T)
-    covariance: Array = bread @ meat @ bread / np.outer(scale, scale) * (n / max(n - k, 1))
-    return covariance
 
 
 @dataclass(frozen=True, slots=True)

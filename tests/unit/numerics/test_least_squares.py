@@ -8,7 +8,6 @@ import pytest
 from pipeline.numerics.least_squares import (
     autocorrelation_time,
     gauss_newton,
-    hac_covariance,
     linear_fit,
 )
 from pipeline.numerics.selection import needed_columns
@@ -97,17 +96,3 @@ def test_autocorrelation_time_of_first_order_noise(phi, expected):
     for k in range(1, noise.size):
         noise[k] += phi * noise[k - 1]
     assert autocorrelation_time(noise) == pytest.approx(expected, rel=0.12)
-
-
-def test_hac_standard_error_holds_under_correlation():
-    """The spread over 300 draws of a mean in AR(1) noise, against the mean sandwich."""
-    rng = np.random.default_rng(5)
-    design = np.ones((2000, 1))
-    means, errors = [], []
-    for _ in range(300):
-        noise = rng.standard_normal(2000)
-        for k in range(1, 2000):
-            noise[k] += 0.6 * noise[k - 1]
-        means.append(noise.mean())
-        errors.append(np.sqrt(hac_covariance(design, noise - noise.mean(), lags=30)[0, 0]))
-    assert np.std(means) == pytest.approx(np.mean(errors), rel=0.15)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.numerics.harmonics import harmonic_fit, hermite, whole_cycles
+from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.plateaus import block_means, find_plateaus, white_noise_sigma
 
 
@@ -46,16 +46,6 @@ def test_noise_of_a_drifting_stepped_signal():
 
 def test_block_means_drop_the_rest():
     assert block_means(np.arange(7.0), 3).tolist() == [1.0, 4.0]
-
-
-def test_harmonics_off_a_whole_turn():
-    angle = np.linspace(0.0, 7.3, 900)
-    y = 0.4 + 1.5 * np.cos(3 * angle - 0.7) + 0.2 * np.sin(8 * angle)
-    y = y + 0.05 * np.random.default_rng(4).standard_normal(900)
-    fit = harmonic_fit(angle, y, (3, 8))
-    assert fit.amplitude(3) == pytest.approx(1.5, abs=4 * fit.u_amplitude(3))
-    assert fit.amplitude(8) == pytest.approx(0.2, abs=4 * fit.u_amplitude(8))
-    assert fit.u_amplitude(3) == pytest.approx(0.05 * math.sqrt(2 / 900), rel=0.4)
 
 
 def test_cuts_hold_whole_cycles():
