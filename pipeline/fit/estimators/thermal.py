@@ -17,7 +17,12 @@ from pipeline.fit.heat_record import (
     read_heat,
     reference_resistance,
 )
-from pipeline.fit.instruments import budget_of, current_source, temperature_source
+from pipeline.fit.instruments import (
+    budget_of,
+    current_source,
+    temperature_source,
+    voltage_source,
+)
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.least_squares import (
     LinearFit,
@@ -31,7 +36,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Contribution
+from pipeline.records.uncertainty import Contribution, propagate, type_b
 
 NAME = "thermal"
 GIVEN = "rth_winding_k_w"
@@ -244,7 +249,7 @@ def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
 
 
 def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Constants) -> Estimate:
-    """Budget: the loss by the gains of R and i², the rise by the thermometer.
+    """Budget: the loss by the errors of R and i², or of v and i; the rise by the thermometer.
 
     A thermometer's offset leaves the loss alone, for R25 is low by what R(T) of it is high, and
     the rise as well where it measured the ambient too.
@@ -252,14 +257,15 @@ def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Const
     meta = record.capture.meta
     rth = balance.rth_k_w
     thermometer = temperature_source(meta)
-    gains = {current_source(meta): 2.0 * (meta.u_rel_current or 0.0)}
+    current = type_b(current_source(meta), meta.u_rel_current or 0.0)
     resistance = reference_resistance(record, known)
-    if resistance is not None:
-        for part in resistance.budget:
-            if part.source != thermometer:
-                gains[part.source] = gains.get(part.source, 0.0) + part.u / resistance.number
-    parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof)]
-    parts += [Contribution(source, -rth * u, "B") for source, u in gains.items()]
+    if resistance is None:
+        volts = type_b(voltage_source(meta), meta.u_rel_voltage or 0.0)
+        loss = propagate([(-rth, volts), (-rth, current)])
+    else:
+        others = tuple(part for part in resistance.budget if part.source != thermometer)
+        loss = propagate([(-2.0 * rth, current), (-rth / resistance.number, others)])
+    parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof), *loss]
     rise = float(record.temp_winding_degc.max()) - float(ambient[0])
     if record.temp_ambient_degc is None and rise > 0.0:
         parts.append(Contribution(thermometer, rth * (meta.u_temp_degc or 0.0) / rise, "B"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -12,6 +14,7 @@ from pipeline.fit.estimators import (
 )
 from pipeline.records.capture import Capture
 from pipeline.records.constants import Constants
+from pipeline.records.uncertainty import type_a
 from tests.recovery.cases_electrical import LONG_HEAT
 from tests.recovery.simulated import recorded
 from tests.unit.fit.signals import capture, estimates, known_value
@@ -105,6 +108,24 @@ def test_thermal_resistance_of_one_time_constant():
     table = short.tables[0].head(600)
     brief = Capture("short", "0" * 64, "verified", short.meta, (table,))
     assert estimates(thermal.ESTIMATOR, brief)["rth_winding_k_w"].status == "not_identifiable"
+
+
+def test_the_loss_carries_what_it_was_made_of():
+    """By v i alone: both gains once. By a known R: the current's twice, R's scatter as scatter."""
+    run = heat_capture(kind="measured", alpha=0.0)
+    alone = estimates(thermal.ESTIMATOR, run)["rth_winding_k_w"]
+    parts = {part.source: part for part in alone.budget}
+    assert parts["voltage@s"].u == pytest.approx(-0.001 * alone.number)
+    assert parts["current@s"].u == pytest.approx(-0.002 * alone.number)
+    reference = replace(
+        known_value("r_phase_ohm", 0.4, 0.0, "ohm", "resistance"), budget=type_a("contacts", 0.004)
+    )
+    known = Constants((reference,))
+    found = estimates(thermal.ESTIMATOR, run, known=known)["rth_winding_k_w"]
+    parts = {part.source: part for part in found.budget}
+    assert parts["current@s"].u == pytest.approx(-0.004 * found.number)
+    assert parts["contacts"].u == pytest.approx(-0.01 * found.number)
+    assert parts["contacts"].kind == "A"
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0.1, 0.19), (0.02, 0.06)])
