@@ -132,6 +132,8 @@ class Capture:
         for index, other in enumerate(self.tables):
             if name in other.columns and "t_s" in other.columns and "t_s" in table.columns:
                 keep = self.kept(index) & np.isfinite(other[name].to_numpy())
+                if not keep.any():
+                    return np.full(table.height, np.nan)
                 moved: Array = np.interp(
                     table["t_s"].to_numpy(),
                     other["t_s"].to_numpy()[keep],
