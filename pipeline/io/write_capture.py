@@ -13,7 +13,7 @@ import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -126,7 +126,9 @@ def _start_ns(meta: Mapping[str, str]) -> int:
     stated = meta.get("started_at")
     if stated is None:
         return 0
-    return round(datetime.fromisoformat(stated).timestamp()) * NANOSECONDS
+    moment = datetime.fromisoformat(stated)
+    in_utc = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    return round(in_utc.timestamp()) * NANOSECONDS
 
 
 def _blocks(table: Table, rows: int) -> Iterator[tuple[int, dict[str, NDArray[np.float64]]]]:

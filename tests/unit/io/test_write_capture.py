@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import math
 import struct
+import time
 
 import numpy as np
 import pytest
@@ -153,3 +155,24 @@ def test_columns_of_unequal_length_are_refused(tmp_path):
     with pytest.raises(ValueError, match="unequal"):
         write_capture(tmp_path, "x", META, [{"t_s": T, "id_a": T[:5]}], Format("cdr"))
     assert csv_bytes(META, TABLE) == csv_bytes(META, TABLE)
+
+
+@pytest.mark.parametrize("zone", ["UTC", "Asia/Tokyo"])
+def test_a_start_without_a_zone_is_in_utc(zone, monkeypatch):
+    """The contract's start is in UTC: the bytes are the same wherever they are written."""
+    table = {"t_s": np.arange(3.0)}
+    said, stated = (
+        {"contract": "1", "started_at": f"2026-01-05T08:00:00{end}"} for end in ("", "Z")
+    )
+    monkeypatch.setenv("TZ", zone)
+    time.tzset()
+    try:
+        clocks = [_first_log_time(mcap_bytes(m, [table], Format("json"))) for m in (said, stated)]
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+    assert clocks[0] == clocks[1]
+
+
+def _first_log_time(content: bytes) -> int:
+    return next(iter(make_reader(io.BytesIO(content)).iter_messages()))[2].log_time
