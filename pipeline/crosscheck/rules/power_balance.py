@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.numerics.weak_rows import smooth_speed
 from pipeline.physics.conventions import copper_resistance_ohm
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
 
 NAME = "power_balance"
-COLUMNS = ("vd_v", "vq_v", "id_a", "iq_a", "omega_mech_rad_s", "torque_shaft_nm")
-BINS = 400
+COLUMNS = ("t_s", "vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
+SPEEDS = ("theta_mech_rad", "omega_mech_rad_s")
+SPEED_S = 0.005
+BINS, LEAST_ROWS = 400, 40
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
@@ -29,16 +32,14 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     (Durbin, Rev. Inst. Int. Stat. 22, 1954).
     """
     r_phase = constants.best("r_phase_ohm")
-    captures = [c for c in campaign.of("torque_map") if c.has(*COLUMNS)]
+    captures = [c for c in campaign.of("torque_map") if c.has(*COLUMNS) and any(map(c.has, SPEEDS))]
     if not captures:
         return not_evaluated(NAME, "needs a torque_map with dq voltages, speed and shaft torque")
     blocks = np.vstack([_blocks(c, None if r_phase is None else r_phase.number) for c in captures])
-    if blocks.shape[0] < 40:
+    if blocks.shape[0] < LEAST_ROWS:
         return not_evaluated(NAME, "needs longer plateaus in the torque_map")
     ratio, u_fit = _slope(blocks)
-    meta = captures[0].meta
-    gains = [meta.u_rel_current or 0.0, meta.u_rel_voltage or 0.0, meta.u_rel_torque or 0.0]
-    u = float(np.hypot(u_fit, np.linalg.norm(gains)))
+    u = float(np.hypot(u_fit, np.linalg.norm(_gains(captures))))
     pairs = constants.best("pole_pairs")
     return judge_ratio(
         NAME,
@@ -51,20 +52,41 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     )
 
 
+def _gains(captures: Sequence[Capture]) -> list[float]:
+    """Relative standard uncertainty of current, voltage and torque: the largest stated."""
+    metas = [capture.meta for capture in captures]
+    keys = ("u_rel_current", "u_rel_voltage", "u_rel_torque")
+    return [max(getattr(meta, key) or 0.0 for meta in metas) for key in keys]
+
+
+def _speed(data: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Shaft speed [n, rad/s]: the angle's own rate where there, else the bench's."""
+    if "theta_mech_rad" not in data:
+        return data["omega_mech_rad_s"]
+    t_s = data["t_s"]
+    width_s = max(SPEED_S, 10.0 * float(np.median(np.diff(t_s))))
+    return smooth_speed(t_s, data["theta_mech_rad"], width_s)
+
+
 def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
     """Block means [n, 8]: net power, i_q omega, shaft power, i², |i|, |omega|, omega², 1; SI.
 
     Copper loss at the winding's temperature is taken off where R and the temperature are known,
     so that its slow growth is not read as anything else.
     """
-    wanted = (*COLUMNS, *(n for n in ("temp_winding_degc",) if capture.has(n)))
+    speed = next(name for name in SPEEDS if capture.has(name))
+    wanted = (*COLUMNS, speed, *(n for n in ("temp_winding_degc",) if capture.has(n)))
     data = capture.arrays(*wanted)
+    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    data = {name: column[fine] for name, column in data.items()}
+    if np.count_nonzero(fine) < LEAST_ROWS:
+        return np.empty((0, 8))
     i_squared = data["id_a"] ** 2 + data["iq_a"] ** 2
     power = 1.5 * (data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"])
     if r_phase_ohm is not None and "temp_winding_degc" in data:
         r_ohm = copper_resistance_ohm(r_phase_ohm, data["temp_winding_degc"], 25.0)
         power = power - 1.5 * r_ohm * i_squared
-    omega = data["omega_mech_rad_s"]
+    omega = _speed(data)
     shaft = data["torque_shaft_nm"] * omega
     columns = (
         power,
@@ -76,7 +98,6 @@ def _blocks(capture: Capture, r_phase_ohm: float | None) -> NDArray[np.float64]:
         omega**2,
     )
     rows = np.column_stack([*columns, np.ones(omega.size)])
-    rows = rows[np.isfinite(rows).all(axis=1)]
     size = max(1, rows.shape[0] // BINS)
     usable = rows[: rows.shape[0] // size * size]
     means: NDArray[np.float64] = usable.reshape(-1, size, rows.shape[1]).mean(axis=1)

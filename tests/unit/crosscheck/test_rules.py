@@ -258,6 +258,29 @@ def test_line_voltage_taken_for_phase_unbalances_the_power() -> None:
     assert "1.7321" in (check.suspect or "")
 
 
+def test_where_the_angle_is_there_the_angle_counts_in_the_power() -> None:
+    """The bench's own speed is a tenth high; a gate lets it pass because the angle is used."""
+    capture = torque_map().captures[0]
+    omega = capture.tables[0]["omega_mech_rad_s"].to_numpy()
+    table = capture.tables[0].with_columns(
+        pl.Series("theta_mech_rad", np.cumsum(omega) * 1e-4), pl.col("omega_mech_rad_s") * 1.1
+    )
+    check = judge("power_balance", constants(), Campaign("m", (replace(capture, tables=(table,)),)))
+    assert check.status == "pass"
+    assert check.value == pytest.approx(1.0, abs=0.005)
+
+
+def test_the_power_is_as_sure_as_the_worse_of_its_stations() -> None:
+    """A transducer known to 3 % widens the limit, whichever capture it made."""
+    capture = torque_map().captures[0]
+    poor = replace(capture, path="z.csv", meta=replace(capture.meta, u_rel_torque=0.03))
+    limits = [
+        judge("power_balance", constants(), Campaign("m", order)).limit
+        for order in ((capture, poor), (poor, capture))
+    ]
+    assert limits == pytest.approx([0.08, 0.08], abs=0.01)
+
+
 def test_torque_equation_needs_both_terms() -> None:
     whole = torque_map()
     assert judge("torque_equation", constants(), whole).status == "pass"
