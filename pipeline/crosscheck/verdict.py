@@ -18,7 +18,9 @@ def verdict(
     """The status of `contract/outputs.md` and every reason that keeps it from `released`.
 
     `required` are the constants that the limits file wants measured; `release` is `auto` or
-    `manual` (then a person approves in the registry, and the file stays provisional).
+    `manual` (then a person approves in the registry, and the file stays provisional). A constant
+    that came out where no motor is keeps any datasheet back, required or not: what is wrong with
+    its captures is in what else rests on them.
     """
     failed = [check for check in checks if check.status == "fail"]
     if failed:
@@ -33,6 +35,11 @@ def verdict(
             why.append(f"assumed, not measured: {name}")
         elif estimate.at_bound:
             why.append(f"at its bound: {name}")
+    why += [
+        f"impossible: {name} ({estimate.note})"
+        for name, estimate in sorted(constants.items())
+        if estimate.impossible and name not in required
+    ]
     if release != "auto":
         why.append(AWAITS_APPROVAL)
     return ("provisional", tuple(why)) if why else ("released", ())

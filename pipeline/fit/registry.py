@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from graphlib import TopologicalSorter
 from typing import NamedTuple
@@ -133,7 +134,16 @@ def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
     else:
         return estimate
     note = f"{wrong}: look at clock, signs and units of {', '.join(estimate.captures[:3])}"
-    return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
+    gone = not_identifiable(estimate.name, estimate.unit, estimate.method, note)
+    return replace(gone, impossible=_beyond(estimate, term))
+
+
+def _beyond(estimate: Estimate, term: Term | None) -> bool:
+    """Whether a value is out of its range by more than three of its own standard uncertainties."""
+    if term is None or not estimate.finite:
+        return False
+    three = 3.0 * estimate.u
+    return not any(_in_range(estimate.number + part, term) for part in (-three, 0.0, three))
 
 
 def _in_range(value: float, term: Term) -> bool:

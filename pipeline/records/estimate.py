@@ -37,7 +37,8 @@ class Estimate:
 
     `method` is the estimator's name, `at` the conditions the value holds for (names from the
     glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used,
-    `orders` the spectrum behind it, where it has one.
+    `orders` the spectrum behind it, where it has one. `impossible`: it came out where no motor is,
+    by more than its uncertainty explains, so a clock, a sign or a unit of `captures` is wrong.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Estimate:
     bounds: tuple[float, float] | None = None
     at_bound: bool = False
     orders: tuple[Order, ...] = ()
+    impossible: bool = False
 
     def __post_init__(self) -> None:
         if (self.value is None) != (self.status == "not_identifiable"):

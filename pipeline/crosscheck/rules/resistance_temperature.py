@@ -22,7 +22,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     """
     alpha = constants.best("temp_coeff_copper_1_k")
     if alpha is None or alpha.status == "assumed":
-        return not_evaluated(NAME, "needs a heat_run over some tens of kelvin")
+        return not_evaluated(NAME, _missing(constants))
     return judge_ratio(
         NAME,
         alpha.number / COPPER_1_K,
@@ -31,6 +31,14 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         "temperature coefficient of the resistance over copper's",
         otherwise="a thermometer that lags or sits off the winding, or a winding not of copper",
     )
+
+
+def _missing(constants: Constants) -> str:
+    """What is missing, with what a heat run that is there came to."""
+    found = [e for e in constants.all_of("temp_coeff_copper_1_k") if e.impossible]
+    if found:
+        return f"the heat_run gives no coefficient: it {found[0].note}"
+    return "needs a heat_run over some tens of kelvin"
 
 
 RULE = Rule(NAME, check, {"allowance": 0.05}, tests=("heat_run", "resistance"))

@@ -25,6 +25,7 @@ ESTIMATE = Estimate(
     bounds=(0.0, 1.0),
     at_bound=True,
     orders=(Order(60, 0.006, 1e-5, 0.7),),
+    impossible=True,
 )
 X = np.linspace(0.0, 1.0, 5)
 
