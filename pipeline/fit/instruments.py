@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.records.capture import Capture, CaptureMeta
+from pipeline.records.capture import UNSTATED_U, Capture, CaptureMeta
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
@@ -45,42 +45,49 @@ def temperature_source(meta: CaptureMeta) -> str:
     return f"temperature@{station(meta)}"
 
 
+SOURCES: Mapping[str, tuple[Callable[[CaptureMeta], str], str]] = {
+    "voltage": (voltage_source, "u_rel_voltage"),
+    "current": (current_source, "u_rel_current"),
+    "temperature": (temperature_source, "u_temp_degc"),
+    "torque": (torque_source, "u_rel_torque"),
+}
+
+
 def instrument_uncertainties(
     captures: Iterable[Capture], kinds: Iterable[str] = ("voltage", "current", "temperature")
 ) -> dict[str, float]:
     """Standard uncertainty of each source: relative for gains, [K] for temperatures.
 
-    The largest that the captures of a station state; 0 where none states it.
+    The largest that the captures of a station state; what is usual (`UNSTATED_U`) where none
+    states it.
     """
     wanted = tuple(kinds)
-    found: dict[str, float] = {}
+    stated: dict[str, float] = {}
+    usual: dict[str, float] = {}
     for capture in captures:
-        meta = capture.meta
-        stated = {
-            "voltage": (voltage_source(meta), meta.u_rel_voltage),
-            "current": (current_source(meta), meta.u_rel_current),
-            "temperature": (temperature_source(meta), meta.u_temp_degc),
-            "torque": (torque_source(meta), meta.u_rel_torque),
-        }
         for kind in wanted:
-            source, u = stated[kind]
-            found[source] = max(found.get(source, 0.0), u or 0.0)
-    return dict(sorted(found.items()))
+            source_of, key = SOURCES[kind]
+            source, u = source_of(capture.meta), getattr(capture.meta, key)
+            usual[source] = UNSTATED_U[key]
+            if u is not None:
+                stated[source] = max(stated.get(source, 0.0), u)
+    return dict(sorted((usual | stated).items()))
 
 
 def unstated_note(
     captures: Iterable[Capture], kinds: Iterable[str] = ("voltage", "current", "temperature")
 ) -> str:
-    """Which `u_*` keys no capture states, in words, or an empty string."""
-    keys = {
-        "voltage": "u_rel_voltage",
-        "current": "u_rel_current",
-        "temperature": "u_temp_degc",
-        "torque": "u_rel_torque",
-    }
+    """Which `u_*` keys no capture states, or states as 0, in words, or an empty string."""
     metas = [capture.meta for capture in captures]
-    missing = [keys[k] for k in kinds if all(getattr(m, keys[k]) is None for m in metas)]
-    return f"{', '.join(missing)} not stated, taken as 0" if missing else ""
+    words = []
+    for key in (SOURCES[kind][1] for kind in kinds):
+        stated = {getattr(meta, key) for meta in metas} - {None}
+        if not stated:
+            unit = " K" if key == "u_temp_degc" else ""
+            words.append(f"{key} not stated, taken as {UNSTATED_U[key]:g}{unit}")
+        elif not any(stated):
+            words.append(f"{key} stated as 0, as if the instrument had no error")
+    return ", ".join(words)
 
 
 def contributions(

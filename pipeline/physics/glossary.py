@@ -145,10 +145,11 @@ def _metadata() -> Iterable[Term]:
     yield text("voltage_timing", "instant, held or centred")
     yield number("pwm_hz", "Hz", "switching frequency", 0.0, 1e7)
     yield number("vdc_v", "V", "DC link voltage", 0.0, 2e3)
-    yield number("u_rel_current", "1", "relative standard uncertainty of the current gain", 0, 1)
-    yield number("u_rel_voltage", "1", "relative standard uncertainty of the voltage gain", 0, 1)
-    yield number("u_rel_torque", "1", "relative standard uncertainty of the torque gain", 0, 1)
-    yield number("u_temp_degc", "degC", "standard uncertainty of the temperatures", 0, 100)
+    for gain in ("current", "voltage", "torque"):
+        words = f"relative standard uncertainty of the {gain} gain; 0.01 where not stated"
+        yield number(f"u_rel_{gain}", "1", words, 0, 1)
+    words = "standard uncertainty of the temperatures; 2 where not stated"
+    yield number("u_temp_degc", "degC", words, 0, 100)
     yield text("sha256_rows", "HEX/ROWS over the rows of a CSV")
 
 

@@ -19,6 +19,16 @@ VoltageKind = Literal["measured", "commanded"]
 Array = NDArray[np.float64]
 
 
+# Standard uncertainty (k=1) of an instrument that states none, by metadata key: a gain [1] of a
+# percent, a thermometer [K] of two kelvin. What is stated counts as stated, 0 too.
+UNSTATED_U: Mapping[str, float] = {
+    "u_rel_current": 0.01,
+    "u_rel_voltage": 0.01,
+    "u_rel_torque": 0.01,
+    "u_temp_degc": 2.0,
+}
+
+
 @dataclass(frozen=True, slots=True)
 class CaptureMeta:
     """The metadata of `contract/capture.md`, parsed; keys it does not know are in `extra`."""
@@ -46,6 +56,11 @@ class CaptureMeta:
     u_temp_degc: float | None = None
     sha256_rows: str | None = None
     extra: Mapping[str, str] = field(default_factory=dict)
+
+    def instrument_u(self, key: str) -> float:
+        """Standard uncertainty of an instrument, a key of UNSTATED_U; its default if not stated."""
+        stated: float | None = getattr(self, key)
+        return UNSTATED_U[key] if stated is None else stated
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,10 +53,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 
 def _gains(captures: Sequence[Capture]) -> list[float]:
-    """Relative standard uncertainty of current, voltage and torque: the largest stated."""
+    """Relative standard uncertainty of current, voltage and torque: the largest of the captures."""
     metas = [capture.meta for capture in captures]
     keys = ("u_rel_current", "u_rel_voltage", "u_rel_torque")
-    return [max(getattr(meta, key) or 0.0 for meta in metas) for key in keys]
+    return [max(meta.instrument_u(key) for meta in metas) for key in keys]
 
 
 def _speed(data: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

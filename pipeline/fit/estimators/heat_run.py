@@ -137,8 +137,8 @@ def _slope_budget(line: Line, options: Mapping[str, float]) -> Budget:
         Contribution(
             f"scatter:{NAME}:slope", math.sqrt(float(line.covariance[1, 1])), "A", line.dof
         ),
-        Contribution(voltage_source(meta), slope * (meta.u_rel_voltage or 0.0), "B"),
-        Contribution(current_source(meta), -slope * (meta.u_rel_current or 0.0), "B"),
+        Contribution(voltage_source(meta), slope * meta.instrument_u("u_rel_voltage"), "B"),
+        Contribution(current_source(meta), -slope * meta.instrument_u("u_rel_current"), "B"),
         Contribution(
             "assumed:thermometer_lag", slope * line.rise_rate_1_s * options["u_lag_s"], "B"
         ),
@@ -202,9 +202,11 @@ def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) 
     scatter = math.sqrt(float(line.covariance[0, 0]))
     parts = [
         Contribution(f"scatter:{NAME}:r25", scatter, "A", line.dof),
-        Contribution(voltage_source(meta), r25 * (meta.u_rel_voltage or 0.0), "B"),
-        Contribution(current_source(meta), -r25 * (meta.u_rel_current or 0.0), "B"),
-        Contribution(temperature_source(meta), -line.slope_ohm_k * (meta.u_temp_degc or 0.0), "B"),
+        Contribution(voltage_source(meta), r25 * meta.instrument_u("u_rel_voltage"), "B"),
+        Contribution(current_source(meta), -r25 * meta.instrument_u("u_rel_current"), "B"),
+        Contribution(
+            temperature_source(meta), -line.slope_ohm_k * meta.instrument_u("u_temp_degc"), "B"
+        ),
         Contribution("assumed:voltage_offset_v", drop / current, "B"),
     ]
     at = {"temp_winding_degc": 25.0, "current_a": round(current, 4)}

@@ -9,7 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.instruments import budget_of, station
+from pipeline.fit.instruments import (
+    budget_of,
+    instrument_uncertainties,
+    station,
+    unstated_note,
+)
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.terminals import PAIRS
 from pipeline.numerics.least_squares import linear_fit
@@ -213,10 +218,9 @@ def _estimate(
     parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof)] if u > 0.0 else []
     words = [note]
     if UNITS[name] != "deg":
-        gain, stated = _gain(used, options)
+        gain, unstated = _gain(used, options)
         parts.append(Contribution(f"lcr@{station(used[0].meta)}", gain * abs(value), "B"))
-        if not stated:
-            words.append(f"u_rel_lcr not stated, taken as {gain:g}")
+        words.append(unstated)
     frequencies = [
         float(np.nanmean(c.arrays("freq_hz")["freq_hz"])) for c in used if c.has("freq_hz")
     ]
@@ -237,14 +241,21 @@ def _estimate(
     )
 
 
-def _gain(used: Sequence[Capture], options: Mapping[str, float]) -> tuple[float, bool]:
-    """The meter's relative standard uncertainty and whether a capture states it (`u_rel_lcr`)."""
+def _gain(used: Sequence[Capture], options: Mapping[str, float]) -> tuple[float, str]:
+    """The meter's relative standard uncertainty, and in words where no capture states it.
+
+    A meter that does not state its own (`u_rel_lcr`) is a voltage over a current; the option of
+    that name replaces this where it is not 0.
+    """
     for capture in used:
         try:
-            return float(capture.meta.extra["u_rel_lcr"]), True
+            return float(capture.meta.extra["u_rel_lcr"]), ""
         except (KeyError, ValueError):
             continue
-    return options["u_rel_lcr"], False
+    gains = instrument_uncertainties(used, ("voltage", "current"))
+    gain = options["u_rel_lcr"] or math.hypot(*gains.values())
+    unstated = "" if options["u_rel_lcr"] else unstated_note(used, ("voltage", "current"))
+    return gain, "; ".join(w for w in (f"u_rel_lcr not stated, taken as {gain:.2g}", unstated) if w)
 
 
 def _resistance(used: Sequence[Capture], options: Mapping[str, float]) -> Estimate | None:

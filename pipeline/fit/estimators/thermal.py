@@ -257,10 +257,10 @@ def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Const
     meta = record.capture.meta
     rth = balance.rth_k_w
     thermometer = temperature_source(meta)
-    current = type_b(current_source(meta), meta.u_rel_current or 0.0)
+    current = type_b(current_source(meta), meta.instrument_u("u_rel_current"))
     resistance = reference_resistance(record, known)
     if resistance is None:
-        volts = type_b(voltage_source(meta), meta.u_rel_voltage or 0.0)
+        volts = type_b(voltage_source(meta), meta.instrument_u("u_rel_voltage"))
         loss = propagate([(-rth, volts), (-rth, current)])
     else:
         others = tuple(part for part in resistance.budget if part.source != thermometer)
@@ -268,7 +268,7 @@ def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Const
     parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof), *loss]
     rise = float(record.temp_winding_degc.max()) - float(ambient[0])
     if record.temp_ambient_degc is None and rise > 0.0:
-        parts.append(Contribution(thermometer, rth * (meta.u_temp_degc or 0.0) / rise, "B"))
+        parts.append(Contribution(thermometer, rth * meta.instrument_u("u_temp_degc") / rise, "B"))
     at = {
         "current_a": round(float(record.current_a.mean()), 4),
         "temp_ambient_degc": round(float(ambient[0]), 2),
