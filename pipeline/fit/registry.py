@@ -112,7 +112,7 @@ def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:
 
 
 def _possible(estimator: Estimator, result: Fit) -> Fit:
-    """The result with every value that is not finite or out of range turned into a refusal."""
+    """The result with what is not finite, out of range or of no known size not identifiable."""
     own = {term.name: term for term in estimator.terms}
     return Fit(
         tuple(
@@ -131,6 +131,10 @@ def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
     elif term is not None and not _in_range(estimate.number, term):
         low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
         wrong = f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}"
+    elif term is not None and _unknown_size(estimate, term):
+        wrong = (
+            f"came out as {estimate.number:.3g} ± {estimate.u:.2g} {estimate.unit}, no known size"
+        )
     else:
         return estimate
     note = f"{wrong}: look at clock, signs and units of {', '.join(estimate.captures[:3])}"
@@ -144,6 +148,11 @@ def _beyond(estimate: Estimate, term: Term | None) -> bool:
         return False
     three = 3.0 * estimate.u
     return not any(_in_range(estimate.number + part, term) for part in (-three, 0.0, three))
+
+
+def _unknown_size(estimate: Estimate, term: Term) -> bool:
+    """Whether what no motor is without has a u as large as its value; a zero friction is found."""
+    return term.low is not None and term.low > 0.0 and estimate.u >= abs(estimate.number)
 
 
 def _in_range(value: float, term: Term) -> bool:

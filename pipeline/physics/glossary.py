@@ -110,7 +110,7 @@ def _constants() -> Iterable[Term]:
     yield constant("cogging_peak_nm", "N·m", "half the peak-to-peak of the cogging torque")
     yield constant("cogging_order", "1", "leading cogging order a mechanical turn", 1, 5000, True)
     yield constant("cogging_amplitude_nm", "N·m", "amplitude of the leading cogging order")
-    yield constant("j_rotor_kgm2", "kg·m²", "rotor inertia", 0.0, 1e4)
+    yield constant("j_rotor_kgm2", "kg·m²", "rotor inertia", TINY, 1e4)
     yield constant("torque_coulomb_nm", "N·m", "Coulomb friction torque")
     yield constant("b_visc_nm_s_rad", "N·m·s/rad", "viscous friction coefficient", -1.0, 1e4)
     yield constant("tau_elec_s", "s", "lq_h over r_phase_ohm", 0.0, 100.0)

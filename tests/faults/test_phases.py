@@ -226,3 +226,35 @@ def test_speed_a_tenth_off(rng: np.random.Generator) -> None:
     _, finding = warned(with_column(capture, "omega_mech_rad_s", speed))
     assert finding.code == "speed_against_angle"
     assert "1.1 times" in finding.message
+
+
+def _loaded(rng: np.random.Generator, load_nm: float) -> Capture:
+    """The drive with a load of this size on its shaft, which the current carries."""
+    capture = drive(MOTOR, rng)
+    load = load_nm * np.sign(np.sin(2.0 * np.pi * column(capture, "t_s") / 0.7))
+    kt = 1.5 * MOTOR.pole_pairs * MOTOR.psi_wb
+    noise = rng.normal(0.0, 1e-3, load.size)
+    capture = with_column(capture, "iq_a", column(capture, "iq_a") + load / kt)
+    return with_column(capture, "torque_shaft_nm", load + noise)
+
+
+def test_torque_of_the_other_sign_in_a_drive_log(rng: np.random.Generator) -> None:
+    """Refused as in a map; the healthy log is let through."""
+    healthy = _loaded(rng, 0.5)
+    assert validate(healthy, {})[1] == ()
+    torque = -column(healthy, "torque_shaft_nm")
+    assert refused(with_column(healthy, "torque_shaft_nm", torque)).code == "torque_sign"
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.1])
+def test_a_drifting_torque_of_a_free_shaft_has_no_sign(
+    share: float, rng: np.random.Generator
+) -> None:
+    """Let through: a transducer that drifts down while the current creeps up, on a free shaft."""
+    healthy = drive(MOTOR, rng)
+    ramp = np.linspace(0.0, 1.0, column(healthy, "t_s").size)
+    current = column(healthy, "iq_a") * 0.1 + 0.2 * MOTOR.rated_a * ramp
+    creeping = with_column(healthy, "iq_a", current)
+    for torque in (-share * ramp, -1e-2 * share * current):
+        noisy = torque + rng.normal(0.0, 1e-4 * share, ramp.size)
+        validate(with_column(creeping, "torque_shaft_nm", noisy), {})

@@ -98,6 +98,13 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if not torque_is_parted(found.design, found.sigma):
         return _refused(f"the drive's torque cannot be told from its friction; {EXPERIMENT}")
     estimates = _estimates(rows, torque, found)
+    inertia = estimates[0]
+    if inertia.known and inertia.u >= abs(inertia.number):
+        estimates = _refused(
+            f"the acceleration does not follow the torque: the inertia came out as "
+            f"{inertia.number:.3g} ± {inertia.u:.2g} kg·m²; look at the signs of iq_a and "
+            f"torque_shaft_nm, else {EXPERIMENT}"
+        ).estimates
     return Fit(estimates, _evidence(rows, y, found))
 
 

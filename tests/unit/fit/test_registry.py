@@ -39,3 +39,26 @@ def test_no_estimate_with_a_number_that_is_not_finite_passes(
     (estimate,) = registry.fit_all(campaign, {})[0].estimates
     assert (estimate.status, "a.csv" in estimate.note) == ("not_identifiable", True)
     assert canonical_json(estimate.document())
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "u", "status"),
+    [
+        ("j_rotor_kgm2", 4.8e-3, 1.1e-2, "not_identifiable"),
+        ("r_phase_ohm", 0.3, 0.3, "not_identifiable"),
+        ("r_phase_ohm", 0.3, 0.2, "measured"),
+        ("torque_coulomb_nm", 1e-5, 2e-5, "measured"),
+        ("b_visc_nm_s_rad", 1e-6, 2e-6, "measured"),
+        ("resistance_imbalance", 1e-5, 1e-4, "measured"),
+    ],
+)
+def test_what_no_motor_is_without_has_a_size(
+    name: str, value: float, u: float, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An inertia of which u is as large as the value is not told; a small friction is."""
+    made = Estimate(name, value, "1", "measured", "made_up", type_a("s", u), captures=("a.csv",))
+    made_up = Estimator("made_up", (name,), ("drive",), "", lambda *_: Fit((made,)))
+    monkeypatch.setattr(registry, "estimators", lambda: (made_up,))
+    campaign = Campaign("m", (capture("drive", "a", t_s=np.arange(3.0)),))
+    (found,) = registry.fit_all(campaign, {})[0].estimates
+    assert found.status == status
