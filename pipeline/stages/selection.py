@@ -126,13 +126,14 @@ def _same_captures(base: Mapping[str, Sheet], candidate: Mapping[str, Sheet]) ->
 
 def _of_code(newest: Mapping[str, Mapping[str, Sheet]], same: Sequence[str]) -> bool:
     """Whether versions of the code are meant: all candidates have their captures on both sides,
-    and their versions differ, or both sides are of the same motors.
+    and their versions differ; some of them, where both sides are of the same motors. A lot against
+    itself compares nothing.
     """
     base, candidate = newest["baseline"], newest["candidate"]
     if len(same) < len(candidate):
         return False
-    differ = all(base[m].version.version != candidate[m].version.version for m in same)
-    return differ or base.keys() == candidate.keys()
+    differ = [base[m].version.version != candidate[m].version.version for m in same]
+    return all(differ) or (any(differ) and base.keys() == candidate.keys())
 
 
 def _versions(

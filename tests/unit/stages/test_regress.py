@@ -125,8 +125,16 @@ def test_the_code_is_compared_with_itself(output: Path, capsys: pytest.CaptureFi
     assert report(output)["mode"] == "code"
 
 
-def test_a_lot_against_itself_passes(output: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = told(capsys, output, "baseline=lot:B", "candidate=lot:B")
+@pytest.mark.parametrize("mode", ["auto", "lots"])
+def test_a_lot_against_itself_is_refused(
+    output: Path, mode: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A typing mistake must not pass a lot; asked for by name, versions may be the same."""
+    words = ("baseline=lot:B", "candidate=lot:B")
+    code, out, err = told(capsys, output, *words, f"mode={mode}")
+    assert (code, out) == (2, "")
+    assert "holds no motor that the candidate does not" in err
+    code, out, _ = told(capsys, output, *words, "mode=code")
     assert code == 0
     assert "the very same versions" in out
 
