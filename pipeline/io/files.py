@@ -38,16 +38,21 @@ def input_folder(name: str) -> Path:
 def list_files(folder: Path) -> Listing:
     """All regular files below a folder; hidden ones are left out.
 
-    Raises UsageError where the folder is not there.
+    A folder below it that cannot be listed is a finding. Raises UsageError where the folder is
+    not there, MachineError where it cannot be listed itself.
     """
     if not folder.is_dir():
         raise UsageError(f"there is no folder {folder}", "give input= a folder of captures")
     paths: list[str] = []
     findings: list[Finding] = []
     root = folder.resolve()
-    for where, folders, names in os.walk(folder, onerror=_unreadable):
+
+    def unreadable(fault: OSError) -> None:
+        findings.append(_not_listed(folder, fault))
+
+    for where, folders, names in os.walk(folder, onerror=unreadable):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        links = [name for name in folders if Path(where, name).is_symlink()]
+        links = [name for name in folders if _is_link(Path(where, name))]
         for name in sorted(names) + links:
             if name.startswith("."):
                 continue
@@ -61,8 +66,23 @@ def list_files(folder: Path) -> Listing:
     return Listing(tuple(sorted(paths)), tuple(sorted(findings, key=lambda f: f.file)))
 
 
-def _unreadable(fault: OSError) -> None:
-    raise MachineError(f"a folder cannot be listed: {fault}", "check its permissions") from fault
+def _is_link(path: Path) -> bool:
+    """Whether it is a symbolic link; False where the system does not tell, which `_fault` says."""
+    try:
+        return path.is_symlink()
+    except OSError:
+        return False
+
+
+def _not_listed(folder: Path, fault: OSError) -> Finding:
+    """The finding for a folder below; raises MachineError where it is the folder itself."""
+    if fault.filename is None or Path(fault.filename) == folder:
+        words = f"a folder cannot be listed: {fault}"
+        raise MachineError(words, "check its permissions") from fault
+    name = Path(fault.filename).relative_to(folder).as_posix()
+    words = f"the folder cannot be listed, so nothing in it is used: {fault.strerror}"
+    error = CaptureError("unreadable", words, "check its permissions")
+    return Finding.refusal(printable(name), error)
 
 
 def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
@@ -77,6 +97,9 @@ def _fault(path: Path, root: Path, relative: str) -> CaptureError | None:
                 "not_a_file", "it is a link to outside the folder", "copy the file itself here"
             )
         mode = path.stat().st_mode
+    except PermissionError as fault:
+        words = f"it cannot be read: {fault.strerror}"
+        return CaptureError("unreadable", words, "check the permissions of its folder")
     except (OSError, RuntimeError):
         return CaptureError("not_a_file", "it is a link to nothing", "remove it")
     if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
