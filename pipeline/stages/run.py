@@ -28,7 +28,13 @@ from pipeline.stages.fleet.jobs import MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import Batch, Keeping, digest_of, tools_version
 from pipeline.stages.fleet.looking import look_with
 from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
-from pipeline.stages.fleet.publishing import datasheets_of, outcome_of, placed, publish
+from pipeline.stages.fleet.publishing import (
+    datasheets_of,
+    outcome_of,
+    placed,
+    publish,
+    removed_note,
+)
 
 CRUMBS = ".work"
 COMMITTED = 50
@@ -87,7 +93,7 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
     )
     with watch.stage("fleet"):
         datasheets = datasheets_of(output, results)
-        files = publish(settings, results, datasheets, findings)
+        files, removed = publish(settings, results, datasheets, findings)
         outcome = outcome_of(datasheets, findings, found, report=settings.report)
     with watch.stage("registry"):
         registered = _register(registry, output, results)
@@ -107,7 +113,12 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
     return Outcome(
         first_that_applies(outcome.exit_code, registered.code, *(e.exit_code for e in died)),
         "\n".join(filter(None, [outcome.text, registered.text])),
-        (*outcome.errors, *registered.errors, *(f"error: {e}" for e in died)),
+        (
+            *outcome.errors,
+            *removed_note(removed, settings.output),
+            *registered.errors,
+            *(f"error: {e}" for e in died),
+        ),
         watch.table(),
     )
 

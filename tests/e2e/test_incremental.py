@@ -86,6 +86,24 @@ def test_what_a_changed_capture_touches_is_done(folder: Folder) -> None:
     assert [path.name for path in (folder.output / "datasheets").iterdir()] == ["gimbal~2ftwo.json"]
 
 
+def test_another_input_into_the_same_output_says_what_it_removes(
+    folder: Folder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The output mirrors one input: what goes is counted and named, once; a user's file stays."""
+    folder.run()
+    own = folder.output / "datasheets" / "notes.txt"
+    own.write_text("mine")
+    (folder.input / "one").rename(folder.place / "elsewhere")
+    capsys.readouterr()
+    main(["run", f"input={folder.input}", f"output={folder.output}", *WORDS])
+    (line,) = (one for one in capsys.readouterr().err.splitlines() if "removed" in one)
+    assert line.startswith(f"note: {folder.output} holds what comes of this input alone: 2 files")
+    assert line.endswith("removed: datasheets/gimbal~2fone.json, report/gimbal~2fone.html")
+    assert own.read_text() == "mine"
+    main(["run", f"input={folder.input}", f"output={folder.output}", *WORDS])
+    assert "removed" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("kind", ["touched", "torn", "gone", "registry"])
 def test_results_that_are_not_whole_are_made_again(folder: Folder, kind: str) -> None:
     folder.run()

@@ -27,6 +27,8 @@ INPUT, OUTPUT = "\ue000", "\ue001"
 """Stand for the names of the folders; no file may bear such a name."""
 OF_BATCH = frozenset({*KEY_CONSTANTS, *(name for _, name, _ in COLUMNS)})
 """Constants that the batch's page and summary show."""
+TOLD = 5
+"""Names of removed files in a note, at most; datasheets come first."""
 ROOMS = ("datasheets", "report", "recordings", ".cache")
 
 
@@ -50,10 +52,10 @@ def publish(
     results: Sequence[MotorResult],
     datasheets: Sequence[Datasheet],
     findings: Sequence[Finding],
-) -> Files:
+) -> tuple[Files, tuple[str, ...]]:
     """Writes what belongs to the batch, then takes away what an earlier run left behind.
 
-    Returns every file of the batch.
+    Returns every file of the batch, and the names of those that were taken away.
     """
     output = Path(settings.output)
     files: list[tuple[str, str]] = []
@@ -70,22 +72,39 @@ def publish(
 
         write("report/index.html", render_fleet(datasheets, tuple(findings)).encode())
     names = sorted(name for name, _ in files)
-    _sweep(output, names)
+    removed = _sweep(output, names)
     write(MANIFEST, canonical_json({"schema": "outputs/1", "files": names}))
-    return tuple(sorted(files))
+    return tuple(sorted(files)), removed
 
 
-def _sweep(output: Path, files: Sequence[str]) -> None:
-    """Removes the files that the last run listed and this one did not write, and torn ones."""
+def _sweep(output: Path, files: Sequence[str]) -> tuple[str, ...]:
+    """Removes the files that the last run listed and this one did not write, and torn ones.
+
+    Returns the names of the former.
+    """
+    removed = []
     for name in sorted(_listed(output / MANIFEST) - set(files)):
         stale = output / name
         if stale.resolve().is_relative_to(output.resolve()):
-            with suppress(IsADirectoryError, NotADirectoryError):
-                stale.unlink(missing_ok=True)
+            with suppress(IsADirectoryError, NotADirectoryError, FileNotFoundError):
+                stale.unlink()
+                removed.append(name)
     for room in ROOMS:
         for torn in (output / room).rglob(".*.partial"):
             if not _alive(partial_owner(torn)):
                 torn.unlink(missing_ok=True)
+    return tuple(removed)
+
+
+def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
+    """A line that counts and names what an earlier run had left and this one took away."""
+    if not removed:
+        return ()
+    told = ", ".join(removed[:TOLD]) + (", ..." if len(removed) > TOLD else "")
+    return (
+        f"note: {output} holds what comes of this input alone: {len(removed)} files of an earlier "
+        f"run are removed: {told}",
+    )
 
 
 def _listed(manifest: Path) -> set[str]:
