@@ -85,6 +85,7 @@ def _estimate() -> Schema:
         {
             "bounds": _or_null(_list(NUMBER, minItems=2, maxItems=2)),
             "at_bound": {"type": "boolean"},
+            "settled": {"const": True},
             "orders": _list(
                 _object({"order": COUNT, "amplitude": SPREAD, "u": SPREAD, "phase_rad": NUMBER})
             ),

@@ -29,12 +29,23 @@ ASSUMED = "assumed:"
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """How constants can be had: what an estimator declares, without the estimator."""
+    """How constants can be had: what an estimator declares, without the estimator.
+
+    It needs all of `uses` and one of `either`, where it names any.
+    """
 
     gives: tuple[str, ...]
     tests: tuple[str, ...]
     experiment: str
     uses: tuple[str, ...] = ()
+    either: tuple[str, ...] = ()
+
+    def wanting(self, known: Known) -> list[str]:
+        """What it needs and is missing."""
+        missing = [name for name in self.uses if _is_missing(known, name)]
+        if all(_is_missing(known, name) for name in self.either):
+            missing += self.either
+        return missing
 
     @property
     def computes(self) -> bool:
@@ -187,7 +198,7 @@ def _settling(
         if constant not in way.gives:
             continue
         deeper = above | {constant}
-        wanting = [n for n in way.uses if n not in deeper and _is_missing(known, n)]
+        wanting = [name for name in way.wanting(known) if name not in deeper]
         if way.computes and not wanting:
             wanting = [n for n in way.uses if n not in deeper]
         tried = bool(known.tests & set(way.tests))
@@ -210,7 +221,7 @@ def _untried(constant: str, known: Known, ways: tuple[Way, ...]) -> frozenset[st
 
 def _is_missing(known: Known, name: str) -> bool:
     estimate = known.constants.get(name)
-    return estimate is None or not estimate.known
+    return estimate is None or not (estimate.known or estimate.settled)
 
 
 def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list[Doubt]:
@@ -221,7 +232,8 @@ def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list
         if found is None:
             continue
         kind, words = found
-        tests = settling_tests(name, known, ways)
+        settled = name in known.constants and known.constants[name].settled
+        tests = frozenset() if settled else settling_tests(name, known, ways)
         if kind == "uncertain" and _mostly_instrument(known.constants[name]):
             assumed = _largest_instrument(known.constants[name]).startswith(ASSUMED)
             tests = _untried(name, known, ways) if assumed else frozenset()
@@ -233,6 +245,8 @@ def _constants_in_doubt(known: Known, ways: tuple[Way, ...], aims: Aims) -> list
 def _doubt_of(name: str, estimate: Estimate | None, aims: Aims) -> tuple[DoubtKind, str] | None:
     if estimate is None:
         return "missing", "nothing recorded gives it"
+    if estimate.settled:
+        return ("missing", estimate.note) if name in aims.required else None
     if not estimate.known:
         return "missing", estimate.note or "not identifiable from what is there"
     if estimate.status == "assumed":
@@ -285,6 +299,8 @@ def _checks_in_doubt(
     for check in known.checks:
         if check.status not in ("fail", "not_evaluated"):
             continue
+        if check.status == "not_evaluated" and _settled_in(check.meaning, known):
+            continue
         rests_on = check_tests.get(check.name, ())
         if check.status == "fail":
             suspect = f"; suspect: {check.suspect}" if check.suspect else ""
@@ -297,6 +313,12 @@ def _checks_in_doubt(
             tests = tests or frozenset(set(rests_on) - known.tests) or frozenset(rests_on)
         doubts.append(Doubt(kind, check.name, words, tests, WEIGHTS[kind]))
     return doubts
+
+
+def _settled_in(meaning: str, known: Known) -> bool:
+    """Whether a reason speaks of a constant that was looked for and is not there."""
+    named = set(re.findall(r"\w+", meaning)) & set(known.constants)
+    return any(known.constants[name].settled for name in named)
 
 
 def _tests_named(meaning: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:

@@ -32,6 +32,8 @@ class Estimator:
         name it gives is not_identifiable with `experiment` as the note.
     `uses`: constants of other estimators it reads from `known` where they are there; it runs
         after all estimators that give them.
+    `either`: those of `uses` of which one is enough. `aids`: those of `uses` that refine its result
+        and that it does without; a plan sends nobody to record them for its sake.
     `rank`: preference among estimators that give the same constant; the lowest is published.
     `experiment`: the test to record, in words, when the constant is missing.
     `terms`: glossary entries for constants of its own that `contract/outputs.md` does not name.
@@ -44,6 +46,8 @@ class Estimator:
     experiment: str
     fit: FitFunction
     uses: tuple[str, ...] = ()
+    either: tuple[str, ...] = ()
+    aids: tuple[str, ...] = ()
     rank: int = 0
     terms: tuple[Term, ...] = ()
     options: Mapping[str, float] = field(default_factory=dict)

@@ -101,6 +101,7 @@ def _estimate(name: str, said: Mapping[str, Any]) -> Estimate:
         note=said["note"],
         bounds=None if bounds is None else (bounds[0], bounds[1]),
         at_bound=said.get("at_bound", False),
+        settled=said.get("settled", False),
         orders=tuple(
             Order(one["order"], one["amplitude"], one["u"], one["phase_rad"])
             for one in said.get("orders", ())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from pipeline.records.uncertainty import (
@@ -39,6 +39,7 @@ class Estimate:
     glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used,
     `orders` the spectrum behind it, where it has one. `impossible`: it came out where no motor is,
     by more than its uncertainty explains, so a clock, a sign or a unit of `captures` is wrong.
+    `settled`: it was looked for and is not there, down to what the note tells.
     """
 
     name: str
@@ -54,6 +55,7 @@ class Estimate:
     at_bound: bool = False
     orders: tuple[Order, ...] = ()
     impossible: bool = False
+    settled: bool = False
 
     def __post_init__(self) -> None:
         if (self.value is None) != (self.status == "not_identifiable"):
@@ -113,8 +115,10 @@ class Estimate:
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`; infinite degrees of freedom become null."""
         known = self.known
-        spectrum = {"orders": [asdict(one) for one in self.orders]} if self.orders else {}
-        return spectrum | {
+        more: dict[str, Any] = {"settled": True} if self.settled else {}
+        if self.orders:
+            more["orders"] = [asdict(one) for one in self.orders]
+        return more | {
             "value": self.value,
             "unit": self.unit,
             "u": self.u if known else None,
@@ -139,6 +143,11 @@ class Estimate:
 def not_identifiable(name: str, unit: str, method: str, note: str) -> Estimate:
     """The result that says which experiment is missing; `note` names it."""
     return Estimate(name, None, unit, "not_identifiable", method, note=note)
+
+
+def not_there(name: str, unit: str, method: str, note: str) -> Estimate:
+    """The result that says that it was looked for and not found; `note` names down to what size."""
+    return replace(not_identifiable(name, unit, method, note), settled=True)
 
 
 def derived(

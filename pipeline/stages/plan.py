@@ -76,7 +76,20 @@ def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:
 
 
 def _planned(known: Known, required: frozenset[str]) -> Plan:
-    by_rank = sorted(estimators(), key=lambda estimator: (estimator.rank, estimator.name))
-    ways = [Way(e.gives, e.tests, e.experiment, e.uses) for e in by_rank]
     check_tests = {rule.name: rule.tests for rule in rules()}
-    return make_plan(known, ways, check_tests, Aims(required, U_REL, U_REL_OF, U_OF))
+    return make_plan(known, ways_of(), check_tests, Aims(required, U_REL, U_REL_OF, U_OF))
+
+
+def ways_of() -> tuple[Way, ...]:
+    """How each constant can be had, the preferred way first."""
+    by_rank = sorted(estimators(), key=lambda estimator: (estimator.rank, estimator.name))
+    return tuple(
+        Way(
+            e.gives,
+            e.tests,
+            e.experiment,
+            tuple(name for name in e.uses if name not in (*e.aids, *e.either)),
+            e.either,
+        )
+        for e in by_rank
+    )

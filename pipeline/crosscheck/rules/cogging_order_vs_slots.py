@@ -24,7 +24,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     order, pairs = constants.best("cogging_order"), constants.best("pole_pairs")
     slots = campaign.nameplate("slots")
     if order is None or pairs is None or not isinstance(slots, int):
-        return not_evaluated(NAME, "needs cogging found in a cogging test, pole pairs and slots")
+        none = any(one.settled for one in constants.all_of("cogging_order"))
+        words = "no cogging was found, so there is no cogging_order to judge"
+        needs = "needs cogging found in a cogging test, pole pairs and slots"
+        return not_evaluated(NAME, words if none else needs)
     found, p = round(order.number), round(pairs.number)
     fundamental = cogging_order(slots, p)
     words = f"order {found} a turn; {slots} slots and {2 * p} poles make multiples of {fundamental}"

@@ -29,13 +29,14 @@ from pipeline.physics.glossary import CONSTANTS
 from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, Order, not_identifiable
+from pipeline.records.estimate import Estimate, Order, not_identifiable, not_there
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Budget, Contribution
 
 NAME = "cogging"
 COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
 GIVES = (*COGGING, "torque_coulomb_nm")
+AIDS = ("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s")
 STRANGER_LEVEL = 1e-6
 EXPERIMENT = (
     "record a cogging test: zero current, at least one slow whole turn each way, with "
@@ -157,7 +158,7 @@ def _cogging(
     if not lines:
         limit = detection_limit(spec, options["level"])
         note = f"no cogging found; an amplitude above {limit:.2g} N·m would have been; {tested}"
-        return tuple(not_identifiable(n, _unit(n), NAME, note + also) for n in COGGING)
+        return tuple(not_there(n, _unit(n), NAME, note + also) for n in COGGING)
     leading = lines[0]
     sides = phase_modulated(lines, leading.order)
     amplitude = float(np.sqrt(sum(line.amplitude**2 for line in [leading, *sides])))
@@ -310,7 +311,8 @@ ESTIMATOR = Estimator(
     tests=("cogging",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s"),
+    uses=AIDS,
+    aids=AIDS,
     rank=10,
     options={"highest_order": 1000.0, "level": 0.01},
 )

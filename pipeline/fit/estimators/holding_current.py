@@ -30,7 +30,7 @@ from pipeline.physics.glossary import CONSTANTS, Term
 from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate, not_identifiable, not_there
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import propagate, type_a
 
@@ -138,7 +138,7 @@ def _cogging(
     if not lines:
         limit = detection_limit(spec)
         note = f"no order found; an amplitude above {limit:.2g} A would have been"
-        return tuple(not_identifiable(n, _unit(n), NAME, note) for n in names)
+        return tuple(not_there(n, _unit(n), NAME, note) for n in names)
     paths = tuple(c.path for c in captures)
     note = f"A by order: {name_orders(lines, known, campaign)}"
     if rms_a is not None:
@@ -218,6 +218,8 @@ ESTIMATOR = Estimator(
     experiment=EXPERIMENT,
     fit=fit,
     uses=("pole_pairs", *USES),
+    either=USES,
+    aids=("pole_pairs",),
     rank=20,
     terms=(RESIDUAL,),
     options={"highest_order": 1000.0, "level": 0.01},

@@ -50,6 +50,14 @@ LONGER = (
     "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
     "with iq_a and theta_mech_rad"
 )
+AIDS = (
+    "kt_reluctance_nm_a2",
+    "temp_coeff_magnet_1_k",
+    "ld_h",
+    "lq_h",
+    "pole_pairs",
+    "cogging_order",
+)
 NUISANCES = (
     "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
     "d current sin", "q current cubed", "d squared q current", "d q current cubed",
@@ -247,15 +255,9 @@ ESTIMATOR = Estimator(
     tests=("drive", "spin_down"),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=(
-        *USES,
-        "kt_reluctance_nm_a2",
-        "temp_coeff_magnet_1_k",
-        "ld_h",
-        "lq_h",
-        "pole_pairs",
-        "cogging_order",
-    ),
+    uses=(*USES, *AIDS),
+    either=USES,
+    aids=AIDS,
     rank=0,
     options={"level": 0.001},
 )

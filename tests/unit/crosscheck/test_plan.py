@@ -7,7 +7,7 @@ import pytest
 from pipeline.crosscheck.plan import Aims, Known, Way, make_plan, settling_tests
 from pipeline.physics.glossary import CONSTANTS, TESTS
 from pipeline.records.datasheet import Check
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate, not_identifiable, not_there
 from pipeline.records.uncertainty import type_a, type_b
 
 RESISTANCE = Way(("r_phase_ohm",), ("resistance",), "drive DC steps")
@@ -174,3 +174,35 @@ def test_ways_that_use_each_other_do_not_go_round_for_ever() -> None:
     plan = make_plan(known({}, "drive"), (one, other), {}, Aims())
     assert plan.steps == ()
     assert [doubt.name for doubt in plan.beyond] == ["ld_h", "lq_h"]
+
+
+COGGING = Way(("cogging_order", "cogging_peak_nm"), ("cogging",), "turn it slowly")
+HOLD = Way(("cogging_order", "cogging_peak_nm"), ("holding_current",), "hold it everywhere")
+
+
+def test_what_was_looked_for_and_is_not_there_is_no_doubt() -> None:
+    """No cogging: neither another method nor the same test again is asked for, nor its check."""
+    none = {n: not_there(n, "1", "cogging", "no cogging found") for n in COGGING.gives}
+    check = Check("cogging_order_vs_slots", "not_evaluated", "no cogging: no cogging_order")
+    state = known({**ALL_KNOWN, **none}, "cogging", checks=(check,))
+    tests = {"cogging_order_vs_slots": ("cogging", "open_circuit")}
+    plan = make_plan(state, (*WAYS, COGGING, HOLD), tests, Aims())
+    assert (plan.steps, plan.beyond) == ((), ())
+    asked = make_plan(state, (*WAYS, COGGING, HOLD), tests, Aims(frozenset({"cogging_peak_nm"})))
+    assert asked.steps == ()
+    assert [(doubt.name, doubt.words) for doubt in asked.beyond] == [
+        ("cogging_peak_nm", "no cogging found")
+    ]
+
+
+def test_one_of_several_constants_is_enough() -> None:
+    """Friction with Kt from the back-EMF: a drive is missing, not the torque map."""
+    friction = Way(
+        ("b_visc_nm_s_rad",), ("drive", "spin_down"), "drive and coast", (),
+        ("kt_peak_nm_a", "kt_from_ke_nm_a"),
+    )  # fmt: skip
+    rest = {n: e for n, e in ALL_KNOWN.items() if n != "kt_peak_nm_a"}
+    with_ke = {**rest, "kt_from_ke_nm_a": measured("kt_from_ke_nm_a", 0.1)}
+    ways = (*WAYS, friction)
+    assert settling_tests("b_visc_nm_s_rad", known(with_ke, "spin_down"), ways) == {"drive"}
+    assert settling_tests("b_visc_nm_s_rad", known(rest, "spin_down"), ways) == {"torque_map"}

@@ -26,6 +26,7 @@ ESTIMATE = Estimate(
     at_bound=True,
     orders=(Order(60, 0.006, 1e-5, 0.7),),
     impossible=True,
+    settled=True,
 )
 X = np.linspace(0.0, 1.0, 5)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main as door
+from pipeline.crosscheck.plan import Known, settling_tests
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.datasheets import datasheet_of, read_datasheets
 from pipeline.io.publish import canonical_json
@@ -19,7 +20,7 @@ from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.uncertainty import type_a, type_b
 from pipeline.settings import PlanSettings
-from pipeline.stages.plan import main
+from pipeline.stages.plan import main, ways_of
 
 DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
 
@@ -146,3 +147,13 @@ def test_a_file_that_is_no_datasheet(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "datasheets" / "x.json").write_bytes(content)
     with pytest.raises(UsageError, match=r"x\.json"):
         read_datasheets(tmp_path)
+
+
+def test_friction_is_never_had_by_holding_the_rotor_still() -> None:
+    """Whatever else is missing: what only refines the inertia is not recorded for its sake."""
+    ways = ways_of()
+    for tests in ((), ("spin_down",), ("drive",), ("drive", "spin_down"), ("drive", "resistance")):
+        state = Known("m", {}, (), frozenset(tests))
+        found = settling_tests("b_visc_nm_s_rad", state, ways)
+        assert found
+        assert not found & {"holding_current", "cogging"}, (tests, found)
