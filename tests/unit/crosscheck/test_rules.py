@@ -127,6 +127,7 @@ def test_resistance_follows_copper() -> None:
 def test_balance_of_the_phases() -> None:
     assert judge("resistance_balance", constants()).status == "pass"
     check = judge("resistance_balance", constants({"resistance_imbalance": 0.05}))
+    assert "0.0500 ± 0.0002 (k=2), at most 0.02" in check.meaning
     assert (check.status, check.limit) == ("fail", pytest.approx(0.02 + 2 * 0.002 * 0.05))
 
 
