@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from pipeline.physics.conventions import convention_suspect
+from pipeline.physics.conventions import MOST_SUSPECTS, convention_suspect, conventions_hit
 from pipeline.records.datasheet import Check, CheckStatus
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, propagate, standard_uncertainty
@@ -50,7 +50,8 @@ def judge_ratio(
     """A check of a ratio that is 1 when all is well.
 
     `value` is the ratio, `limit` the largest deviation from 1 that passes. On anything but a
-    pass, `suspect` names the convention whose number the ratio lands on, else `otherwise`.
+    pass, `suspect` names the convention whose number the ratio lands on, else `otherwise`; nothing
+    where the ratio is so uncertain that it lands on many.
     """
     status = judge_deviation(ratio - 1.0, u, allowance)
     words = f"{meaning}; {ratio:.4f} ± {2.0 * u:.4f} (k=2), expected 1 within the limit"
@@ -58,7 +59,8 @@ def judge_ratio(
     if status == "not_evaluated":
         words += "; too uncertain to judge"
     elif status != "pass":
-        suspect = convention_suspect(ratio, u, pole_pairs) or otherwise
+        vague = len(conventions_hit(ratio, u, pole_pairs)) > MOST_SUSPECTS
+        suspect = None if vague else convention_suspect(ratio, u, pole_pairs) or otherwise
     return Check(name, status, words, ratio, allowance + 2.0 * u, "1", suspect)
 
 

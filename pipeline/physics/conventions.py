@@ -310,21 +310,36 @@ MAGIC_RATIOS: tuple[tuple[float, str, str], ...] = (
     (3.0 / math.sqrt(2.0), "2.1213", "torque per rms ampere against p psi"),
     (2.0 * math.pi, "2*pi", "per cycle against per radian"),
     (60.0 / (2.0 * math.pi), "9.5493", "rpm against rad/s"),
+    (100.0, "100", "hundredths against the unit: N·cm against N·m"),
+    (1000.0, "1000", "thousandths against the unit: ms, mA, mV or mN·m"),
 )
+
+
+MOST_SUSPECTS = 2
 
 
 def convention_suspect(ratio: float, u_ratio: float, pole_pairs: int | None) -> str | None:
     """The convention whose number a ratio of two like quantities lands on, or None.
 
-    A number or its inverse is hit within 1 % + 2 u, u relative; of several the two nearest are
-    named, the nearest first. None where the ratio is 1 within that, or hits nothing.
+    One of `conventions_hit`, or both of two, the nearest first; None where it hits none, or so many
+    that they tell nothing.
+    """
+    hits = conventions_hit(ratio, u_ratio, pole_pairs)
+    return " or ".join(hits) if 0 < len(hits) <= MOST_SUSPECTS else None
+
+
+def conventions_hit(ratio: float, u_ratio: float, pole_pairs: int | None) -> list[str]:
+    """The conventions within whose reach a ratio of two like quantities lies, the nearest first.
+
+    A number or its inverse is hit within 1 % + 2 u, u relative. None where the ratio is 1 within
+    that.
     """
     if not (ratio > 0.0 and math.isfinite(ratio) and math.isfinite(u_ratio)):
-        return None
+        return []
     reach = 0.01 + 2.0 * u_ratio / ratio
     place = math.log(ratio)
     if abs(place) <= reach:
-        return None
+        return []
     numbers = list(MAGIC_RATIOS)
     if pole_pairs is not None and pole_pairs > 1:
         words = "electrical against mechanical angle, speed or frequency"
@@ -334,5 +349,4 @@ def convention_suspect(ratio: float, u_ratio: float, pole_pairs: int | None) -> 
         miss = abs(abs(place) - math.log(number))
         if miss <= reach:
             hits.append((miss, f"{label if place > 0.0 else f'1/{label}'}: {words}"))
-    nearest = [text for _, text in sorted(hits)[:2]]
-    return " or ".join(nearest) if nearest else None
+    return [text for _, text in sorted(hits)]

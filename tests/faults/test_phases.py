@@ -211,6 +211,15 @@ def test_speed_against_angle(
     assert words in error.message
 
 
+def test_a_clock_in_milliseconds(rng: np.random.Generator) -> None:
+    """Refused: the speed is 1000 times the angle's rate, and the clock is what is suspected."""
+    capture = spin_down(MOTOR, rng)
+    error = refused(with_column(capture, "t_s", 1e3 * column(capture, "t_s")))
+    assert error.code == "speed_against_angle"
+    assert "1000 times" in error.message
+    assert "clock t_s is in ms" in error.message
+
+
 def test_speed_against_angle_of_a_shaft_that_ends_where_it_began(rng: np.random.Generator) -> None:
     """Refused: a reversing drive turns as far back as forth, and is in rpm all the same."""
     capture = drive(MOTOR, rng)

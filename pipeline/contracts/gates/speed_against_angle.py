@@ -20,6 +20,8 @@ SUSPECTS = {
     0.017453: "the angle is in degrees",
     TURN_RAD: "the angle is in turns",
     1.0 / TURN_RAD: "the speed is in turns a second",
+    1000.0: "the clock t_s is in ms, or the speed in mrad/s",
+    1e6: "the clock t_s is in µs",
     -1.0: "one of them has its sign turned",
 }
 

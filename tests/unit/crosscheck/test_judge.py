@@ -40,3 +40,17 @@ def test_ratio_cancels_the_shared_gain() -> None:
     ratio, u = ratio_of(kt, ke)
     assert ratio == pytest.approx(1.0)
     assert u == pytest.approx(math.hypot(0.002, 0.001))
+
+
+def test_a_ratio_that_could_be_anything_names_no_suspect() -> None:
+    """0.26 ± 0.27 reaches from 2 to 2 pi and beyond: neither a convention nor another cause."""
+    check = judge_ratio("tau", 0.2648, 0.1363, 0.04, "tau over L/R", None, "leads")
+    assert (check.status, check.suspect) == ("fail", None)
+    sure = judge_ratio("tau", 0.2648, 0.001, 0.04, "tau over L/R", None, "leads")
+    assert sure.suspect == "leads"
+
+
+def test_a_torque_in_newton_centimetres_is_named() -> None:
+    check = judge_ratio("kt_vs_ke", 100.0002, 0.3, 0.01, "Kt over Ke", 10, "gain of the torque")
+    assert check.suspect is not None
+    assert "N·cm" in check.suspect
