@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.shaft_rows import COAST, DRIVE, OVERLAP, ShaftRows
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
@@ -354,8 +355,7 @@ def _form(coefficients: Array, free: bool, rows: ShaftRows) -> tuple[Array, tupl
 
 
 def drag_words(found: DragFit) -> str:
-    """What the fit had to add to Coulomb and viscous drag, in words."""
+    """What stands in the fit beside Coulomb and viscous drag, in words."""
     added = [n for n in found.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
     words = "drag curve left free, its form is not Coulomb and viscous" if found.free else ""
-    also = f"also fitted, because the data demand it: {', '.join(added)}" if added else ""
-    return "; ".join(w for w in (words, also) if w) or "Coulomb and viscous drag hold"
+    return "; ".join(w for w in (words, allowed_for(added)) if w) or "Coulomb and viscous drag hold"

@@ -18,6 +18,7 @@ from pipeline.fit.instruments import (
     voltage_source,
 )
 from pipeline.fit.magnet_coefficient import magnet_coefficient
+from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.clusters import cluster_covariance
@@ -258,7 +259,7 @@ def _estimates(
     paths = tuple(sorted(c.path for c in rows.captures))
     words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
     if chosen:
-        words.append(f"the data also demand {', '.join(chosen)}")
+        words.append(allowed_for(chosen))
     unstated = unstated_note(rows.captures, ("voltage", "current"))
     words += [unstated] if unstated else []
     per_kelvin = {GIVES[0]: abs(magnet), GIVES[1]: COPPER_COEFFICIENT_25_1_K}

@@ -208,7 +208,7 @@ def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimat
 
 def _note(rows: ShaftRows, torque: Torque, found: DragFit) -> str:
     words = [torque.words, drag_words(found)]
-    words.append("iron loss under the magnet's flux counts as drag")
+    words.append("what iron loss there is under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")

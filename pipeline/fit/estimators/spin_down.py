@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.fit.drag import DRAG_FORMS, STRIBECK
 from pipeline.fit.instruments import budget_of
+from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.coasting import coast_down, coasting_rows
 from pipeline.numerics.least_squares import (
@@ -252,7 +253,7 @@ def _estimates(
     paths = tuple(sorted({c.path for c in coasts}))
     added = [*motion.extras, *motion.ripples]
     note = f"{len(coasts)} coasts; residual {np.sqrt(spread):.2g} times the encoder's own noise"
-    note += f"; the data also demand {', '.join(added)}" if added else ""
+    note += f"; {allowed_for(added)}" if added else ""
     form = np.zeros(2)
     if np.sqrt(spread) > UNEXPLAINED:
         form = _form(motion, coasts, found)

@@ -15,6 +15,7 @@ from pipeline.fit.instruments import (
     unstated_note,
 )
 from pipeline.fit.magnet_coefficient import SOURCE, magnet_coefficient
+from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.operating_points import Point, PointTable, operating_points, pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.torque_slope import Slope, slope_without_d
@@ -311,7 +312,7 @@ def _note(
 ) -> str:
     words = [table.note()]
     if chosen:
-        words.append(f"the data also demand columns {', '.join(chosen)}")
+        words.append(allowed_for(chosen))
     if not any(c.has("temp_magnet_degc") for c in captures):
         words.append("magnet temperature not logged, taken as ambient or 25 degC")
     if np.unique(np.sign(_column(points, "iq_a").round(6))).size < 2:

@@ -365,11 +365,12 @@ def test_torque_that_is_friction_in_disguise_is_not_parted() -> None:
     assert torque_is_parted(np.column_stack([speed**2, *rest]), sense)
 
 
-def test_what_inertia_added_is_said_in_plain_words() -> None:
+def test_what_inertia_added_is_said_and_claims_no_effect() -> None:
     known = chain(recorded("windage"), SPIN_DOWN, TORQUE_MAP, COGGING, INERTIA)
     found = known.by("inertia", "j_rotor_kgm2")
     assert found is not None
-    assert "also fitted, because the data demand it: " in found.note
+    assert "allowed for in this fit, no finding (diagnose tells effects): " in found.note
+    assert "demand" not in found.note
     assert "windage" in found.note
 
 

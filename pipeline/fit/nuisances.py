@@ -1,0 +1,16 @@
+"""What a fit allowed for beside what it measures, in words that claim no effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def allowed_for(terms: Sequence[str]) -> str:
+    """The nuisance terms of a fit in words, or an empty string.
+
+    They soak up what would else bend the constants, whatever it comes from, and one stands for
+    another. Which effects a motor shows is told by `diagnose`, which fits all tests at once.
+    """
+    if not terms:
+        return ""
+    return f"allowed for in this fit, no finding (diagnose tells effects): {', '.join(terms)}"
