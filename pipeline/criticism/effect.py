@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+SCALES = ("current_a", "voltage_v", "speed_rad_s", "freq_hz", "torque_nm", "period_s", "flux_wb")
+"""What `Machine.scales` holds, and a parameter's `scale` may name."""
+
 _NEIGHBOURS = 2
 _SAMPLED = (
     "id_a",

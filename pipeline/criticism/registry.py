@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 from pipeline.criticism import effects as effects_room
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.own_effect import guarded, told
 from pipeline.records.errors import UsageError
 
 
@@ -23,7 +24,8 @@ def effects(effects_path: str | None = None) -> dict[str, Effect]:
     """Every effect by name, sorted; a user's file may not take the name of one of ours.
 
     The folder is looked at anew every time, and files that have not changed are the same effects.
-    Raises UsageError for a folder that is not there, a file without `EFFECT`, a name taken twice.
+    Raises UsageError for a folder that is not there, a file that cannot be run or holds no
+    `EFFECT`, an effect that cannot be right (`own_effect`), a name taken twice.
     """
     return dict(_library(_user_files(effects_path)))
 
@@ -73,11 +75,12 @@ def _load(path: Path, digest: str) -> Effect:
     module = importlib.util.module_from_spec(spec)
     # by its name it is known in another process too
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    effect = getattr(module, "EFFECT", None)
-    if not isinstance(effect, Effect):
-        raise UsageError(f"{path.name} defines no EFFECT", "see docs/criticism.md")
-    return effect
+    with told(path):
+        spec.loader.exec_module(module)
+        effect = getattr(module, "EFFECT", None)
+        if not isinstance(effect, Effect):
+            raise UsageError(f"{path.name} defines no EFFECT", "see docs/criticism.md")
+        return guarded(effect, path, path.read_text(encoding="utf-8", errors="replace"))
 
 
 def chosen(names: tuple[str, ...], effects_path: str | None = None) -> dict[str, Effect]:

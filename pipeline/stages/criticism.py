@@ -38,7 +38,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     """
     input_folder(settings.input)
     watch, output = Stopwatch(), output_folder(settings.output)
-    if settings.model.effects:
+    if settings.model.effects or settings.effects_path is not None:
         _known(settings)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     with mate(settings.effects_path) as second:

@@ -54,7 +54,7 @@ def test_a_folder_that_has_changed_is_read_again(tmp_path: Path):
 def test_files_of_one_name_in_two_folders_are_two_effects(tmp_path: Path):
     """Each travels to another process by the name of its own module."""
     one, two = (effects(written(tmp_path / str(n), n))["brake"] for n in (2, 3))
-    assert one.torque.__module__ != two.torque.__module__
+    assert one.torque.call.__module__ != two.torque.call.__module__
     for effect, factor in ((one, 2.0), (two, 3.0)):
         assert strength(pickle.loads(pickle.dumps(effect))) == factor
 

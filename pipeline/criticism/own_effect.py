@@ -1,0 +1,280 @@
+"""Effects of a user's files: what is wrong with one is told with its file, line and remedy.
+
+A hook of theirs is called through a `Hook`; hooks of the library are not, and cost nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import SCALES, Effect, Machine, Operating, Parameter, Recorded
+from pipeline.records.errors import PipelineError, UsageError
+
+_HOOKS = (
+    "coenergy",
+    "drop",
+    "torque",
+    "angle",
+    "current",
+    "load",
+    "voltage",
+    "shaft",
+    "speed",
+)
+_OF_OPERATING = (
+    "id_a",
+    "iq_a",
+    "eps_rad",
+    "theta_rad",
+    "omega_rad_s",
+    "winding_k",
+    "magnet_k",
+    "freq_hz",
+)
+_OF_RECORDED = ("i_a", "torque_nm", "eps_rad", "omega_e_rad_s")
+_MEND = "correct the file"
+_TRIED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Hook:
+    """A hook of the effect of a user's file; what it gives is a finite number a sample.
+
+    Raises UsageError where it does not, or fails.
+    """
+
+    call: Callable[..., Any]
+    what: str
+    file: str
+
+    def __call__(self, *arguments: Any) -> Any:
+        """The hook's value [n]."""
+        q = next((a for a in arguments if isinstance(a, Mapping)), {})
+        with told(Path(self.file), self.what, q):
+            value = self.call(*arguments)
+        inputs = _inputs(arguments[0])
+        if inputs:
+            self._look(value, inputs)
+        return value
+
+    def _look(self, value: Any, inputs: list[NDArray[Any]]) -> None:
+        shape, found = inputs[0].shape, np.asarray(value)
+        where = f"{Path(self.file).name}{_at(getattr(self.call, '__code__', None))}: {self.what}"
+        if found.dtype.kind not in "bifc":
+            words = f"{where} gives {type(value).__name__} and no numbers"
+            raise UsageError(words, "return an array of one number a sample")
+        try:
+            fits = np.broadcast_shapes(found.shape, shape) == shape
+        except ValueError:
+            fits = False
+        if not fits:
+            words = f"{where} gives an array of shape {found.shape} for samples of shape {shape}"
+            raise UsageError(words, "return one number a sample")
+        if np.isfinite(found).all():
+            return
+        known = np.logical_and.reduce([np.isfinite(one) for one in inputs if one.shape == shape])
+        lost = np.broadcast_to(~np.isfinite(found), shape) & known
+        if lost.any():
+            words = f"{where} gives no finite number at {np.count_nonzero(lost)} of {lost.size}"
+            raise UsageError(f"{words} samples", "give one for every current, speed and angle")
+
+
+def _inputs(first: Any) -> list[NDArray[Any]]:
+    """The arrays [n] that a hook is given, by its first argument."""
+    if isinstance(first, np.ndarray):
+        return [first]
+    names: tuple[str, ...] = ()
+    if isinstance(first, Operating):
+        names = ("omega_rad_s", *_OF_OPERATING)
+    elif isinstance(first, Recorded):
+        names = _OF_RECORDED
+    return [np.asarray(getattr(first, name)) for name in names]
+
+
+def guarded(effect: Effect, path: Path, text: str) -> Effect:
+    """A user's effect with its hooks behind `Hook`s; raises UsageError for what is wrong with it.
+
+    Scales are looked at, and for the names of parameters every hook is tried; `text` is the file's.
+    """
+    what = f"effect {effect.name}"
+    for parameter in effect.parameters:
+        _known_scale(parameter, path, what, text)
+    hooks = {name: getattr(effect, name) for name in _HOOKS}
+    behind: dict[str, Any] = {
+        name: Hook(hook, f"{name} of {what}", str(path))
+        for name, hook in hooks.items()
+        if hook is not None
+    }
+    if effect.expand is not None:
+        behind["expand"] = _Expand(effect.expand, what, str(path))
+    made = replace(effect, **behind)
+    _try(made, path)
+    return made
+
+
+@dataclass(frozen=True, slots=True)
+class _Expand:
+    """`expand` of a user's effect, held against the scales that there are."""
+
+    call: Callable[[Machine], tuple[Parameter, ...]]
+    what: str
+    file: str
+
+    def __call__(self, machine: Machine) -> tuple[Parameter, ...]:
+        with told(Path(self.file), f"expand of {self.what}"):
+            parameters = tuple(self.call(machine))
+        for parameter in parameters:
+            _known_scale(parameter, Path(self.file), self.what)
+        return parameters
+
+
+def _known_scale(parameter: Parameter, path: Path, what: str, text: str = "") -> None:
+    if parameter.scale == "1" or parameter.scale in SCALES:
+        return
+    quoted = (f'"{parameter.scale}"', f"'{parameter.scale}'")
+    found = [n for n, line in enumerate(text.splitlines(), 1) if any(one in line for one in quoted)]
+    at = f", line {found[0]}" if found else ""
+    words = f"{path.name}{at}: {what}: {parameter.name} has the scale {parameter.scale!r}"
+    near = get_close_matches(parameter.scale, SCALES, 1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise UsageError(words, f"{hint}scales are 1, {', '.join(SCALES)}")
+
+
+class _NoNameError(KeyError):
+    """A name that a table has not."""
+
+
+class _Named(dict[str, float]):
+    """A table of names, such as parameters or scales, that all are known."""
+
+    def __missing__(self, name: str) -> float:
+        raise _NoNameError(name)
+
+
+def _try(effect: Effect, path: Path) -> None:
+    """Calls every hook once, for the names that it asks of its parameters.
+
+    Whatever else befalls it here is told where it befalls it on captures: this machine is no motor.
+    """
+    x, r = _operating(), _recorded()
+    line: NDArray[Any] = np.ones(_TRIED)
+    calls = {
+        "coenergy": (x,),
+        "drop": (x,),
+        "torque": (x,),
+        "angle": (x,),
+        "current": (r,),
+        "load": (r,),
+        "shaft": (line,),
+    }
+    try:
+        parameters = effect.every(x.machine)
+        q = _Named({p.name: p.scan[0] if p.scan else 0.0 for p in parameters})
+    except Exception:  # noqa: BLE001 (a machine of no slots may be nothing to it)
+        return
+    for name, given in calls.items():
+        _ask(getattr(effect, name), (*given, q), q, path)
+    _ask(effect.speed, (line, q, x.ts_s), q, path)
+    _ask(effect.voltage, (line + 0j, x, q, "drive"), q, path)
+
+
+def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Path) -> None:
+    """Raises UsageError where a hook asks for a parameter that its effect has not."""
+    if hook is None:
+        return
+    try:
+        with np.errstate(all="ignore"):
+            hook.call(*arguments)
+    except _NoNameError as error:
+        raise _fault(error, path, hook.what, q) from error
+    except (Exception, SystemExit):  # noqa: BLE001 (see `_try`)
+        return
+
+
+@contextmanager
+def told(path: Path, what: str = "", q: Mapping[str, float] | None = None) -> Iterator[None]:
+    """Whatever goes wrong in a user's file, as one line of file, line and remedy."""
+    try:
+        yield
+    except PipelineError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise _fault(error, path, what, q or {}) from error
+
+
+def _fault(error: BaseException, path: Path, what: str, q: Mapping[str, float]) -> UsageError:
+    line = _line(error, path)
+    where = path.name + ("" if line is None else f", line {line}") + (f": {what}" if what else "")
+    if isinstance(error, SystemExit):
+        return UsageError(f"{where}: it ends the program", "take the exit out of the file")
+    if isinstance(error, KeyError) and q and error.args and error.args[0] not in q:
+        asked = f"{where}: asks for {error.args[0]!r}"
+        return UsageError(
+            asked, f"its parameters are {', '.join(q)}; scales are {', '.join(SCALES)}"
+        )
+    said = (error.msg if isinstance(error, SyntaxError) else str(error)).splitlines()
+    words = ": ".join(filter(None, [type(error).__name__, said[0] if said else ""]))
+    return UsageError(f"{where}: {words}", _MEND)
+
+
+def _line(error: BaseException, path: Path) -> int | None:
+    """The line of the file that is nearest to the error."""
+    if isinstance(error, SyntaxError) and error.filename == str(path):
+        return error.lineno
+    found, trace = None, error.__traceback__
+    while trace is not None:
+        if _of(trace) == str(path):
+            found = trace.tb_lineno
+        trace = trace.tb_next
+    return found
+
+
+def _of(trace: TracebackType) -> str:
+    return trace.tb_frame.f_code.co_filename
+
+
+def _at(code: Any) -> str:
+    return "" if code is None else f", line {code.co_firstlineno}"
+
+
+def _operating() -> Operating:
+    """A few samples of a machine of size one."""
+    steps = np.linspace(0.1, 0.3, _TRIED)
+    machine = Machine(2, 12, _Named.fromkeys(SCALES, 1.0), (12,))
+    base = dict.fromkeys(("r_ohm", "ld_h", "lq_h", "psi_wb"), 1.0)
+    return Operating(
+        machine=machine,
+        base=base,
+        id_a=steps,
+        iq_a=steps,
+        eps_rad=2.0 * steps,
+        theta_rad=steps,
+        omega_rad_s=steps,
+        winding_k=steps,
+        magnet_k=steps,
+        travel_rad=np.full(_TRIED, math.inf),
+        inverter=True,
+        freq_hz=steps,
+        ts_s=1e-4,
+        psi_wb=steps.astype(np.complex128),
+        torque_em_nm=steps,
+        run=np.zeros(_TRIED, dtype=np.int64),
+        runs_rad=steps[:1],
+    )
+
+
+def _recorded() -> Recorded:
+    steps = np.linspace(0.1, 0.3, _TRIED)
+    return Recorded(
+        steps.astype(np.complex128), steps, steps, steps, 1e-4, inverter=True, instrument="drive"
+    )
