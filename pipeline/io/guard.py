@@ -14,12 +14,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from pipeline.records.errors import CaptureError, UsageError
 
 _MB = 2**20
 _TIMEOUT = b"Timeout"
+LEAST_MB = 32
+"""Memory without which the libraries can read no file, however small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +40,16 @@ class ReadLimits:
         """Refuses limits that no file could keep.
 
         Raises:
-            UsageError: A time or a memory that is not above zero, or no number.
+            UsageError: A time that is not above zero, a memory that is too little for any file.
 
         """
         if not self.seconds > 0.0:
             raise UsageError(f"read_seconds={self.seconds} is not above 0", "60 is usual")
-        if self.memory_mb <= 0:
-            raise UsageError(f"read_memory_mb={self.memory_mb} is not above 0", "1024 is usual")
+        if self.memory_mb < LEAST_MB:
+            raise UsageError(
+                f"read_memory_mb={self.memory_mb} is too little to read anything with",
+                f"{LEAST_MB} at least; 1024 is usual",
+            )
 
     def time_s(self, size_bytes: int) -> float:
         """Longest time for a file of that size [s]."""
@@ -116,6 +122,7 @@ def _memory(most_bytes: int) -> Iterator[None]:
         return
     import resource
 
+    _begin_libraries()
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     pages = int(Path("/proc/self/statm").read_bytes().split()[5])
     wanted = pages * resource.getpagesize() + most_bytes
@@ -126,6 +133,16 @@ def _memory(most_bytes: int) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+
+
+@cache
+def _begin_libraries() -> None:
+    """Starts the threads that reading needs: one that cannot be started under the limit may leave
+    the others waiting for it until the time is up, and their memory is no file's.
+    """
+    import polars as pl
+
+    pl.read_csv(b"t_s\n0\n")
 
 
 @dataclass(frozen=True, slots=True)

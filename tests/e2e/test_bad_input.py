@@ -205,7 +205,9 @@ def test_a_typo_in_an_option_is_usage(bench: Path, tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("word", ["read_seconds=-5", "read_memory_mb=0", "workers=-1"])
+@pytest.mark.parametrize(
+    "word", ["read_seconds=-5", "read_memory_mb=0", "read_memory_mb=31", "workers=-1"]
+)
 def test_impossible_limits_are_a_mistake_of_the_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], word: str
 ) -> None:

@@ -11,6 +11,7 @@ import pytest
 import zstandard
 
 from pipeline.__main__ import main
+from pipeline.io.guard import LEAST_MB
 from tests.faults.bombs import MB, chunk, file_of
 
 pytestmark = pytest.mark.workers
@@ -69,6 +70,14 @@ def test_inspect_reads_in_a_worker(folder: Path, capsys: pytest.CaptureFixture[s
     assert HEAVY in capsys.readouterr().err
     assert main(["inspect", str(folder / "whole.csv")]) == 0
     assert "in the form of the contract" in capsys.readouterr().out
+
+
+def test_the_least_memory_reads_a_small_file(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The threads of the libraries are begun before the limit is, and panic at none."""
+    assert main(["inspect", str(folder / "whole.csv"), f"read_memory_mb={LEAST_MB}"]) == 0
+    assert not capfd.readouterr().err
 
 
 def test_inspect_ends_where_the_reader_hangs(
