@@ -6,13 +6,24 @@ Text keys are taken as typed, because an override grammar would turn serial numb
 
 from __future__ import annotations
 
+import re
 import typing
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any
 
 from pipeline.commands import Command
 from pipeline.records.errors import UsageError
 from pipeline.settings import Settings, configuration_folder
+
+_BOOL = re.compile("true|false|yes|no|on|off|0|1", re.IGNORECASE)
+_INT = re.compile("[+-]?[0-9]+")
+_FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[+-]?[0-9]+)?|[+-]?(inf|nan)", re.IGNORECASE)
+_KINDS: dict[Any, tuple[re.Pattern[str], str, str]] = {
+    bool: (_BOOL, "neither true nor false", "true or false"),
+    int: (_INT, "no whole number", "a whole number"),
+    float: (_FLOAT, "no number", "a number"),
+}
 
 
 def load_settings(command: Command, words: list[str]) -> Settings:
@@ -30,7 +41,7 @@ def load_settings(command: Command, words: list[str]) -> Settings:
         if f"{key}_" in kinds:
             key = f"{key}_"  # the key is a word of Python, such as `from`
         if _is_text(kinds.get(key)):
-            texts[key] = _unquoted(value)
+            texts[key] = _text(command, key, _unquoted(value), kinds[key])
         elif command.free and key not in kinds:
             free[key] = _unquoted(value)
         else:
@@ -44,10 +55,29 @@ def load_settings(command: Command, words: list[str]) -> Settings:
             rest.append(f"++{word}" if nested else word)
     settings = _composed(command, rest)
     for key, text in texts.items():
-        setattr(settings, key, None if text == "null" else text)
+        setattr(settings, key, text)
     if command.free:
         setattr(settings, command.free, free)
     return settings
+
+
+def _text(command: Command, key: str, text: str, kind: Any) -> str | None:
+    """The value of a text key; raises UsageError for one that it cannot take."""
+    said = f"{command.name}: {key.rstrip('_')}={text}"
+    about = next(f.metadata for f in fields(command.settings) if f.name == key)
+    if text == "null":
+        if kind is str:
+            raise UsageError(f"{said} is nothing", f"it takes {about['words']}")
+        return None
+    if about["one_of"] and text not in about["one_of"]:
+        raise UsageError(f"{said} is unknown", f"it is {' or '.join(about['one_of'])}")
+    if not about["place"]:
+        return text
+    if not text.strip():
+        here = "; `.` is the current folder" if key in ("input", "output") else ""
+        raise UsageError(f"{said} is empty", f"it takes {about['words']}{here}")
+    # a shell expands no ~ after `=`
+    return str(Path(text).expanduser()) if text == "~" or text.startswith("~/") else text
 
 
 def _well_formed(command: Command, key: str, value: str) -> None:
@@ -61,6 +91,11 @@ def _well_formed(command: Command, key: str, value: str) -> None:
             has = ", ".join(f"{group}.{known}" for known in kinds)
             raise UsageError(f"{command.name}: no key {key!r}", f"{group} has {has}")
         kind = kinds[name]
+    if kind in _KINDS and not _KINDS[kind][0].fullmatch(_unquoted(value)):
+        _, wrong, right = _KINDS[kind]
+        raise UsageError(f"{command.name}: {key}={value} is {wrong}", f"write {key}= and {right}")
+    if kind is str and value == "null":
+        raise UsageError(f"{command.name}: {key}=null is nothing", f"write {key}= and a name")
     if is_dataclass(kind):
         known = sorted(path.stem for path in (configuration_folder() / key).glob("*.yaml"))
         if value not in known:
@@ -103,7 +138,8 @@ def _composed(command: Command, overrides: list[str]) -> Settings:
             config = compose(f"command/{command.name}", overrides=overrides)
         made: Settings = typing.cast(Settings, OmegaConf.to_object(config))
     except (HydraException, OmegaConfBaseException) as error:
-        reason = str(error).splitlines()[0].rstrip(".")
+        reasons = [str(one).splitlines()[0].rstrip(".") for one in (error, error.__cause__) if one]
+        reason = ": ".join(dict.fromkeys(reasons))
         raise UsageError(
             f"{command.name}: {reason}",
             f"`python -m pipeline {command.name} --help` lists the keys",

@@ -14,12 +14,21 @@ import pipeline
 from pipeline.records.errors import UsageError
 
 
-def key(default: Any, words: str, *, result: bool = True, room: str | None = None) -> Any:
+def key(
+    default: Any,
+    words: str,
+    *,
+    result: bool = True,
+    room: str | None = None,
+    place: bool = False,
+    one_of: tuple[str, ...] = (),
+) -> Any:
     """A settings field; `result` is False where the value cannot change what is computed.
 
-    `room` is a package each of whose modules is a name that the key takes.
+    `room` is a package each of whose modules is a name that the key takes. A `place` is a file,
+    folder or URL: never empty, and `~` is the user's home. `one_of` are all values that there are.
     """
-    metadata = {"words": words, "result": result, "room": room}
+    metadata = {"words": words, "result": result, "room": room, "place": place, "one_of": one_of}
     if isinstance(default, (dict, list)):
         return field(default_factory=lambda: type(default)(default), metadata=metadata)
     return field(default=default, metadata=metadata)
@@ -48,20 +57,32 @@ class ReadingSettings(Settings):
 class RunSettings(ReadingSettings):
     """`run`: captures in; datasheets, checks, report and recordings out."""
 
-    input: str = key("data/demo", "folder of captures, searched with its subfolders", result=False)
-    output: str = key("reports/demo", "folder for everything that is written", result=False)
+    input: str = key(
+        "data/demo", "folder of captures, searched with its subfolders", result=False, place=True
+    )
+    output: str = key(
+        "reports/demo", "folder for everything that is written", result=False, place=True
+    )
     source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
-    release: str = key("manual", "manual, or auto: release a datasheet that meets every condition")
-    limits: str = key("default", "limits file of conf/limits/: constants a release must hold")
+    release: str = key(
+        "manual",
+        "manual, or auto: release a datasheet that meets every condition",
+        one_of=("manual", "auto"),
+    )
+    limits: str = key(
+        "default", "limits file of conf/limits/: constants a release must hold", place=True
+    )
     recover: bool = key(False, "use the good part of MCAP files that are cut off, unverified")
     workers: int = key(0, "motors worked on at once; 0 is one a core", result=False)
     executor: str = key("local", "local processes, or dask", result=False)
     scheduler: str | None = key(
         None, "tls://HOST:PORT of a Dask cluster; dask starts its own without", result=False
     )
-    tls_ca: str | None = key(None, "certificate of the cluster's authority", result=False)
-    tls_cert: str | None = key(None, "certificate of this client", result=False)
-    tls_key: str | None = key(None, "key of that certificate", result=False)
+    tls_ca: str | None = key(
+        None, "certificate of the cluster's authority", result=False, place=True
+    )
+    tls_cert: str | None = key(None, "certificate of this client", result=False, place=True)
+    tls_key: str | None = key(None, "key of that certificate", result=False, place=True)
     cache: bool = key(True, "remember in output/.cache what need not be done again", result=False)
     recordings: bool = key(True, "write a Rerun recording a capture", result=False)
     report: bool = key(True, "write the HTML report", result=False)
@@ -69,6 +90,7 @@ class RunSettings(ReadingSettings):
         "auto",
         "folder or URL that keeps every version; auto is registry/ in output, null is none",
         result=False,
+        place=True,
     )
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
@@ -88,15 +110,19 @@ class CalcSettings(Settings):
 class InspectSettings(ReadingSettings):
     """`inspect`: what one file holds."""
 
-    file: str = key("", "any file")
+    file: str = key("", "any file", place=True)
 
 
 @dataclass(kw_only=True)
 class PlanSettings(ReadingSettings):
     """`plan`: which test to record next."""
 
-    output: str = key("reports/demo", "output folder of a run: the plan is of its datasheets")
-    input: str | None = key(None, "folder of captures to plan from, where there is no run of them")
+    output: str = key(
+        "reports/demo", "output folder of a run: the plan is of its datasheets", place=True
+    )
+    input: str | None = key(
+        None, "folder of captures to plan from, where there is no run of them", place=True
+    )
     source: str = key("auto", "source map of conf/source/ for foreign files of input")
     motor: str | None = key(None, "motor_id; every motor without it")
 
@@ -107,7 +133,7 @@ class RegistrySettings(Settings):
 
     action: str = key("", "list, show, diff, at, verify, approve, revoke, tag or untag")
     motor: str | None = key(None, "motor_id; for `at` the date may stand here")
-    registry: str = key("reports/demo/registry", "folder or URL of the registry")
+    registry: str = key("reports/demo/registry", "folder or URL of the registry", place=True)
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL")
     revision: str | None = key(None, "1, 2, ... of the motor, for show, approve and revoke")
     version: str | None = key(None, "beginning of the version's digest, instead of a revision")
@@ -130,12 +156,16 @@ class RegressSettings(Settings):
         "motor, tag, status, version, revision, code, date, since, until (docs/lots.md)",
     )
     candidate: str = key("", "selector of what is judged; its motors are left out of the baseline")
-    limits: str = key("default", "limits file of conf/limits/, or the path of one")
+    limits: str = key("default", "limits file of conf/limits/, or the path of one", place=True)
     mode: str = key(
         "auto", "auto, lots, or code: the same captures under two versions of the pipeline"
     )
-    output: str = key("reports/demo", "folder for everything that is written", result=False)
-    registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
+    output: str = key(
+        "reports/demo", "folder for everything that is written", result=False, place=True
+    )
+    registry: str = key(
+        "auto", "folder or URL; auto is registry/ in output", result=False, place=True
+    )
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     diagnoses: str = key(
         "auto", "folders of diagnoses, parted by commas; auto is diagnosis/ in output and beside"
@@ -151,8 +181,10 @@ class ExportSettings(Settings):
     motor: str = key("", "motor_id")
     revision: str | None = key(None, "1, 2, ... of the motor; the newest released without it")
     version: str | None = key(None, "beginning of the version's digest, instead of a revision")
-    output: str = key("reports/demo", "folder to write export/ to", result=False)
-    registry: str = key("auto", "folder or URL; auto is registry/ in output", result=False)
+    output: str = key("reports/demo", "folder to write export/ to", result=False, place=True)
+    registry: str = key(
+        "auto", "folder or URL; auto is registry/ in output", result=False, place=True
+    )
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
     options: dict[str, Any] = key({}, "of the format: options.NAME=value")
 
@@ -161,7 +193,7 @@ class ExportSettings(Settings):
 class SimulateSettings(Settings):
     """`simulate`: captures of a simulated motor, and what is true of it."""
 
-    output: str = key("", "folder to write to", result=False)
+    output: str = key("", "folder to write to", result=False, place=True)
     motor: str = key("gimbal-5208", "design of conf/motor/")
     effects: str = key("", "[name, name=size, name.parameter=value, ...]; a name alone is typical")
     outside: str | None = key(None, "a term of nobody's library on top: eddy_brake, contact, ...")
@@ -193,12 +225,16 @@ class ModelSettings:
 class CompareSettings(ReadingSettings):
     """`compare`: where a model is off, signal by signal."""
 
-    input: str = key("data/demo", "folder of captures, searched with its subfolders", result=False)
-    output: str = key("reports/demo", "folder for everything that is written", result=False)
+    input: str = key(
+        "data/demo", "folder of captures, searched with its subfolders", result=False, place=True
+    )
+    output: str = key(
+        "reports/demo", "folder for everything that is written", result=False, place=True
+    )
     source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
     motor: str | None = key(None, "motor_id; every motor without it")
     model: ModelSettings = field(default_factory=ModelSettings)
-    effects_path: str | None = key(None, "folder of your own effects, one file each")
+    effects_path: str | None = key(None, "folder of your own effects, one file each", place=True)
 
 
 @dataclass(kw_only=True)
@@ -210,7 +246,7 @@ class DiagnoseSettings(CompareSettings):
 class ReviewSettings(Settings):
     """`review`: what a run and its diagnoses recorded, in the Rerun viewer."""
 
-    output: str = key("reports/demo", "output folder of a run")
+    output: str = key("reports/demo", "output folder of a run", place=True)
     motor: str | None = key(None, "motor_id: its captures, ladder and comparison; else the fleet")
     lot: str | None = key(None, "lot: its motors, and the regressions it took part in")
     web: bool = key(False, "serve a browser instead of opening a window; on this machine only")
@@ -222,7 +258,9 @@ class BenchmarkSettings(Settings):
     """`benchmark`: sealed simulated campaigns, diagnosed blind, with a table of marks."""
 
     action: str = key("run", "run, table (of what has been run), or sensitivity (measure a* anew)")
-    output: str = key("reports/benchmark", "folder of sealed truths and results", result=False)
+    output: str = key(
+        "reports/benchmark", "folder of sealed truths and results", result=False, place=True
+    )
     subset: str = key("small", "small, a fixed stratified set of minutes, or full, of hours")
     shard: str = key("1/1", "which part of the cases to work on: i/n, i from 1", result=False)
     seed: int = key(1, "master seed of every random draw")

@@ -23,6 +23,8 @@ _MB = 2**20
 _TIMEOUT = b"Timeout"
 LEAST_MB = 32
 """Memory without which the libraries can read no file, however small."""
+MOST = 1e9
+"""Seconds and megabytes beyond which the system counts no more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +45,17 @@ class ReadLimits:
             UsageError: A time that is not above zero, a memory that is too little for any file.
 
         """
-        if not self.seconds > 0.0:
-            raise UsageError(f"read_seconds={self.seconds} is not above 0", "60 is usual")
+        if not 0.0 < self.seconds <= MOST:
+            words = f"no time above 0 and up to {MOST:g} s"
+            raise UsageError(f"read_seconds={self.seconds} is {words}", "60 is usual")
         if self.memory_mb < LEAST_MB:
             raise UsageError(
                 f"read_memory_mb={self.memory_mb} is too little to read anything with",
                 f"{LEAST_MB} at least; 1024 is usual",
             )
+        if self.memory_mb > MOST:
+            told = f"read_memory_mb={self.memory_mb} is more than there can be"
+            raise UsageError(told, "1024 is usual")
 
     def time_s(self, size_bytes: int) -> float:
         """Longest time for a file of that size [s]."""

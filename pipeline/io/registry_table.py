@@ -69,6 +69,10 @@ Row = tuple[Event, str | None]
 Decide = Callable[[Sequence[Event]], Sequence[Row]]
 
 
+# Schemes that deltalake has always known; what it makes of another is asked of it.
+USUAL_SCHEMES = frozenset({"s3", "s3a", "gs", "gcs", "az", "azure", "abfs", "abfss", "file"})
+
+
 class EventTable:
     """The registry's table at a folder or an object-store URL; opened anew for every call."""
 
@@ -80,6 +84,23 @@ class EventTable:
                 f"registry {place!r}: Delta cannot work below a folder with such a name",
                 "name another by registry=FOLDER, or none by registry=null",
             )
+        if self.folder is None and place.partition("://")[0] not in USUAL_SCHEMES:
+            self._known_scheme()
+
+    def _known_scheme(self) -> None:
+        """Raises UsageError where deltalake keeps no tables at such an address."""
+        from deltalake import DeltaTable
+        from deltalake.exceptions import DeltaError
+
+        try:
+            DeltaTable(self.place, storage_options=self.options or None)
+        except (DeltaError, OSError, ValueError) as error:
+            said = str(error).lower()
+            if "scheme" not in said and "recognise url" not in said:
+                return
+            known = ", ".join(sorted(USUAL_SCHEMES))
+            words = f"registry {self.place}: no registry can be at such an address"
+            raise UsageError(words, f"a folder, or a URL of {known}") from error
 
     def events(self) -> list[Event] | None:
         """Every event in the order of commits; None where there is no table."""

@@ -14,6 +14,7 @@ from pipeline.io.publish import output_folder
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import CompareSettings
 from pipeline.stages.campaigns import campaigns, outcome_of, start_constants
@@ -37,10 +38,10 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     While workers read the captures, the module that the judge `needs` is imported.
     """
     input_folder(settings.input)
-    watch, output = Stopwatch(), output_folder(settings.output)
     if settings.model.effects or settings.effects_path is not None:
         _known(settings)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
+    watch, output = Stopwatch(), output_folder(settings.output)
     with mate(settings.effects_path) as second:
         with watch.stage("read"), ThreadPoolExecutor(1) as aside:
             asked = settings.input, settings.source, settings.motor, limits
@@ -58,8 +59,11 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
 
 
 def _known(settings: CompareSettings) -> None:
-    """Refuses the name of an effect that there is not, also of one to take away."""
+    """Refuses the name of an effect that there is not, also of one to take away, or is twice."""
     from pipeline.criticism.registry import chosen
 
     names = tuple(name.removeprefix("-") for name in settings.model.effects)
     chosen(names, settings.effects_path)
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise UsageError(f"model.effects names {twice[0]} twice", "name it once")

@@ -27,6 +27,8 @@ from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
 from pipeline.settings import ReviewSettings
 
+LAST_PORT = 65534
+"""One less than there are, for the fleet's table is on the next."""
 NO_SCREEN = "add web=true, or run it where there is a screen"
 
 
@@ -46,6 +48,8 @@ class Opened:
 def main(settings: ReviewSettings) -> Outcome:
     """Opens the fleet, one motor or one lot; refuses recordings that cannot be verified."""
     output = Path(settings.output)
+    if not 0 <= settings.port <= LAST_PORT:
+        raise UsageError(f"port={settings.port} is none", f"0, or one of 1 to {LAST_PORT}")
     if not output.is_dir():
         raise UsageError(f"output={settings.output} is no folder", "name the output of a run")
     chosen = _chosen(output, settings)

@@ -35,6 +35,7 @@ from pipeline.stages.fleet.publishing import (
     publish,
     removed_note,
 )
+from pipeline.stages.options import check_options
 
 CRUMBS = ".work"
 COMMITTED = 50
@@ -52,7 +53,8 @@ class Registered:
 
 def main(settings: RunSettings) -> Outcome:
     """Every motor of `input` to `output`; refused captures are named and the rest goes on."""
-    _known_options(settings)
+    check_options(settings)
+    ReadLimits(settings.read_seconds, settings.read_memory_mb)
     input_folder(settings.input)
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
@@ -121,29 +123,6 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
         ),
         watch.table(),
     )
-
-
-def _known_options(settings: RunSettings) -> None:
-    """Refuses an option of an estimator or check that does not exist: a typo must not be silent."""
-    if not (settings.fit or settings.gates or settings.crosscheck):
-        return
-    from pipeline.contracts.registry import gates
-    from pipeline.crosscheck.registry import rules
-    from pipeline.fit.registry import estimators
-
-    plugs: tuple[tuple[str, Mapping[str, Any], Mapping[str, Mapping[str, float]]], ...] = (
-        ("fit", settings.fit, {e.name: e.options for e in estimators()}),
-        ("gates", settings.gates, {g.name: g.settings() for g in gates()}),
-        ("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()}),
-    )
-    for room, given, known in plugs:
-        for name, options in given.items():
-            if name not in known:
-                raise UsageError(f"{room}.{name}: no such plug-in", f"one of {', '.join(known)}")
-            for option in options:
-                if option not in known[name]:
-                    has = ", ".join(known[name]) or "none"
-                    raise UsageError(f"{room}.{name}.{option}: no such option", f"it has {has}")
 
 
 def _registry(settings: RunSettings) -> Registry | None:

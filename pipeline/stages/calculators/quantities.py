@@ -174,7 +174,9 @@ def _value(kind: str, key: Key, text: str) -> float:
             f"write a number, or a number with one of {', '.join(u for u in units if u)}",
         )
     value = float(found[1]) * scales.get(typed, 1.0)
-    if not (math.isfinite(value) and value > key.low):
+    if not math.isfinite(value):
+        raise UsageError(f"calc {kind}: {key.name}={text}", "it is too large for a number")
+    if value <= key.low:
         raise UsageError(
             f"calc {kind}: {key.name}={text}", f"it must be above {key.low:g} {key.unit}"
         )

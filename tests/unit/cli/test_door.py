@@ -91,6 +91,104 @@ def test_a_reader_that_leaves_early_is_no_failure() -> None:
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("run workers=abc", "workers=abc is no whole number; write workers= and a whole number"),
+        ("run workers=1.5", "workers=1.5 is no whole number"),
+        ("simulate seed=x", "seed=x is no whole number"),
+        ("run report=maybe", "report=maybe is neither true nor false"),
+        ("run timings=3", "timings=3 is neither true nor false"),
+        ("run read_seconds=abc", "read_seconds=abc is no number"),
+        ("run read_seconds=nan", "read_seconds=nan is no time"),
+        ("run read_seconds=inf", "read_seconds=inf is no time"),
+        ("run read_memory_mb=99999999999999", "is more than there can be"),
+        ("compare model.name=null", "model.name=null is nothing"),
+        ("run input=null", "input=null is nothing; it takes folder of captures"),
+        ("run output=null", "output=null is nothing"),
+        ("compare input=null", "input=null is nothing"),
+        ("diagnose output=null", "output=null is nothing"),
+        ("plan output=null", "output=null is nothing"),
+        ("run limits=null", "limits=null is nothing"),
+        ("run input=", "input= is empty; it takes folder of captures"),
+        ("run output=", "output= is empty"),
+        ("simulate output=", "output= is empty; it takes folder to write to; `.` is"),
+        ("compare effects_path=", "effects_path= is empty"),
+        ("registry list registry=", "registry= is empty"),
+        ("run release=yes", "release=yes is unknown; it is manual or auto"),
+        ("run gates=3", "gates=3"),
+        ("run gates.sampling_rate=3", "write gates.sampling_rate.OPTION=number; it has enabled"),
+        ("run fit.current_step=null", "write fit.current_step.OPTION=number; it has least_share"),
+        ("run crosscheck.kt_vs_ke=abc", "crosscheck.kt_vs_ke=abc: kt_vs_ke is no option"),
+        ("run crosscheck.kt_vs_ke.allowance=abc", "allowance=abc is not a number; "),
+        ("run crosscheck.kt_vs_ke.allowance=[1]", "allowance=[1] is not a number; "),
+        ("run crosscheck.kt_vs_ke.allowance=true", "allowance=True is not a number; "),
+        ("run crosscheck.kt_vs_ke.allowance=-0.1", "is not a number of 0 or more; "),
+        ("run fit.current_step.least_share=-1", "least_share=-1 is not a number from 0 to 1"),
+        ("run fit.current_step.least_share=nan", "least_share=nan is not a number"),
+        ("run fit.current_step.least_share=inf", "least_share=inf is not a number"),
+        ("run fit.cogging.level=0", "level=0 is not a number between 0 and 1"),
+        ("run fit.soak.temp_assumed_degc=-300", "is not above -273.15 degC"),
+        ("run gates.sampling_rate.enabled=2", "enabled=2 is not 1 or 0"),
+        ("compare model.effects=[cogging,cogging]", "model.effects names cogging twice"),
+        ("compare model.effects=[cogging,-cogging]", "model.effects names cogging twice"),
+        ("review web=true port=99999", "port=99999 is none; 0, or one of 1 to 65534"),
+        ("review port=-1", "port=-1 is none"),
+        ("run registry=http://x/y", "registry http://x/y: no registry can be at such an address"),
+        ("registry list registry=foo://x/y", "no registry can be at such an address"),
+        ("calc ke-kt ke_ll_peak=1e400", "ke_ll_peak_v_s_rad=1e400; it is too large for a number"),
+    ],
+)
+def test_a_value_that_cannot_be_is_named_with_what_can_be(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: str,
+    told: str,
+) -> None:
+    """One line, exit code 2, and nothing is read or written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in").mkdir()
+    command, *keys = words.split()
+    given = {"input": "in", "output": "out"} if command in ("run", "compare", "diagnose") else {}
+    given = {k: v for k, v in given.items() if not any(w.startswith(f"{k}=") for w in keys)}
+    assert main([command, *(f"{k}={v}" for k, v in given.items()), *keys]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ")
+    assert told in line
+    assert command in ("compare", "diagnose") or [path.name for path in tmp_path.iterdir()] == [
+        "in"
+    ]
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        "fit.soak.temp_assumed_degc=-40",
+        "fit.hand_turn.alpha_assumed_1_k=-0.002",
+        "gates.sampling_rate.enabled=false",
+        "gates.sampling_rate.step_warn=0",
+        "crosscheck.kt_vs_ke.allowance=1e-3",
+        "report=off",
+        "workers='2'",
+        "read_seconds=1.5e2",
+    ],
+)
+def test_what_can_be_is_taken(tmp_path: Path, word: str) -> None:
+    """No captures are there: exit code 4."""
+    (tmp_path / "in").mkdir()
+    assert main(["run", f"input={tmp_path / 'in'}", f"output={tmp_path / 'out'}", word]) == 4
+
+
+def test_a_tilde_is_the_home_which_no_shell_expands_after_an_equals_sign(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("HOME", "/home/someone")
+    settings = load_settings(COMMANDS["run"], ["input=~/captures", "output=a~b"])
+    assert isinstance(settings, RunSettings)
+    assert (settings.input, settings.output) == ("/home/someone/captures", "a~b")
+
+
 def test_text_keys_are_taken_as_typed() -> None:
     """00123 is a serial number, 12:30:45 no base-60 integer, ${...} no look-up."""
     for text in ("00123", "12:30:45", "${oc.env:HOME}", "a b", "[x]", "caf\u00e9"):
