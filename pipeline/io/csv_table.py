@@ -24,8 +24,9 @@ _MAX_COLUMNS = 4096
 _BLOCK_BYTES = 2**22
 SEPARATORS = (";", "\t", ",", "|")
 _COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
+_DECIMAL_COMMA = re.compile(rb"\d,\d")
 _LONG_INTEGER = re.compile(r"^-?\d{16,}$")
-_PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh")
+PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh", b"\xfd7zXZ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ def _refuse(
 
 def check_text(data: bytes) -> None:
     """Refuse bytes that are no plain text table: packed, UTF-16, NUL, or CR line ends."""
-    if data.startswith(_PACKED):
+    if data.startswith(PACKED):
         raise _refuse("encoding", "the file is packed", "unpack it first")
     if data.startswith((b"\xff\xfe", b"\xfe\xff")) or b"\0" in data:
         raise _refuse(
@@ -102,7 +103,7 @@ def read_csv(
     if stated is None and dialect.whole_last_line:
         _check_last_line(body, rows)
     names, units = _header(head, dialect)
-    _check_separator(names, dialect)
+    _check_separator(names, rows, dialect)
     rows = _even_out(rows, dialect)
     names = _check_shape(rows, names, dialect)
     fields = _parse(rows, names, dialect, wanted)
@@ -212,16 +213,18 @@ def _header(
     return names, units
 
 
-def _check_separator(names: Sequence[str], dialect: CsvDialect) -> None:
+def _check_separator(names: Sequence[str], rows: bytes, dialect: CsvDialect) -> None:
     """Refuses a header that is one field by the dialect's separator and many by another."""
     used = [mark for mark in SEPARATORS if mark != dialect.separator and mark in names[0]]
     if len(names) > 1 or not used:
         return
+    comma = used[0] != "," and _DECIMAL_COMMA.search(rows, 0, MAX_HEAD_BYTES)
+    layout = f"separator: {used[0]!r}" + (", decimal: ','" if comma else "")
     raise _refuse(
         "separator",
         f"the fields are separated by {used[0]!r}, where {dialect.separator!r} is expected",
         "save it with commas between fields and points as decimal signs, or write a source map "
-        f"in conf/source with layout: {{separator: {used[0]!r}}}; `inspect` starts one",
+        f"in conf/source with layout: {{{layout}}}; `inspect` starts one",
     )
 
 

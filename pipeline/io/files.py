@@ -6,6 +6,7 @@ that shrinks under a map would end the process.
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Iterator
@@ -18,6 +19,13 @@ from pipeline.io.mcap.limits import MAX_FILE_BYTES
 from pipeline.records.errors import CaptureError, MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import printable
+
+_REMEDIES = {
+    errno.EACCES: "check its permissions",
+    errno.EPERM: "check its permissions",
+    errno.ENOENT: "put it back, or run again",
+    errno.ELOOP: "remove the link",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,4 +161,5 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def _not_readable(fault: OSError) -> CaptureError:
-    return CaptureError("unreadable", f"it cannot be read: {fault.strerror}", "check the disk")
+    remedy = _REMEDIES.get(fault.errno or 0, "check the disk")
+    return CaptureError("unreadable", f"it cannot be read: {fault.strerror}", remedy)

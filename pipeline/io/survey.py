@@ -7,12 +7,13 @@ stranger's bytes can be parsed in another process than the one that puts the bat
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, split_comments
+from pipeline.io.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments
 from pipeline.io.files import list_files, read_head, read_whole
 from pipeline.io.foreign import find_reader
 from pipeline.io.mcap.container import MAGIC, Layout, scan
@@ -36,6 +37,10 @@ Form = Literal["mcap", "csv", "foreign"]
 METADATA_RECORD = "capture"
 _MCAP_SUFFIX = ".mcap"
 _TEXT_SUFFIXES = frozenset({".csv", ".txt", ".tsv", ".log", ".dat", ".asc"})
+_TABLE_SUFFIXES = frozenset({".csv", ".tsv"})
+_PACKED_SUFFIXES = frozenset({".gz", ".zst", ".bz2", ".xz", ".zip"})
+_CONTRACT = re.compile(rb"(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?#[ \t]*contract[ \t]*:")
+_FIRST_BYTES = 2**16
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +77,9 @@ class Survey:
         """One line that counts and names the files that are no captures, or an empty text."""
         if not self.others:
             return ""
-        shown = ", ".join(self.others[:5]) + (", ..." if len(self.others) > 5 else "")
-        return f"{len(self.others)} files are no captures and were left alone: {shown}"
+        many = f"{len(self.others)} files are no captures and were"
+        words = "1 file is no capture and was" if len(self.others) == 1 else many
+        return f"{words} left alone: {', '.join(self.others)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +142,22 @@ def survey(
             continue
         if entry is None:
             others.append(answer.path)
-        elif entry.sha256 in entries:
-            findings.append(_duplicate(answer.path, entries[entry.sha256].path))
         else:
-            entries[entry.sha256] = entry
+            first = entries.setdefault(entry.sha256, entry)
+            if first is not entry:
+                kept, other = _preferred(folder, first, entry)
+                entries[entry.sha256] = kept
+                findings.append(_duplicate(other.path, kept.path))
     findings += [_absent(path) for path in sorted(set(manifests) - there)]
-    return Survey(tuple(entries.values()), tuple(sorted(findings, key=_order)), tuple(others))
+    captures = tuple(sorted(entries.values(), key=lambda entry: entry.path))
+    return Survey(captures, tuple(sorted(findings, key=_order)), tuple(others))
+
+
+def _preferred(folder: Path, first: Entry, second: Entry) -> tuple[Entry, Entry]:
+    """Of two files of the same bytes the one to use, which is no link if one of them is a file."""
+    if (folder / first.path).is_symlink() and not (folder / second.path).is_symlink():
+        return second, first
+    return first, second
 
 
 def question_of(path: Path) -> Question:
@@ -195,11 +211,10 @@ def _may_be_capture(
     sources: Mapping[str, SourceMap],
 ) -> bool:
     """Whether the name, the first bytes or what is said of a file make it worth reading."""
-    return (
-        path.lower().endswith(_MCAP_SUFFIX)
-        or _is_text(path, listed, beside, sources)
-        or read_head(folder / path, len(MAGIC)) == MAGIC
-    )
+    if path.lower().endswith(_MCAP_SUFFIX) or _is_text(path, listed, beside, sources):
+        return True
+    head = read_head(folder / path, _FIRST_BYTES)
+    return head.startswith(MAGIC) or _CONTRACT.match(head) is not None
 
 
 def _order(finding: Finding) -> tuple[str, str, str]:
@@ -270,6 +285,7 @@ def _entry(
         own, head = _text_head(data, bool(listed or beside))
     source, known = _source(path, own, beside, listed, head, topics, sources)
     if not known:
+        _not_lost(path, data)
         return None
     if source is not None and source.reader is not None:
         form, own = "foreign", dict(find_reader(source.reader).metadata(data))
@@ -286,6 +302,22 @@ def _entry(
     said = fixed | said
     belongs(said)
     return Entry(path, digest, form, source, tuple(sorted(said.items())), recovered)
+
+
+def _not_lost(path: str, data: bytes) -> None:
+    """Raises CaptureError for a file that is no capture only because nothing can be seen in it."""
+    suffix = PurePosixPath(path).suffix.lower()
+    if not data and suffix in _TABLE_SUFFIXES:
+        raise CaptureError("truncated", "the file is empty", "copy it again, or remove it")
+    if data.startswith(PACKED) and (suffix in _TEXT_SUFFIXES or _is_packed(path)):
+        raise CaptureError("encoding", "the file is packed", "unpack it first")
+
+
+def _is_packed(path: str) -> bool:
+    """Whether a name says that a capture was packed (`lcr.csv.gz`)."""
+    name = PurePosixPath(path.lower())
+    inside = PurePosixPath(name.stem).suffix
+    return name.suffix in _PACKED_SUFFIXES and inside in {_MCAP_SUFFIX, *_TEXT_SUFFIXES}
 
 
 def _recovered(path: str, layout: Layout) -> Finding:
@@ -319,7 +351,8 @@ def _is_text(
     """Whether a file's name, or what is said of it, makes it worth reading as text."""
     suffix = PurePosixPath(path).suffix.lower()
     named = any(source.files and source.recognises_name(path) for source in sources.values())
-    return suffix in _TEXT_SUFFIXES or bool(listed) or bool(beside) or named
+    written = suffix in _TEXT_SUFFIXES or _is_packed(path)
+    return written or bool(listed) or bool(beside) or named
 
 
 def _text_head(data: bytes, named: bool) -> tuple[dict[str, str], str]:

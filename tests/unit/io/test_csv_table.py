@@ -130,3 +130,16 @@ def test_a_units_row_that_nobody_declared_is_named() -> None:
     fault = refusal(b"t_s,ia_a\ns,A\n0,1\n")
     assert (fault.code, fault.rows) == ("bad_number", (0, 0))
     assert "units row" in fault.remedy
+
+
+@pytest.mark.parametrize(
+    ("rows", "layout"),
+    [
+        (b"t_s;iq_a\n0,0;1,5\n0,1;2\n", "{separator: ';', decimal: ','}"),
+        (b"t_s;iq_a\n0.0;1.5\n0.1;2\n", "{separator: ';'}"),
+    ],
+)
+def test_the_remedy_for_a_separator_has_the_decimal_comma_where_there_is_one(
+    rows: bytes, layout: str
+) -> None:
+    assert f"layout: {layout};" in refusal(HEAD + rows).remedy

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import gzip
 import json
 import os
 import pickle
@@ -126,7 +128,65 @@ def test_other_files_are_counted_and_named_once(tmp_path: Path) -> None:
     assert found.entries == () and found.findings == ()
     names = ("notes.txt", "other.mcap", "picture.png", "table.csv", "truth.json", "utf16.csv")
     assert found.others == names
-    assert found.note.startswith("6 files are no captures")
+    assert found.note == f"6 files are no captures and were left alone: {', '.join(names)}"
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "alone" / "truth.json").write_text("{}")
+    assert survey(tmp_path / "alone", {}).note == (
+        "1 file is no capture and was left alone: truth.json"
+    )
+
+
+def test_what_nothing_can_be_seen_of_is_refused_and_not_left_alone(tmp_path: Path) -> None:
+    """Expected: a lost recording costs an exit code 3; a log or an archive of others does not."""
+    packed = gzip.compress(CSV.encode())
+    found = fill(
+        tmp_path,
+        bare__csv=packed,
+        named__csv__gz=packed,
+        empty__csv="",
+        empty__log="",
+        pictures__tar__gz=packed,
+    )
+    told = {finding.file: (finding.code, finding.severity) for finding in found.findings}
+    assert told == {
+        "bare.csv": ("encoding", "refused"),
+        "named.csv.gz": ("encoding", "refused"),
+        "empty.csv": ("truncated", "refused"),
+    }
+    assert found.others == ("empty.log", "pictures.tar.gz")
+
+
+@pytest.mark.parametrize("name", ["noext", "run.7", "a.weird"])
+def test_the_key_contract_makes_a_capture_whatever_its_name(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(CSV)
+    (tmp_path / "notes.md").write_text("# Notes\n\n# contract: see there\n")
+    found = survey(tmp_path, {})
+    assert [entry.path for entry in found.entries] == [name]
+    assert found.others == ("notes.md",)
+    assert len(captures(tmp_path, found)) == 1
+
+
+def test_of_a_file_and_a_link_to_it_the_file_is_used(tmp_path: Path) -> None:
+    (tmp_path / "lcr.csv").write_text(CSV)
+    (tmp_path / "inside.csv").symlink_to("lcr.csv")
+    found = survey(tmp_path, {})
+    assert [entry.path for entry in found.entries] == ["lcr.csv"]
+    assert [(f.file, f.code) for f in found.findings] == [("inside.csv", "duplicate_content")]
+    assert "lcr.csv" in found.findings[0].message
+
+
+def test_a_file_that_may_not_be_read_has_to_do_with_permissions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Root may read everything, so the refusal is the system's own words."""
+
+    def closed(*_: object) -> int:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    (tmp_path / "x.csv").write_text(CSV)
+    monkeypatch.setattr("pipeline.io.files.os.open", closed)
+    (finding,) = survey(tmp_path, {}).findings
+    assert (finding.code, finding.remedy) == ("unreadable", "check its permissions")
 
 
 def test_folders_are_read_in_one_order_whatever_the_disk_says(tmp_path: Path) -> None:
@@ -223,7 +283,7 @@ def test_links_pipes_and_devices_are_never_opened(tmp_path: Path) -> None:
     found = survey(folder, {})
     codes = {finding.file: finding.code for finding in found.findings}
     refused = ("a.csv", "b.csv", "loop.csv", "pipe.csv", "up")
-    assert codes == dict.fromkeys(refused, "not_a_file") | {"real.csv": "duplicate_content"}
+    assert codes == dict.fromkeys(refused, "not_a_file") | {"inside.csv": "duplicate_content"}
 
 
 def test_names_that_cannot_be_printed_are_refused_in_print(tmp_path: Path) -> None:
