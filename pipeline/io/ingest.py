@@ -58,7 +58,7 @@ def _sorted(frames: list[pl.DataFrame]) -> list[pl.DataFrame]:
     return sorted(frames, key=lambda frame: (frame.columns, -frame.height))
 
 
-def _wanted(source: SourceMap | None, name: str) -> bool:
+def wanted(source: SourceMap | None, name: str) -> bool:
     if source is None:
         return last_part(name) in COLUMNS or foreign_unit(name) is not None
     return any(name == part.field or last_part(name) == part.field for part in source.fields)
@@ -68,7 +68,7 @@ def _read_mcap(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | N
     layout = scan(data, recover=entry.recovered)
     source = entry.source
     joint = entry.said.get("joint") or (source.joint if source else None)
-    tables = read_tables(layout, lambda _topic, name: _wanted(source, name), joint)
+    tables = read_tables(layout, lambda _topic, name: wanted(source, name), joint)
     form = "auto" if source is None else source.messages
     for table in tables:
         if form != "auto" and table.blocks != (form == "block"):
@@ -90,7 +90,7 @@ def _read_foreign(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap 
 def _read_csv(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:
     source = entry.source
     dialect = CONTRACT_DIALECT if source is None else source.layout
-    found = read_csv(data, dialect, lambda name: _wanted(source, name), entry.path)
+    found = read_csv(data, dialect, lambda name: wanted(source, name), entry.path)
     if source is not None:
         time = source.time
         start = time.start_s if found.time_start is None else found.time_start

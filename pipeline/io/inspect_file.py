@@ -11,9 +11,11 @@ from typing import Literal
 import numpy as np
 
 from pipeline.io.aliases import guess
+from pipeline.io.columns import to_frame
 from pipeline.io.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
 from pipeline.io.files import read_whole
+from pipeline.io.ingest import wanted
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
@@ -22,7 +24,6 @@ from pipeline.io.sniff import encoding_of, numeric_columns, sniff
 from pipeline.io.source_map import SourceMap
 from pipeline.io.starter_map import FieldSeen, StreamSeen, starter_map
 from pipeline.io.survey import look, question_of
-from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError
 
 
@@ -86,13 +87,15 @@ def _mcap(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectRe
         topics = [channel.topic for channel in layout.definitions.channels.values()]
     except CaptureError as fault:
         faults.append(str(fault))
-    if "contract" in metadata:
+    contract = "contract" in metadata
+    foreign = contract and "source" not in metadata and _column_faults(tables, metadata, faults)
+    if contract:
         faults += _metadata_faults(metadata)
     matched = _matched(name, None, topics, sources)
     streams = tuple(_stream(table, "messages") for table in tables)
     starter = ""
-    if streams and "contract" not in metadata:
-        starter = starter_map(streams, CONTRACT_DIALECT, None, topics)
+    if streams and (foreign or not contract):
+        starter = starter_map(streams, CONTRACT_DIALECT, None, topics, by_name=foreign)
     return _report(name, "mcap", data, checksums, metadata, matched, streams, faults, starter)
 
 
@@ -128,7 +131,7 @@ def _text(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectRe
     except CaptureError as fault:
         faults.append(str(fault))
     contract = "contract" in metadata and "source" not in metadata
-    foreign = not faults and contract and _contract_faults(data, faults)
+    foreign = not faults and contract and _contract_faults(data, metadata, faults)
     if contract:
         faults += _metadata_faults(metadata)
     matched = _matched(name, head, [], sources)
@@ -147,13 +150,30 @@ def _but_for_the_key(
     """Whether a table would be a capture of the contract if it only stated `contract`."""
     stated = not _metadata_faults({"contract": CONTRACT_VERSION, **metadata})
     known = any(field.certain for stream in streams for field in stream.fields)
-    return stated and known and not _contract_faults(data, [])
+    return stated and known and not _contract_faults(data, metadata, [])
 
 
-def _contract_faults(data: bytes, faults: list[str]) -> bool:
+def _contract_faults(data: bytes, metadata: Mapping[str, str], faults: list[str]) -> bool:
     """Whether `run` cannot read the table as the contract's own; the reason joins the faults."""
     try:
-        read_csv(data, CONTRACT_DIALECT, COLUMNS.__contains__)
+        table = read_csv(data, CONTRACT_DIALECT, lambda name: wanted(None, name)).table
+    except CaptureError as fault:
+        faults.append(str(fault))
+        return True
+    return _column_faults([table], metadata, faults)
+
+
+def _column_faults(
+    tables: Sequence[RawTable], metadata: Mapping[str, str], faults: list[str]
+) -> bool:
+    """Whether fields are not the contract's columns as they stand; the reason joins the faults."""
+    pole_pairs = metadata.get("pole_pairs", "")
+    try:
+        counted = int(pole_pairs) if pole_pairs.isdecimal() else None
+        frames = [to_frame(table, None, counted) for table in tables]
+        if tables and all(frame is None for frame in frames):
+            faults.append("it holds no column of the contract; finish the source map below")
+            return True
     except CaptureError as fault:
         faults.append(str(fault))
         return True

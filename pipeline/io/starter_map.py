@@ -44,7 +44,9 @@ def starter_map(
     """
     lines = ["# Save as conf/source/NAME.yaml, correct what is guessed, and run again."]
     if by_name:
-        lines.append("# The file itself must name it: `# source: NAME` among its first lines.")
+        text = "`# source: NAME` among its first lines"
+        where = text if header is not None else "`source: NAME` in its metadata or NAME.meta.yaml"
+        lines.append(f"# The file itself must name it: {where}.")
     lines.append("recognise:")
     if header is not None:
         pattern = "^" + re.escape(header.strip()[:120])

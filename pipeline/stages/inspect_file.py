@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 from pipeline.io.files import size_bytes
 from pipeline.io.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
-from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.errors import CaptureError, MachineError, UsageError
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings, configuration_folder
@@ -19,6 +20,7 @@ from pipeline.stages.fleet.pools import Cluster, open_pool
 
 if TYPE_CHECKING:
     from pipeline.io.inspect_file import InspectReport
+    from pipeline.io.source_map import SourceMap
     from pipeline.io.starter_map import FieldSeen
 
 
@@ -49,7 +51,11 @@ def main(settings: InspectSettings) -> Outcome:
     task = InspectTask(settings.file, ReadLimits(settings.read_seconds, settings.read_memory_mb))
     pool = open_pool("local", Cluster())
     with TemporaryDirectory() as crumbs, Crew(pool, 1, Path(crumbs) / "work") as crew:
-        (text,) = crew.work_through(look_into, [task])
+        try:
+            (text,) = crew.work_through(look_into, [task])
+        except CaptureError as error:
+            told = f"{printable(settings.file)}: {error.message}"
+            raise CaptureError(error.code, told, error.remedy, error.rows) from error
     if isinstance(text, MachineError):
         raise text
     return Outcome(text=text)
@@ -66,7 +72,25 @@ def look_into(task: InspectTask) -> str:
     sources = load_source_maps(configuration_folder() / "source")
     with reading(task.file, size_bytes(path), task.limits):
         report = describe(path, sources)
+        if not report.faults:
+            report = replace(report, faults=_refusal(path, sources))
     return render(report)
+
+
+def _refusal(path: Path, sources: Mapping[str, SourceMap]) -> tuple[str, ...]:
+    """Why `run` would refuse a file by itself that can be looked into, or nothing."""
+    from pipeline.contracts.validate import validate
+    from pipeline.io.ingest import read_capture
+    from pipeline.io.survey import look, question_of
+
+    answer = look(path.parent, question_of(path), sources)
+    if answer.entry is None:
+        return tuple(f"{one.message}; {one.remedy}" for one in answer.findings)
+    try:
+        validate(read_capture(path.parent, answer.entry), {})
+    except CaptureError as fault:
+        return (str(fault),)
+    return ()
 
 
 def render(report: InspectReport) -> str:
@@ -89,7 +113,8 @@ def render(report: InspectReport) -> str:
         lines.append(f"{stream.name}: {stream.rows} rows{rate}")
         lines += [f"  {_field(seen)}" for seen in stream.fields]
     if report.streams:
-        lines += ["tests:", *(f"  {line}" for line in _tests(report, said.get("pair")))]
+        when = "tests, once a source map reads it" if report.starter else "tests"
+        lines += [f"{when}:", *(f"  {line}" for line in _tests(report, said.get("pair")))]
     if report.starter:
         lines += ["a source map to start from:", "", report.starter.rstrip("\n")]
     return "\n".join(lines) + "\n"

@@ -72,6 +72,32 @@ def test_inspect_reads_in_a_worker(folder: Path, capsys: pytest.CaptureFixture[s
     assert "in the form of the contract" in capsys.readouterr().out
 
 
+def test_inspect_names_the_file_that_it_cannot_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Expected: exit 3, for a pipe is read by nobody."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    assert main(["inspect", str(tmp_path / "pipe.csv")]) == 3
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "pipe.csv: it is no regular file" in line
+
+
+def test_inspect_says_what_a_gate_of_run_would(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Half a turn is no cogging test: it was called sound, and `run` refused it."""
+    rows = "".join(f"{n / 100},{n / 400},{0.01 * (n % 7)}\n" for n in range(400))
+    head = "# contract: 1\n# motor_id: m\n# test: cogging\n"
+    text = f"{head}t_s,theta_mech_rad,torque_shaft_nm\n{rows}"
+    (folder / "half.csv").write_text(text)
+    main(["run", f"input={folder}", f"output={folder.parent / 'out'}", "report=false"])
+    refused = [line for line in capsys.readouterr().err.splitlines() if "half.csv" in line]
+    assert main(["inspect", str(folder / "half.csv")]) == 0
+    told = [x for x in capsys.readouterr().out.splitlines() if x.startswith("fault: ")]
+    assert len(told) == 1
+    assert told[0].removeprefix("fault: ").partition(";")[0] in refused[0]
+
+
 def test_the_least_memory_reads_a_small_file(
     folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

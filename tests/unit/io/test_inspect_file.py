@@ -115,6 +115,42 @@ def test_a_capture_that_run_would_refuse_is_not_called_sound(
     assert table["t_s"].to_list() == [0.0, 0.1]
 
 
+@pytest.mark.parametrize(
+    ("header", "code", "field"),
+    [
+        ("t_s,omega_mech_rpm", "unknown_unit", "'omega_mech_rpm': {column: omega_mech_rad_s, unit"),
+        ("t_ms,omega_mech_rad_s", "unknown_unit", "'t_ms': {column: t_s, unit: 'ms'}"),
+        ("t,omega_mech", "missing_column", "'omega_mech': {column: omega_mech_rad_s"),
+    ],
+)
+def test_a_column_that_run_does_not_take_is_a_fault_with_a_map_to_start_from(
+    tmp_path: Path, header: str, code: str, field: str
+) -> None:
+    """It was called in the form of the contract, and `run` refused it."""
+    path = tmp_path / "x.csv"
+    path.write_text(f"{SPIN}{header}\n0,100\n1,99\n2,98\n")
+    with pytest.raises(CaptureError) as refused:
+        read_capture(tmp_path, survey(tmp_path, {}).entries[0])
+    assert refused.value.code == code
+    report = describe(path, {})
+    (fault,) = report.faults
+    assert fault.startswith(refused.value.message)
+    assert field in report.starter
+    text = render(report)
+    assert "`run` refuses it as it stands" in text
+    assert "tests, once a source map reads it:" in text
+
+
+def test_a_field_of_a_message_that_run_does_not_take_is_a_fault_as_well(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    said = {"contract": "1", "motor_id": "m", "test": "spin_down"}
+    messages = json_messages([{"t_s": n, "omega_mech_rpm": 1.0} for n in range(3)])
+    path.write_bytes(mcap_file(messages, metadata=said))
+    report = describe(path, {})
+    assert any("'omega_mech_rpm' is not in the contract's unit" in one for one in report.faults)
+    assert "`source: NAME` in its metadata or NAME.meta.yaml" in report.starter
+
+
 def test_metadata_that_run_would_refuse_is_named(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_text(SPIN.replace("spin_down", "dance") + "t_s,omega_mech_rad_s\n0,1\n1,2\n")
