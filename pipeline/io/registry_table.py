@@ -12,6 +12,7 @@ Reference: Delta transaction protocol, "Transaction Identifiers"; Kung & Robinso
 from __future__ import annotations
 
 import json
+import os
 import random
 import re
 import time
@@ -137,6 +138,7 @@ class EventTable:
                 rows = decide(before)
                 if not rows:
                     return before, []
+                self._open_to_writing()
                 version = table.version()
                 if self._committed(table, rows):
                     self._sync(table.version())
@@ -202,6 +204,15 @@ class EventTable:
             if table is None:
                 raise
             return table
+
+    def _open_to_writing(self) -> None:
+        """Raises MachineError where nothing may be written: deltalake would panic over it."""
+        if self.folder is None:
+            return
+        for folder in (self.folder, self.folder / "_delta_log"):
+            if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
+                told = f"registry {self.place}: {folder.name} cannot be written"
+                raise MachineError(told, "is it open to you?")
 
     def _committed(self, table: DeltaTable, rows: Sequence[Row]) -> bool:
         """Whether the rows were added to exactly the events that `table` was opened with."""

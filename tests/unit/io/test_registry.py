@@ -14,7 +14,7 @@ from pipeline.io.publish import canonical_json
 from pipeline.io.registry import Registry
 from pipeline.io.registry_exports import FOLDER, place_of
 from pipeline.io.registry_table import MOST_FILES
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Selection, Version, newest
 from tests.registered import HOUR, NOON, document, version_of
 
@@ -326,3 +326,15 @@ def test_the_bytes_of_a_file_are_kept_as_they_are(registry: Registry, tmp_path: 
     for other in (b"", b"{", b"[]", b"{}", b"\xff\xfe", b'{"motor_id": "a"}'):
         with pytest.raises(UsageError, match="no datasheet"):
             registry.publish([other], NOON)
+
+
+def test_a_registry_that_cannot_be_written_is_told_before_the_commit(
+    registry: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library panics over it, with a backtrace. Root may write everywhere, so it is told no."""
+    registry.publish([document("a", 1)], NOON)
+    monkeypatch.setattr("pipeline.io.registry_table.os.access", lambda *_: False)
+    monkeypatch.setattr("pipeline.io.registry_table.EventTable._committed", None)
+    with pytest.raises(MachineError, match="cannot be written; is it open to you"):
+        registry.tag("tag", registry.history("a"), "t", "me", NOON)
+    assert registry.publish([document("a", 1)], NOON).added == ()
