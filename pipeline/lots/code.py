@@ -33,6 +33,7 @@ from pipeline.records.lot_constant import (
     Verdict,
 )
 from pipeline.records.lot_regression import EffectChange, Group, LotRegression
+from pipeline.records.naming import counted
 
 U_RATIO = 2.0
 # Relative; another order of the same sums.
@@ -79,7 +80,7 @@ def compare_versions(
     return LotRegression(
         mode="code",
         verdict=verdict,
-        headline=f"Code {codes} {words} ({len(pairs)} motors)",
+        headline=f"Code {codes} {words} ({counted(len(pairs), 'motor')})",
         reasons=reasons,
         history="sufficient",
         baseline=groups[0],
@@ -215,7 +216,7 @@ def _motor(
 
 def _verdict(seen: _Seen, limits: Limits) -> tuple[Verdict, str]:
     if seen.lost:
-        return "fail", f"{len(seen.lost)} motors lost it, {seen.lost[0]} first"
+        return "fail", f"{counted(len(seen.lost), 'motor')} lost it, {seen.lost[0]} first"
     worst, wider = seen.worst, seen.wider
     if worst is None:
         return "not_evaluated", "only the new version gives it"
@@ -247,9 +248,9 @@ def _checks(pairs: Sequence[Pair]) -> tuple[EffectChange, ...]:
         worse = sorted(new - old)
         verdict: Verdict = "fail" if worse else "marginal"
         why = (
-            f"{len(worse)} motors fail it anew: {', '.join(worse[:5])}"
+            f"failing it anew: {counted(len(worse), 'motor')}, {', '.join(worse[:5])}"
             if worse
-            else f"{len(old - new)} motors no longer fail it"
+            else f"no longer failing it: {counted(len(old - new), 'motor')}"
         )
         changed.append(
             EffectChange(

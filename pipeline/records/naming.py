@@ -35,6 +35,12 @@ def file_stem(motor_id: str) -> str:
     return f"{stem[: MAX_CHARS - len(digest) - 2]}~h{digest}"
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things: `1 motor`, `2 motors`, `2 mismatches`."""
+    ending = "" if number == 1 else "es" if noun.endswith(("s", "ch")) else "s"
+    return f"{number} {noun}{ending}"
+
+
 def printable(text: str) -> str:
     """The text in one line that a terminal shows and does not obey."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

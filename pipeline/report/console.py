@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
-from pipeline.records.naming import printable
+from pipeline.records.naming import counted, printable
 
 COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("p", "pole_pairs", 1.0),
@@ -41,7 +41,9 @@ def summary(
     counts = Counter(sheet.status for sheet in datasheets)
     states = ", ".join(f"{counts[s]} {s}" for s in ("released", "provisional", "refused"))
     refused = sum(finding.severity == "refused" for finding in findings)
-    lines.append(f"{len(datasheets)} motors: {states}; {refused} captures refused")
+    lines.append(
+        f"{counted(len(datasheets), 'motor')}: {states}; {counted(refused, 'capture')} refused"
+    )
     if report and datasheets:
         lines.append(f"open {output}/report/index.html")
     return "\n".join(lines)

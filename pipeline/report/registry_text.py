@@ -11,6 +11,7 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.difference import Change
 from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Event, Version
+from pipeline.records.naming import counted
 
 NONE = "-"
 SHOWN_DIGITS = 12
@@ -59,8 +60,8 @@ def datasheet_text(version: Version, sheet: Datasheet) -> str:
         f"version    {version.version}",
         f"published  {when(own.recorded_at)}",
         f"type {safe(own.motor_type or NONE)}, lot {safe(own.lot or NONE)}, "
-        f"station {safe(', '.join(own.stations) or NONE)}, {len(sheet.captures)} captures, "
-        f"code {safe(sheet.code_version)}",
+        f"station {safe(', '.join(own.stations) or NONE)}, "
+        f"{counted(len(sheet.captures), 'capture')}, code {safe(sheet.code_version)}",
     ]
     lines += [f"  {sheet.status} as published: {safe(reason)}" for reason in sheet.why]
     lines += [f"  {decision(event)}" for event in version.decisions]

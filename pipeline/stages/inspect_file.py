@@ -12,7 +12,7 @@ from pipeline.io.files import size_bytes
 from pipeline.io.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
 from pipeline.records.errors import CaptureError, MachineError, UsageError
-from pipeline.records.naming import printable
+from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings, configuration_folder
 from pipeline.stages.fleet.crew import Crew
@@ -96,7 +96,8 @@ def _refusal(path: Path, sources: Mapping[str, SourceMap]) -> tuple[str, ...]:
 def render(report: InspectReport) -> str:
     """The report as text for people."""
     lines = [
-        f"{report.path}: {report.form}, {report.size} bytes, sha256 {report.sha256[:16]}",
+        f"{report.path}: {report.form}, {counted(report.size, 'byte')}, "
+        f"sha256 {report.sha256[:16]}",
         f"checksums: {report.checksums}",
     ]
     lines += [f"fault: {fault}" for fault in report.faults]
@@ -110,7 +111,7 @@ def render(report: InspectReport) -> str:
     lines += [f"  {key}: {value}" for key, value in report.metadata]
     for stream in report.streams:
         rate = "" if stream.rate_hz is None else f", {stream.rate_hz:.6g} Hz"
-        lines.append(f"{stream.name}: {stream.rows} rows{rate}")
+        lines.append(f"{stream.name}: {counted(stream.rows, 'row')}{rate}")
         lines += [f"  {_field(seen)}" for seen in stream.fields]
     if report.streams:
         when = "tests, once a source map reads it" if report.starter else "tests"

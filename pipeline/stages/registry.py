@@ -12,6 +12,7 @@ from pipeline.lots.selector import OF_CONTENT, known, parse_selector
 from pipeline.records.difference import changes
 from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Selection, Version, histories, in_force, newest, select
+from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome
 from pipeline.report.registry_text import (
     datasheet_text,
@@ -44,7 +45,8 @@ def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
         raise _unknown(registry, settings.motor)
     motors = len({version.motor_id for version in found})
     lines = [versions_table(found), ""] if found else []
-    return Outcome(text="\n".join([*lines, f"{motors} motors, {len(found)} versions"]))
+    count = f"{counted(motors, 'motor')}, {counted(len(found), 'version')}"
+    return Outcome(text="\n".join([*lines, count]))
 
 
 def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -83,16 +85,17 @@ def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
         return Outcome(text=f"nothing was published by {when(until)}")
     rows = [(motor_id, in_force(own), own[-1]) for motor_id, own in motors.items()]
     valid = sum(version is not None for _, version, _ in rows)
-    text = f"{len(rows)} motors, {valid} with a released datasheet at {when(until)}"
+    text = f"{counted(len(rows), 'motor')}, {valid} with a released datasheet at {when(until)}"
     return Outcome(text="\n".join([in_force_table(rows), "", text]))
 
 
 def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
     found = registry.verify()
-    counted = f"{found.versions} versions, {found.decisions} decisions"
-    verdict = f"{len(found.faults)} mismatches" if found.faults else "all of it as published"
+    count = f"{counted(found.versions, 'version')}, {counted(found.decisions, 'decision')}"
+    faults = counted(len(found.faults), "mismatch")
+    verdict = faults if found.faults else "all of it as published"
     errors = (*(f"mismatch: {line}" for line in found.faults), *(f"note: {n}" for n in found.notes))
-    return Outcome(1 if found.faults else 0, f"{settings.registry}: {counted}, {verdict}", errors)
+    return Outcome(1 if found.faults else 0, f"{settings.registry}: {count}, {verdict}", errors)
 
 
 def _approve(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -142,8 +145,11 @@ def _name(registry: Registry, settings: RegistrySettings, kind: Literal["tag", "
     else:
         chosen = (_version(registry, settings, newest=True),)
     changed = registry.tag(kind, chosen, tag, by, datetime.now(UTC))
-    done = "now bear" if kind == "tag" else "no longer bear"
-    return Outcome(text=f"{len(chosen)} versions {done} the tag {tag}, {changed} of them changed")
+    one = "s" if len(chosen) == 1 else ""
+    done = f"now bear{one}" if kind == "tag" else f"no longer bear{one}"
+    return Outcome(
+        text=f"{counted(len(chosen), 'version')} {done} the tag {tag}, {changed} of them changed"
+    )
 
 
 ACTIONS: Mapping[str, Callable[[Registry, RegistrySettings], Outcome]] = {

@@ -15,6 +15,7 @@ from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Version, histories
 from pipeline.records.lot_constant import Side
 from pipeline.records.lot_regression import Group
+from pipeline.records.naming import counted
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,7 @@ def _lots(
     candidate = newest["candidate"]
     shared = [motor for motor in newest["baseline"] if motor in candidate]
     base = {m: one for m, one in newest["baseline"].items() if m not in candidate}
-    notes = [f"{len(shared)} motors are on both sides and count as candidate"] * bool(shared)
+    notes = [f"on both sides, counted as candidate: {counted(len(shared), 'motor')}"] * bool(shared)
     if not base:
         raise UsageError(
             f"baseline={queries['baseline'].text} holds no motor that the candidate does not",
@@ -177,14 +178,14 @@ def _lots(
         )
     base, others = _of_one_type(base, candidate)
     if others:
-        notes.append(f"{len(others)} baseline motors are of another type and are left out")
+        notes.append(f"left out of the baseline, of another type: {counted(len(others), 'motor')}")
     codes = {one.sheet.code_version for one in (*base.values(), *candidate.values())}
     if len(codes) > 1:
         notes.append(f"datasheets of {len(codes)} code versions are compared: {_few(codes)}")
     refused = [m for m, one in {**base, **candidate}.items() if one.sheet.status == "refused"]
     if refused:
         notes.append(
-            f"{len(refused)} datasheets are refused for a failed check and are in the comparison: "
+            f"in the comparison though a check failed: {counted(len(refused), 'datasheet')}, "
             f"{_few(refused)}"
         )
     members = [_member(one, "baseline") for one in base.values()]

@@ -123,7 +123,7 @@ def test_the_commands_work_on_a_bucket(
     ):
         assert main(["registry", *action, *words]) == 0
         told[action[0]] = capsys.readouterr().out
-    assert "1 motors, 2 versions" in told["list"]
+    assert "1 motor, 2 versions" in told["list"]
     assert "2 versions, 0 decisions, all of it as published" in told["verify"]
     listed = client(boto3, store).list_objects_v2(Bucket=BUCKET, Prefix=f"of runs/{FOLDER}/")
     (sheet,) = (output / "datasheets").iterdir()

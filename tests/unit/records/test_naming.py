@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from pipeline.records.naming import MAX_CHARS, file_stem
+from pipeline.records.naming import MAX_CHARS, counted, file_stem
 
 SAFE = re.compile(r"[A-Za-z0-9_~][A-Za-z0-9_.~-]*")
 DEVICES = {"con", "prn", "aux", "nul"} | {f"{p}{n}" for p in ("com", "lpt") for n in range(10)}
@@ -113,3 +113,8 @@ def test_long_ids_keep_a_readable_beginning_and_stay_apart() -> None:
     assert file_stem(one).startswith("gearbox-xxx")
     assert file_stem(one) != file_stem(other)
     assert len(file_stem(one)) == MAX_CHARS
+
+
+def test_a_number_of_things_is_one_thing_or_several() -> None:
+    told = [counted(n, noun) for n in (0, 1, 2) for noun in ("motor", "mismatch")]
+    assert told == ["0 motors", "0 mismatches", "1 motor", "1 mismatch", "2 motors", "2 mismatches"]

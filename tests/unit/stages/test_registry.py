@@ -55,7 +55,7 @@ def test_list(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     ]
     assert lines[-1] == "2 motors, 4 versions"
     assert "\x1b" not in out
-    assert told(capsys, place, "list", "00123")[1].splitlines()[-1] == "1 motors, 1 versions"
+    assert told(capsys, place, "list", "00123")[1].splitlines()[-1] == "1 motor, 1 version"
 
 
 def test_show_takes_the_newest_or_the_one_named(
@@ -95,7 +95,7 @@ def test_approve_revoke_and_at(place: str, capsys: pytest.CaptureFixture[str]) -
     assert "nothing was published" in told(capsys, place, "at", "2026-02-28")[1]
     told(capsys, place, "revoke", *decision)
     again = told(capsys, place, "at", "date=2999-01-01", f"motor={SERIAL}")[1]
-    assert "1 motors, 0 with" in again
+    assert "1 motor, 0 with" in again
 
 
 def test_verify(place: str, capsys: pytest.CaptureFixture[str]) -> None:

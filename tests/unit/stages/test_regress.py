@@ -172,7 +172,7 @@ def test_the_candidate_is_no_part_of_its_baseline(
 ) -> None:
     code, out, _ = told(capsys, output, "baseline=type:gimbal,station:S1", "candidate=lot:B")
     assert code in (0, 1, 4)
-    assert "12 motors are on both sides and count as candidate" in out
+    assert "on both sides, counted as candidate: 12 motors" in out
     assert sorted(report(output)["baseline"]["lots"]) == ["A", "weak"]
 
 
@@ -187,7 +187,7 @@ def test_lots_of_one_type_are_compared(tmp_path: Path, capsys: pytest.CaptureFix
     registry.publish([sheet.document() for sheet in sheets], NOON)
     code, out, _ = told(capsys, tmp_path, "baseline=lot:A", "candidate=lot:B")
     assert code == 0
-    assert "3 baseline motors are of another type and are left out" in out
+    assert "left out of the baseline, of another type: 3 motors" in out
     code, _, err = told(capsys, tmp_path, "baseline=lot:B", "candidate=lot:A")
     assert code == 2
     assert "several types: drone, gimbal; add type:NAME" in err
