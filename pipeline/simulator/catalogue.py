@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.simulator.design import Bench, Effects, Motor, Size
-from pipeline.simulator.effects import FORMS, parameters
+from pipeline.simulator.effects import FORMS, NEVER_NEGATIVE, parameters
 from pipeline.simulator.outside import OUTSIDE, with_unknown
 
 _ITEM = re.compile(r"(?P<name>[a-z_]+)(?:\.(?P<key>[a-z0-9_]+))?(?:=(?P<value>[-+.eE0-9]+))?")
@@ -28,9 +29,12 @@ SPREADS = {
 
 def _number(value: object, what: str) -> float:
     try:
-        return float(str(value))
+        number = float(str(value))
     except ValueError:
-        raise ValueError(f"{what}: {value!r} is no number") from None
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{what}: {value!r} is no number")
+    return number
 
 
 def _fields(kind: type, document: Mapping[str, Any], what: str) -> dict[str, Any]:
@@ -69,9 +73,15 @@ def effects_from(document: Mapping[str, Any], motor: Motor) -> Effects:
             size = {key: _number(word, f"{name}.{key}") for key, word in value.items()}
         else:
             size = _number(value, name)
-        parameters(name, motor, size)
+        _possible(name, parameters(name, motor, size))
         effects[name] = size
     return effects
+
+
+def _possible(name: str, full: Mapping[str, float]) -> None:
+    """Raises ValueError for a size below 0 of an effect that has no sign."""
+    if name in NEVER_NEGATIVE and full["size"] < 0.0:
+        raise ValueError(f"{name}={full['size']:g} is below 0, and {name} has no sign")
 
 
 def bench_from(document: Mapping[str, Any]) -> Bench:
@@ -102,7 +112,7 @@ def with_effects(motor: Motor, text: str) -> Motor:
             raise ValueError(f"no effect {name}; there are {known}")
         given = {} if value is None else {key or "size": _number(value, word)}
         chosen[name] = {**chosen.get(name, {}), **given}
-        parameters(name, motor, chosen[name])
+        _possible(name, parameters(name, motor, chosen[name]))
     return motor.having(**chosen)
 
 

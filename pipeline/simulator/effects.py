@@ -188,6 +188,26 @@ FORMS: dict[str, Form] = {
     ),
 }
 
+NEVER_NEGATIVE = frozenset(
+    {
+        "copper_temperature",
+        "skin_effect",
+        "dead_time",
+        "torque_lag",
+        "saturation",
+        "iron_eddy",
+        "iron_hysteresis",
+        "coulomb_friction",
+        "stribeck",
+        "windage",
+        "load_dependent_friction",
+        "presliding",
+        "cogging",
+        "compliance",
+        "backlash",
+    }
+)
+"""Effects whose `size` is a loss, a time, a gap or an amplitude that has a phase of its own."""
 ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
 
 

@@ -12,7 +12,7 @@ from pipeline.io.plain_yaml import load_plain
 from pipeline.io.publish import canonical_json, output_folder, write_whole
 from pipeline.io.write_capture import Format, write_capture
 from pipeline.records.errors import UsageError
-from pipeline.records.naming import file_stem
+from pipeline.records.naming import counted, file_stem
 from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import SimulateSettings, configuration_folder
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -58,6 +58,7 @@ def main(settings: SimulateSettings) -> Outcome:
     except (ValueError, KeyError) as error:
         raise UsageError(f"simulate: {error}", "correct it") from error
     output_folder(settings.output)
+    _ours(output, [folder for folder, *_ in jobs])
     lines = []
     for folder, motor, bench, seed, plan in jobs:
         with watch.stage("simulate"):
@@ -65,8 +66,31 @@ def main(settings: SimulateSettings) -> Outcome:
         with watch.stage("write"):
             written = _write(output / folder, recordings, settings.encoding)
             write_whole(output / folder / TRUTH, canonical_json(true))
-        lines.append(f"{motor.motor_id}: {written} captures in {output / folder}")
+            for stale in _captures(output / folder) - written:
+                stale.unlink()
+        count = counted(len(written), "capture")
+        lines.append(f"{motor.motor_id}: {count} in {output / folder}")
     return Outcome(text="\n".join(lines) + "\n", timings=watch.table())
+
+
+def _captures(folder: Path) -> set[Path]:
+    """The files of a folder that have names of a simulated campaign."""
+    stems = {stem for stem, _, _ in CAMPAIGN}
+    return {path for s in (".csv", ".mcap") for path in folder.glob(f"*{s}") if path.stem in stems}
+
+
+def _ours(output: Path, folders: Iterable[str]) -> None:
+    """Refuses folders of captures that no simulation wrote: they would be written over.
+
+    What an earlier simulation left is taken away when the new one is written.
+    """
+    for folder in folders:
+        found = sorted(_captures(output / folder))
+        if found and not (output / folder / TRUTH).is_file():
+            raise UsageError(
+                f"{output / folder} holds {found[0].name}, and no {TRUTH}: it is not simulated",
+                "name another folder by output=",
+            )
 
 
 def _simulated(
@@ -130,13 +154,14 @@ def _document(kind: str, name: str) -> dict[str, Any]:
     return document
 
 
-def _write(folder: Path, recordings: Iterable[Recording], encoding: str) -> int:
-    """`mixed` goes through the encodings in turn; long captures stay in compact ones.
+def _write(folder: Path, recordings: Iterable[Recording], encoding: str) -> set[Path]:
+    """Returns the files written. `mixed` goes through the encodings in turn; long captures stay
+    in compact ones.
 
     Tables without a clock are CSV always, captures of several clocks MCAP always.
     """
     large, small = cycle(LARGE), cycle(SMALL)
-    count = 0
+    written = set()
     for recording in recordings:
         table = recording.tables[0]
         if "t_s" not in table:
@@ -147,6 +172,6 @@ def _write(folder: Path, recordings: Iterable[Recording], encoding: str) -> int:
             form = next(large)
         else:
             form = FORMATS[next(small)]
-        write_capture(folder, recording.stem, recording.meta, recording.tables, form)
-        count += 1
-    return count
+        path = write_capture(folder, recording.stem, recording.meta, recording.tables, form)
+        written.add(path)
+    return written

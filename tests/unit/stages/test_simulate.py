@@ -55,6 +55,22 @@ def test_an_encoding_for_all(encoding, tmp_path):
     assert suffixes == ({".csv"} if encoding == "csv" else {".mcap"})
 
 
+def test_an_earlier_motor_leaves_no_captures_behind(tmp_path):
+    """The second is recorded in another encoding, so that other files would stay."""
+    (tmp_path / "notes.txt").write_text("mine")
+    for number, encoding in enumerate(("json", "csv")):
+        simulate.main(SimulateSettings(output=str(tmp_path), encoding=encoding, seed=number))
+    assert {c.meta.motor_id for c in captures(tmp_path).values()} == {"gimbal-5208-1"}
+    assert (tmp_path / "notes.txt").is_file()
+
+
+def test_captures_that_were_not_simulated_are_not_written_over(tmp_path):
+    (tmp_path / "lcr.csv").write_text("mine")
+    with pytest.raises(UsageError, match=r"holds lcr\.csv, and no truth\.json"):
+        simulate.main(SimulateSettings(output=str(tmp_path)))
+    assert [path.name for path in tmp_path.iterdir()] == ["lcr.csv"]
+
+
 def test_effects_as_typed():
     base = motor_from(document("motor", "gimbal-5208"))
     assert with_effects(base, "").effects == base.effects
@@ -64,10 +80,13 @@ def test_effects_as_typed():
     assert motor.effects["saturation"] == {"size_d": 0.02}
     assert motor.effects["dead_time"] == {"size": 0.3}
     assert len(with_effects(base, "eddy_brake=2").extras) == 1
+    assert with_effects(base, "current_offset=-0.1").effects["current_offset"] == {"size": -0.1}
     for wrong, said in (
         ("ghost", "no effect ghost"),
         ("dead_time=x", "dead_time=x"),
         ("cogging.depth=1", "no parameter depth"),
+        ("cogging=-1", "cogging=-1 is below 0"),
+        ("dead_time=1e999", "is no number"),
     ):
         with pytest.raises(ValueError, match=said):
             with_effects(base, wrong)
