@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -35,9 +36,49 @@ def write_whole(path: Path, content: bytes) -> None:
         write_synced(temporary, content)
         temporary.replace(path)
         sync_folder(path.parent)
-    except OSError as error:
+    except OSError:
         with suppress(OSError):
             temporary.unlink()
+        with _refusals(path):
+            raise
+
+
+@contextmanager
+def together(folder: Path) -> Iterator[Callable[[str, bytes], None]]:
+    """Gives `write(name, content)`: files that get their names when all are on the disk, or never.
+
+    The first written is the last to get its name, so that who finds it finds the others.
+    Raises MachineError where the disk refuses; old contents, if any, are then untouched.
+    """
+    waiting: list[tuple[Path, Path]] = []
+
+    def write(name: str, content: bytes) -> None:
+        path = folder / name
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+        waiting.append((temporary, path))
+        with _refusals(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_synced(temporary, content)
+
+    try:
+        yield write
+        for temporary, path in reversed(waiting):
+            with _refusals(path):
+                temporary.replace(path)
+        for room in dict.fromkeys(path.parent for _, path in waiting):
+            with _refusals(room):
+                sync_folder(room)
+    finally:
+        for temporary, _ in waiting:
+            with suppress(OSError):
+                temporary.unlink()
+
+
+@contextmanager
+def _refusals(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
         raise MachineError(
             f"cannot write {path.name} in {path.parent}: {error.strerror}", _remedy(error)
         ) from error

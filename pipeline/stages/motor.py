@@ -13,7 +13,7 @@ from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.verdict import verdict
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.code_version import code_version
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.publish import canonical_json, together
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
@@ -106,31 +106,32 @@ def _write(
     findings: tuple[Finding, ...],
     watch: Stopwatch,
 ) -> Files:
-    """Writes what the job asks for; returns the files, relative to the output folder."""
-    output, stem = Path(job.output), file_stem(job.motor_id)
+    """Writes what the job asks for, all of it or nothing; returns the files, relative to output."""
+    stem = file_stem(job.motor_id)
     files: list[tuple[str, str]] = []
+    with together(Path(job.output)) as write_one:
 
-    def write(name: str, content: bytes) -> str:
-        write_whole(output / name, content)
-        files.append((name, hashlib.sha256(content).hexdigest()))
-        return files[-1][1]
+        def write(name: str, content: bytes) -> str:
+            write_one(name, content)
+            files.append((name, hashlib.sha256(content).hexdigest()))
+            return files[-1][1]
 
-    with watch.stage("datasheet"):
-        write(f"datasheets/{stem}.json", canonical_json(datasheet.document()))
-    if job.report:
-        from pipeline.report.motor_page import render_motor
+        with watch.stage("datasheet"):
+            write(f"datasheets/{stem}.json", canonical_json(datasheet.document()))
+        if job.report:
+            from pipeline.report.motor_page import render_motor
 
-        with watch.stage("report"):
-            terms = {term.name: term for estimator in estimators() for term in estimator.terms}
-            page = render_motor(datasheet, evidence, findings, terms)
-            write(f"report/{stem}.html", page.encode())
-    if job.recordings:
-        from pipeline.io.recordings.seal import SEAL, seal_line
+            with watch.stage("report"):
+                terms = {term.name: term for estimator in estimators() for term in estimator.terms}
+                page = render_motor(datasheet, evidence, findings, terms)
+                write(f"report/{stem}.html", page.encode())
+        if job.recordings:
+            from pipeline.io.recordings.seal import SEAL, seal_line
 
-        with watch.stage("recordings"):
-            for name, content in _recordings(stem, campaign, datasheet, evidence, findings):
-                sha256 = write(name, content)
-                write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
+            with watch.stage("recordings"):
+                for name, content in _recordings(stem, campaign, datasheet, evidence, findings):
+                    sha256 = write(name, content)
+                    write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
     return tuple(files)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.io import publish
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.publish import canonical_json, together, write_whole
 from pipeline.records.errors import MachineError
 
 FULL, CLOSED = "free the disk and run again", "name an output folder that can be written"
@@ -60,3 +60,32 @@ def test_json_is_canonical_and_holds_no_nan() -> None:
     for number in (float("nan"), float("inf")):
         with pytest.raises(ValueError, match="JSON"):
             canonical_json({"a": [number]})
+
+
+def test_files_get_their_names_together_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is full at the third: the old of the first stands, and nothing of the others."""
+    write_whole(tmp_path / "datasheets" / "m.json", b"old")
+    whole = publish.write_synced
+
+    def full(path: Path, content: bytes) -> None:
+        whole(path, content[:2] if content == b"third" else content)
+        if content == b"third":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def files() -> dict[str, bytes]:
+        return {p.name: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
+
+    def write_all() -> None:
+        with together(tmp_path) as write:
+            for name, content in (("m.json", b"new"), ("m.html", b"page"), ("m.rrd", b"third")):
+                write(f"datasheets/{name}", content)
+
+    monkeypatch.setattr(publish, "write_synced", full)
+    with pytest.raises(MachineError, match=r"cannot write m\.rrd .*; free the disk"):
+        write_all()
+    assert files() == {"m.json": b"old"}
+    monkeypatch.setattr(publish, "write_synced", whole)
+    write_all()
+    assert files() == {"m.json": b"new", "m.html": b"page", "m.rrd": b"third"}
