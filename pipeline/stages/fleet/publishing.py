@@ -15,6 +15,7 @@ from pipeline.io.publish import canonical_json, partial_owner, write_whole
 from pipeline.io.survey import Survey
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
+from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import COLUMNS, nothing_usable, summary
 from pipeline.report.words import KEY_CONSTANTS
@@ -102,8 +103,8 @@ def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
         return ()
     told = ", ".join(removed[:TOLD]) + (", ..." if len(removed) > TOLD else "")
     return (
-        f"note: {output} holds what comes of this input alone: {len(removed)} files of an earlier "
-        f"run are removed: {told}",
+        f"note: {output} holds what comes of this input alone: "
+        f"{counted(len(removed), 'file')} of an earlier run removed: {told}",
     )
 
 
