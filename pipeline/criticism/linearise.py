@@ -126,6 +126,25 @@ def absorb(rows: Array, unknown: Sequence[Array]) -> None:
         rows -= (axes * lost) @ (axes.T @ rows)
 
 
+def whitened_anew(segment: Segment, rows: Array, before: Array, after: Array) -> Array:
+    """Rows [R, P] of one segment that were whitened by `before` [R], its disturbances absorbed, as
+    they are whitened by `after`: what a louder noise leaves of an offset is more.
+    """
+    _, _, valid, _ = row_index(segment)
+    bare = rows.copy()
+    _restore(bare, offsets(segment, valid, before))
+    bare *= (after / before)[:, None]
+    absorb(bare, offsets(segment, valid, after))
+    return bare
+
+
+def _restore(rows: Array, unknown: Sequence[Array]) -> None:
+    """Undoes `absorb` in place."""
+    if unknown:
+        axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
+        rows += (axes * (np.sqrt(1.0 + sizes**2) - 1.0)) @ (axes.T @ rows)
+
+
 _VOLTAGE_BASE = (
     "r_ohm",
     "ld_h",

@@ -12,7 +12,13 @@ from pipeline.criticism.each import on_each
 from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.floors import form_tolerance, noise_floor
 from pipeline.criticism.grams import Grams, misfit_of, pseudo_inverse
-from pipeline.criticism.linearise import Column, base_columns, effect_columns, linearise
+from pipeline.criticism.linearise import (
+    Column,
+    base_columns,
+    effect_columns,
+    linearise,
+    whitened_anew,
+)
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.residuals import over_inertia
 from pipeline.criticism.segment import Segment, row_index
@@ -235,21 +241,25 @@ def system(
         labels += [(number, channel, order) for channel, order in one.groups]
         groups.append(one.group + first)
         first += len(one.groups)
-    rescaled = np.ones(whiten.size)
+    group = np.concatenate(groups)
     if before is not None and known:
-        rescaled = whiten / before.whiten
         free = np.array([over_inertia(segments[n], channel) for n, channel, _ in labels])
         inertia = before.around.values["j_kgm2"] / values["j_kgm2"]
-        rescaled *= np.where(free, inertia, 1.0)[np.concatenate(groups)]
+        lighter = np.where(free, inertia, 1.0)[group]
+        places = [n for n, column in enumerate(columns) if column.key in known]
+        kept = np.column_stack([known[columns[n].key] for n in places]) * lighter[:, None]
+        matrix[:, places] = _over(
+            segments, kept, before.whiten, whiten, [r.group.size for r in rows]
+        )
     for place, column in enumerate(columns):
-        old = known.get(column.key)
-        matrix[:, place] = made[:, fresh[column.key]] if old is None else old * rescaled
+        if column.key in fresh:
+            matrix[:, place] = made[:, fresh[column.key]]
     penalty, pull = _priors(model, columns, values)
     return System(
         columns=tuple(columns),
         residual=np.concatenate([r.residual for r in rows]),
         matrix=matrix,
-        group=np.concatenate(groups),
+        group=group,
         window=np.concatenate([r.window for r in rows]),
         unit=np.concatenate([r.unit for r in rows]),
         soft=np.concatenate([r.soft for r in rows]),
@@ -261,6 +271,20 @@ def system(
         tests=tuple(segment.test for segment in segments),
         made_at=values if before is None or not known else before.made_at,
     )
+
+
+def _over(
+    segments: Sequence[Segment], kept: Array, before: Array, now: Array, counts: Sequence[int]
+) -> Array:
+    """Columns [R, P] over the noise `before` [R] as they are over that of `now` [R], of segments
+    with so many rows each.
+    """
+    if np.array_equal(before, now):
+        return kept
+    edges = np.cumsum(counts)[:-1]
+    each = zip(*(np.split(one, edges) for one in (kept, before, now)), strict=True)
+    whole: Array = np.concatenate(on_each(whitened_anew, segments, list(each)))
+    return whole
 
 
 def _kept(before: System | None, fitted: Fitted, chord: bool) -> dict[ColumnKey, Array]:

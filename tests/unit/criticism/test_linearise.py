@@ -1,0 +1,50 @@
+"""Columns that are kept from an earlier fit are those that would be made anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.floors import offsets
+from pipeline.criticism.linearise import absorb, effect_columns, whitened_anew
+from pipeline.criticism.model import Model
+from pipeline.criticism.registry import effects
+from pipeline.criticism.segment import row_index
+from pipeline.criticism.system import Fitted, floors, own_columns, system
+from tests.unit.criticism.machines import BASE, log, machine
+
+PLAIN = Model(machine(), ())
+
+
+def test_rows_over_another_noise_have_their_offsets_absorbed_by_that():
+    """What a louder noise hides of an offset is more: the rows are no multiple of those before."""
+    one, rng = log(noise=1.0), np.random.default_rng(2)
+    _, _, valid, _ = row_index(one)
+    count = int(valid.sum())
+    bare = 1.0 + rng.normal(size=(count, 3))
+    before, after = 300.0 * rng.uniform(1.0, 9.0, (2, count))
+    was, expected = bare * before[:, None], bare * after[:, None]
+    absorb(was, offsets(one, valid, before))
+    absorb(expected, offsets(one, valid, after))
+    assert whitened_anew(one, was, before, after) == pytest.approx(expected, rel=1e-9)
+    assert not np.allclose(was * (after / before)[:, None], expected, rtol=0.1)
+
+
+def test_candidates_columns_survive_a_tolerance_of_form():
+    """Scaled by the floors alone, a gain of the transducer was no longer a gain once any effect had
+    been found, and another gain was named for it.
+    """
+    segments = (log(noise=1.0),)
+    values = {**BASE}
+    start = Fitted(PLAIN, values, floors(segments, PLAIN, values), values)
+    gain = effect_columns(effects()["torque_scale"], PLAIN)
+    before = system(segments, start, gain)
+    wrong = tuple(40.0 * sigma for sigma in start.sigma)
+    doubted = replace(start, tolerance=wrong)
+    kept, made = (system(segments, doubted, gain, b).matrix for b in (before, None))
+    assert kept == pytest.approx(made, rel=1e-6, abs=1e-9 * np.abs(made).max())
+    names = [column.name for column in own_columns(PLAIN)]
+    pair = kept[:, names.index("gain_torque")], kept[:, -1]
+    assert pair[1] == pytest.approx(pair[0], rel=1e-6, abs=1e-9 * np.abs(pair[0]).max())
