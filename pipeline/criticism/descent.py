@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.bounds import Best, bounded_step, limits_of
-from pipeline.criticism.effect import Array, Effect, Machine
+from pipeline.criticism.effect import Array, Effect, Machine, Values
 from pipeline.criticism.floors import rough_floor
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import BASE, PHYSICAL, Model, zero
@@ -131,13 +131,14 @@ def _moved(fitted: Fitted, columns: Sequence[Column], step: Array) -> Fitted:
     return replace(fitted, values=clipped(fitted.model, values))
 
 
-def rough_fit(segments: Sequence[Segment], model: Model) -> Fitted:
-    """Fits a model from orders of magnitude, every equation by the machine's own scale.
+def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = None) -> Fitted:
+    """Fits a model from orders of magnitude, but for values that are `known`, every equation by the
+    machine's own scale.
 
     By its noise floor, an equation that misses it by far would be given up before the constants
     are near. A few windows of each segment are enough.
     """
-    values = start_values(model, model.machine)
+    values = {**start_values(model, model.machine), **(known or {})}
     few = [sparse(segment) for segment in segments]
     rough = tuple(rough_floor(segment, model, values) for segment in few)
     near, _ = gauss_newton(few, Fitted(model, values, rough, values))
@@ -152,6 +153,18 @@ def first_fit(segments: Sequence[Segment], near: Fitted) -> tuple[Fitted, System
     if len(segments) <= _SHORT:
         ends += [_one_side_first(segments, begun, side) for side in _SIDES]
     return min(ends, key=lambda end: end[1].misfit)
+
+
+def fit_anew(segments: Sequence[Segment], fitted: Fitted) -> tuple[Fitted, System]:
+    """A fit begun once more from orders of magnitude, shapes of effects as they are.
+
+    What was missing before an effect came in may have left constants, and floors that were made by
+    them, where no step leads back from: an encoder off its centre shakes a light rotor less.
+    """
+    model = fitted.model
+    shapes = [name for name, (_, p) in model.parameters().items() if not p.amplitude]
+    near = rough_fit(segments, model, {name: fitted.values[name] for name in shapes})
+    return first_fit(segments, replace(near, tolerance=fitted.tolerance))
 
 
 def _one_side_first(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.closer import renamed
-from pipeline.criticism.descent import clipped, gauss_newton
+from pipeline.criticism.descent import clipped, fit_anew, gauss_newton
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.floors import form_tolerance
 from pipeline.criticism.grams import Grams
@@ -37,7 +37,15 @@ from pipeline.criticism.scores import (
     widened,
 )
 from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Fitted, System, floors, floors_grown, own_columns, tolerances
+from pipeline.criticism.system import (
+    Fitted,
+    System,
+    floors,
+    floors_grown,
+    own_columns,
+    system,
+    tolerances,
+)
 
 _MOST = 6
 """Rungs: the model as asked for and five effects."""
@@ -99,15 +107,23 @@ def search(
 
 
 def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
-    """The fit by the noise floors that effects leave, where some are others by a half.
+    """The fit by the noise floors that effects leave, or as it would be had it been asked for with
+    these effects, whichever is better; as it is where floors are not others by a half and nothing
+    is left over them.
 
-    To undo a sensor's lag brings noise with it, and so does a twist that is told by an angle.
+    To undo a sensor's lag brings noise with it, and so does a twist that is told by an angle. An
+    encoder off its centre leaves next to no inertia, and floors that it made.
     """
     floor = floors(segments, fitted.model, fitted.values)
     ratio = np.concatenate(floor) / np.concatenate(fitted.sigma)
-    if np.abs(np.log(ratio)).max() < _OTHER_FLOOR:
-        return fitted
-    return gauss_newton(segments, replace(fitted, sigma=floor, near=fitted.values))[0]
+    if np.abs(np.log(ratio)).max() >= _OTHER_FLOOR:
+        fitted = replace(fitted, sigma=floor, near=fitted.values)
+        ended = gauss_newton(segments, fitted)
+    else:
+        ended = fitted, system(segments, fitted)
+        if not told_groups(ended[1], segments).any():
+            return fitted
+    return min(ended, fit_anew(segments, fitted), key=lambda end: end[1].misfit)[0]
 
 
 def _chosen(
