@@ -8,19 +8,26 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    flux = np.abs(x.flux_wb / x.base["psi_wb"]) ** 2
-    drag: Array = q["drag_nm"] * x.omega_rad_s / x.machine.scales["speed_rad_s"] * flux
+    flux = np.abs(x.flux_wb / x.base["psi_wb"])
+    speed = x.omega_rad_s / x.machine.scales["speed_rad_s"]
+    drag: Array = q["drag_nm"] * speed * flux**2
+    if q["excess_nm"]:
+        drag = drag + q["excess_nm"] * np.sign(speed) * np.sqrt(np.abs(speed)) * flux**1.5
     return drag
 
 
 EFFECT = Effect(
     name="iron_eddy",
-    words="drag proportional to ω |ψ|², given at the highest speed and the magnet's flux",
+    words="drag proportional to ω |ψ|², and to √ω |ψ|^1.5 by excess loss, given at the highest "
+    "speed and the magnet's flux",
     signature="torque lost with speed, and with the square of the flux",
     tests=("torque_map", "spin_down"),
     experiment="a torque map at two speeds with d current; a spin-down without the magnet",
     reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
-    parameters=(Parameter("drag_nm", "N·m", 0.02, 0.002, "torque_nm", low=0.0, high=1.0),),
+    parameters=(
+        Parameter("drag_nm", "N·m", 0.02, 0.002, "torque_nm", low=0.0, high=1.0),
+        Parameter("excess_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0, optional=1),
+    ),
     signals=("torque_shaft_nm",),
     rivals={
         "windage": "a wider speed range",

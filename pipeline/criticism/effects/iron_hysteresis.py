@@ -8,19 +8,23 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _torque(x: Operating, q: Values) -> Array:
-    flux = np.abs(x.flux_wb) / x.base["psi_wb"]
+    flux = np.abs(x.flux_wb / x.base["psi_wb"]) ** (1.0 + q["steeper"])
     drag: Array = q["drag_nm"] * np.sign(x.omega_rad_s) * flux
     return drag
 
 
 EFFECT = Effect(
     name="iron_hysteresis",
-    words="drag proportional to sign(ω) |ψ|, given at the magnet's flux",
+    words="drag proportional to sign(ω) |ψ|^(1 + steeper), given at the magnet's flux",
     signature="torque lost with direction, and with the flux",
     tests=("torque_map",),
     experiment="a torque map with d current; a slow turn without the magnet",
-    reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses",
-    parameters=(Parameter("drag_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0),),
+    reference="Bertotti, IEEE Trans. Magn. 24 (1988), general properties of power losses; the "
+    "exponent: Steinmetz, Trans. AIEE 9 (1892)",
+    parameters=(
+        Parameter("drag_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0),
+        Parameter("steeper", "1", 0.6, 0.0, low=0.0, high=1.2, scan=(0.0,), optional=1),
+    ),
     signals=("torque_shaft_nm",),
     rivals={
         "coulomb_friction": "an open-circuit comparison against a rotor without magnet",

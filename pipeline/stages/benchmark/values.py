@@ -83,16 +83,17 @@ def _standing(q: Mapping[str, float], _: Motor) -> float:
     return q["size"]
 
 
-SIZES: Mapping[str, tuple[str, Size]] = {
-    "windage": ("drag_nm", lambda q, motor: q["size"] * _top(motor) ** 2),
-    "iron_eddy": ("drag_nm", _eddy),
-    "iron_hysteresis": ("drag_nm", _standing),
-    "stribeck": ("excess_nm", _standing),
-    "skin_effect": ("rise", _skin),
-    "dead_time": ("loss_v", _standing),
+SIZES: Mapping[str, tuple[tuple[str, ...], Size]] = {
+    "windage": (("drag_nm",), lambda q, motor: q["size"] * _top(motor) ** 2),
+    "iron_eddy": (("drag_nm", "excess_nm"), _eddy),
+    "iron_hysteresis": (("drag_nm",), _standing),
+    "stribeck": (("excess_nm",), _standing),
+    "skin_effect": (("rise",), _skin),
+    "dead_time": (("loss_v",), _standing),
 }
-"""What an effect does: drag [N·m] and rise of resistance at the highest speed and the magnet's
-flux, drag at standstill, voltage [V] a phase loses at large current."""
+"""What an effect does, by all its terms that are there: drag [N·m] and rise of resistance at the
+highest speed and the magnet's flux, drag at standstill, voltage [V] a phase loses at large
+current."""
 
 
 def compared(case: Case, document: Mapping[str, Any]) -> Iterator[Compared]:
@@ -124,12 +125,14 @@ def _value(effect: str, case: Case, fitted: Fitted) -> Compared | None:
 
 
 def _size(effect: str, case: Case, fitted: Fitted) -> Compared | None:
-    name, size = SIZES.get(effect, ("", _standing))
-    if fitted.get(name, {}).get("value") is None:
+    names, size = SIZES.get(effect, ((), _standing))
+    values = [fitted.get(name, {}).get("value") for name in names]
+    there = [value for value in values if value is not None]
+    if not there:
         return None
     motor = station(case.motor).motor
     want = size(parameters(effect, motor, case.effects[effect]), motor)
-    return Compared(effect, abs(fitted[name]["value"] / want - 1.0), None)
+    return Compared(effect, abs(sum(there) / want - 1.0), None)
 
 
 def _names(effect: str, case: Case) -> tuple[tuple[str, ...], float, Truth]:

@@ -163,8 +163,23 @@ def test_torque_comes_from_the_co_energy_of_the_linear_machine():
         ),
         (
             "iron_eddy",
-            {"drag_nm": 0.02},
+            {"drag_nm": 0.02, "excess_nm": 0.0},
             lambda x: 0.02 * x.omega_rad_s / 250.0 * abs(x.flux_wb / BASE["psi_wb"]) ** 2,
+        ),
+        (
+            "iron_eddy",
+            {"drag_nm": 0.0, "excess_nm": 0.01},
+            lambda x: (
+                0.01
+                * np.sign(x.omega_rad_s)
+                * (abs(x.omega_rad_s) / 250.0) ** 0.5
+                * abs(x.flux_wb / BASE["psi_wb"]) ** 1.5
+            ),
+        ),
+        (
+            "iron_hysteresis",
+            {"drag_nm": 0.01, "steeper": 0.6},
+            lambda x: 0.01 * np.sign(x.omega_rad_s) * abs(x.flux_wb / BASE["psi_wb"]) ** 1.6,
         ),
         (
             "load_dependent_friction",
