@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri, ndtr
 
 from pipeline.criticism.effect import Array
 from pipeline.criticism.floors import channel_scale
@@ -20,6 +22,7 @@ _GROWTH = 5.0
 _MOST_BLOCKS = 10_000
 _OVER = 1.0
 """Excess of χ²/n that is told: a floor from the recording itself is good to a factor of two."""
+_CHANCE = float(ndtr(-5.0))
 _MATERIAL, _MATERIAL_BENCH, _MATERIAL_READING = 5e-4, 1e-2, 5e-3
 """Error that matters: of the machine's own scale, of a bench meter's largest reading, and of the
 largest voltage of a log, which is less than the machine's at standstill."""
@@ -215,7 +218,7 @@ def _over(
     spreads, counts = around.spreads(residual / soft), around.counts
     for place, (number, channel, _) in enumerate(around.labels):
         n, q = counts[place], spreads[place]
-        if n == 0 or q <= 1.0 + max(_OVER, 5.0 * math.sqrt(2.0 / n)):
+        if n == 0 or q <= max(1.0 + _OVER, _highest_by_chance(n)):
             continue
         mine = around.group == place
         unit = float(((around.unit * soft)[mine] ** 2).mean())
@@ -223,6 +226,15 @@ def _over(
         size = math.sqrt(max(more, 0.0))
         matters = size > material_size(segments[number], channel, around, large)
         yield place, float(q), size, matters
+
+
+@cache
+def _highest_by_chance(n: float) -> float:
+    """χ²/n of n samples that chance is over as seldom as five standard deviations of a normal
+    variable: of few samples the tail of χ² is long, and 1 + 5 √(2/n) is passed by one in a thousand
+    of four.
+    """
+    return float(chdtri(n, _CHANCE)) / n
 
 
 def material_size(segment: Segment, channel: str, around: System, large: bool = False) -> float:

@@ -122,3 +122,23 @@ def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(sha
     page = _as_told((running,), replace(quiet, residual=left), ())
     assert [(one.signal, one.matters) for one in page] == [("torque_shaft_nm", False)]
     assert over_floor(quiet, (running,), np.where(mine, 1.2, 0.0)) == ()
+
+
+@pytest.mark.parametrize(
+    ("count", "q", "told"), [(4, 8.9, False), (4, 9.4, True), (400, 1.9, False), (400, 2.1, True)]
+)
+def test_few_samples_are_over_their_floor_by_chance_far_more_often(count, q, told):
+    """Of χ² with 4 degrees of freedom, 36.0 is passed as seldom as 5 by a normal variable."""
+    running = log()
+    fitted = Fitted(Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    around = system((running,), fitted)
+    place = next(n for n, label in enumerate(around.labels) if label[1:] == ("torque_shaft_nm", 0))
+    group = np.full(count, place)
+    few = replace(
+        around,
+        group=group,
+        residual=np.full(count, np.sqrt(q)),
+        soft=np.ones(count),
+        unit=np.ones(count),
+    )
+    assert bool(over_floor(few, (running,), few.residual)) == told
