@@ -174,7 +174,9 @@ def _orders(variable: Variable, machine: Machine) -> tuple[int, ...]:
         return (*LOWEST, 12)
     p = machine.pole_pairs
     slots = () if machine.slots is None else (machine.slots, math.lcm(machine.slots, 2 * p))
-    return tuple(sorted({*LOWEST, p, 2 * p, 6 * p, *slots, *machine.torque_orders}))
+    return tuple(
+        sorted({*LOWEST, p, 2 * p, 6 * p, *slots, *machine.torque_orders, *machine.load_orders})
+    )
 
 
 def _nodes(variable: Variable) -> Array:

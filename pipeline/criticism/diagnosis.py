@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import gammaincc
 
-from pipeline.criticism.asked import fit_of
+from pipeline.criticism.asked import Begun, fit_of
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
@@ -23,6 +23,7 @@ from pipeline.criticism.judge import (
 )
 from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
+from pipeline.criticism.order_scan import orders_left
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
 from pipeline.criticism.scores import LEAST_SHARE, TIE, Candidate, Score, candidates
@@ -31,7 +32,7 @@ from pipeline.criticism.segments import TESTS, segments
 from pipeline.criticism.selection import Rung, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, own_columns
+from pipeline.criticism.system import System, own_columns
 from pipeline.criticism.unknown import unknown_structure
 from pipeline.criticism.wander import SIZE, wandering
 from pipeline.records.capture import Campaign
@@ -59,7 +60,8 @@ _WITHIN = (
 _SEEN = 3.0
 """Standard deviations of a typical size from which on captures would show an effect."""
 _EXPLAINED = 0.5
-"""Share of the misfit that effects found may leave, and still explain what is left."""
+"""Share of the misfit, and of held-out power over the floor, that effects found may leave, and
+still explain what is left."""
 _AS_GOOD = 0.1
 """Share of the fall that a rival's promise may be short of."""
 _NOTHING = 0.01
@@ -73,24 +75,29 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     """
     machine = machine_of(campaign, start)
     library = effects(model.effects_path)
-    asked = model_of(model, machine)
     found = segments(campaign, machine)
     if not _enough(found):
         return _insufficient(campaign, model, library)
-    start_fit = fit_of(found, asked)
+    start_fit = fit_of(found, model_of(model, machine))
+    rungs, held, left = _climbed(start_fit, library)
+    unlooked = orders_left(start_fit.segments, rungs[-1].around)
+    if unlooked:
+        machine = replace(machine, load_orders=unlooked)
+        start_fit = fit_of(segments(campaign, machine), model_of(model, machine))
+        rungs, held, left = _climbed(start_fit, library)
     found = start_fit.segments
     stem = f"{file_stem(campaign.motor_id)}_unknown"
-    rungs, held, left = _climbed(found, start_fit.fitted, library)
-    sketch = _unknown(found, rungs, left, stem)
+    sketch = _unknown(found, rungs, held, left, stem)
     large, calm = _large(found, rungs, left), None
-    if sketch is None and not _explained(rungs, large):
+    if sketch is None and not _explained(rungs, held, large):
         calm = wandering(found, rungs[-1].fitted, large)
     if calm is not None:
         found = calm
-        rungs, held, left = _climbed(found, gauss_newton(found, start_fit.fitted)[0], library)
+        calmed = gauss_newton(found, start_fit.fitted)
+        rungs, held, left = _climbed(Begun(calm, *calmed, start_fit.hum), library)
         left = _large(found, rungs, left)
-        sketch = _unknown(found, rungs, left, stem)
-    within = None if sketch else _unknown(found, rungs, left, stem, in_parts=True)
+        sketch = _unknown(found, rungs, held, left, stem)
+    within = None if sketch else _unknown(found, rungs, held, left, stem, in_parts=True)
     sketch = sketch or within
     left = left if sketch else _large(found, rungs, left)
     last = rungs[-1]
@@ -98,7 +105,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     missing = last.added
     ranking = _ranking(rungs, held, offered, library, found)
     unexcited = _unexcited(campaign, library, last, offered)
-    verdict = _verdict(missing, left, rungs, unexcited)
+    verdict = _verdict(missing, left, rungs, held, unexcited)
     return Diagnosis(
         campaign.motor_id,
         model.name,
@@ -155,10 +162,11 @@ def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
 
 
 def _climbed(
-    found: Sequence[Segment], start: Fitted, library: dict[str, Effect]
+    start: Begun, library: dict[str, Effect]
 ) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...]]:
     """The ladder as far as it is trusted, its held-out errors, and what is left at its end."""
-    rungs = search(found, start, library)
+    found = start.segments
+    rungs = search(found, start.fitted, library)
     alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
     held = in_common([r.around for r in kept], alone[: len(kept)])
@@ -196,6 +204,7 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
 def _unknown(
     found: Sequence[Segment],
     rungs: Sequence[Rung],
+    held: Sequence[HeldOut],
     left: Sequence[Remainder],
     name: str,
     in_parts: bool = False,
@@ -203,7 +212,7 @@ def _unknown(
     """What the structure depends on that no effect explains; None where there is none, or where
     nothing that the machine does predicts it.
     """
-    if _explained(rungs, left):
+    if _explained(rungs, held, left):
         return None
     last = rungs[-1]
     signals = list(dict.fromkeys(r.signal for r in left))
@@ -233,7 +242,7 @@ def trusted(
         kept, around = tuple(rungs[:count]), rungs[count - 1].around
         left = remainder(around, found, around.residual)
         worse = count > 2 and held[count - 1].total > (1.0 - _NOTHING) * held[count - 2].total
-        if count == 1 or not left or (_explained(kept, left) and not worse):
+        if count == 1 or not left or (_explained(kept, held, left) and not worse):
             break
         if held[count - 1].total < (1.0 - LEAST_SHARE) * held[count - 2].total:
             break
@@ -253,13 +262,18 @@ def _clears_orders(found: Sequence[Segment], before: System, after: System) -> b
     return bool(was and not now)
 
 
-def _explained(rungs: Sequence[Rung], left: Sequence[Remainder]) -> bool:
-    """Whether the effects found took most of the misfit of the signals that still miss, and a tenth
-    at least of each one's own.
+def _explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Remainder]) -> bool:
+    """Whether the effects found took most of the misfit of the signals that still miss, a tenth at
+    least of each one's own, and most of the power that held-out errors have over the floor.
 
     An offset of the angle that takes all the torque's error explains nothing of a shaft that coasts
-    too short. Signals that had less than a tenth of the misfit do not count alone.
+    too short. Signals that had less than a tenth of the misfit do not count alone. Misfit is
+    logarithmic: of an equation that is given up at a million floors it takes half to come to a
+    thousand.
     """
+    first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(rungs) - 1))
+    if last > _EXPLAINED * first:
+        return not left
     signals = sorted({r.signal for r in left})
     before, after = (
         np.array([_excess(rung, {name}) for name in signals]) for rung in (rungs[0], rungs[-1])
@@ -273,9 +287,10 @@ def _verdict(
     missing: Sequence[str],
     left: Sequence[Remainder],
     rungs: Sequence[Rung],
+    held: Sequence[HeldOut],
     unexcited: Sequence[Unexcited],
 ) -> Verdict:
-    if left and not _explained(rungs, left):
+    if left and not _explained(rungs, held, left):
         return "unknown"
     if missing:
         return "missing"

@@ -154,9 +154,11 @@ def row_index(
 
 
 def electrical_orders(machine: Machine) -> tuple[int, ...]:
-    """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn."""
+    """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn; and others
+    that were seen under load.
+    """
     p = machine.pole_pairs
-    return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p}))
+    return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *machine.load_orders}))
 
 
 def slow_orders(machine: Machine) -> tuple[int, ...]:

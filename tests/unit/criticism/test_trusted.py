@@ -82,7 +82,17 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
     left = [Remainder("one", name, 0, 9.0, 1.0) for name in names]
     first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
     last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
-    assert _explained((first, last), left) is said
+    held = [HeldOut(first.around.residual, total) for total in (100.0, 2.0)]
+    assert _explained((first, last), held, left) is said
+
+
+@pytest.mark.parametrize(("total", "said"), [(239.7, False), (160.0, True)])
+def test_what_predicts_no_capture_better_explains_nothing(total, said):
+    """From a million floors to a thousand is half of the logarithm, and still a thousand."""
+    left = [Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0)]
+    first, last = missing_by(torque_shaft_nm=1e6), missing_by(torque_shaft_nm=900.0)
+    held = [HeldOut(first.around.residual, one) for one in (244.1, total)]
+    assert _explained((first, last), held, left) is said
 
 
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])

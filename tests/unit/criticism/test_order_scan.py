@@ -1,0 +1,67 @@
+"""Orders a turn that no equation looks at: seen where two captures have them, and only there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.model import Model
+from pipeline.criticism.order_scan import orders_left
+from pipeline.criticism.segment import electrical_orders, row_index
+from pipeline.criticism.system import Fitted, floors, system
+from tests.unit.criticism.machines import BASE, log, machine
+
+PLAIN = Model(machine(), ())
+
+
+def spinning(seed, waves=(), name="torque_shaft_nm"):
+    """A log of fourteen turns with waves (order, size a current) in one of its signals."""
+    one = log(16_000, seed, 1.0)
+    theta, current = one.recorded["theta_mech_rad"], one.recorded["iq_a"]
+    added = sum(
+        (size * current * np.cos(order * theta + 0.4) for order, size in waves),
+        np.zeros(theta.size),
+    )
+    signals = {**one.recorded, name: one.recorded[name] + added}
+    return replace(one, capture=f"log_{seed}", recorded=signals)
+
+
+def left(*segments):
+    values = dict(BASE)
+    fitted = Fitted(PLAIN, values, floors(segments, PLAIN, values), values)
+    return orders_left(segments, system(segments, fitted))
+
+
+def test_waves_under_load_are_found_by_their_orders():
+    both = [spinning(seed, ((16, 2e-3), (37, 3e-3))) for seed in (1, 2)]
+    assert left(*both) == (16, 37)
+    assert left(*[spinning(seed, ((19, 0.02),), "vq_v") for seed in (1, 2)]) == (19,)
+
+
+def test_what_the_equations_look_at_is_theirs():
+    """Order 42 is 6ε of seven pole pairs: its group of rows tells of it."""
+    assert left(*[spinning(seed, ((42, 3e-3),)) for seed in (1, 2)]) == ()
+
+
+def test_one_capture_alone_has_no_order():
+    assert left(spinning(1, ((16, 3e-3),)), spinning(2)) == ()
+
+
+def test_what_nobody_would_act_on_is_no_order():
+    """A two-thousandth of the machine's torque of 1.6 N·m, as an rms."""
+    size = 5e-4 * 1.6 / float(np.sqrt(0.5 * np.mean(log(16_000).recorded["iq_a"] ** 2)))
+    assert left(*[spinning(seed, ((16, 0.6 * size),)) for seed in (1, 2)]) == ()
+    assert left(*[spinning(seed, ((16, 1.8 * size),)) for seed in (1, 2)]) == (16,)
+
+
+@pytest.mark.parametrize("first", range(0, 12, 4))
+def test_noise_has_no_orders(first):
+    assert left(*[spinning(seed) for seed in range(first, first + 4)]) == ()
+
+
+def test_orders_that_were_seen_have_rows_of_their_own():
+    seen = replace(machine(), load_orders=(16,))
+    assert set(electrical_orders(seen)) - set(electrical_orders(machine())) == {16}
+    assert ("torque_shaft_nm", 42) in row_index(log())[3]
