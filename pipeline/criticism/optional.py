@@ -18,6 +18,9 @@ from pipeline.criticism.model import zero
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.system import Fitted, System, own_columns
 
+_CLEARLY = 20.0
+"""Prices from which on the tangent is believed that a term pays."""
+
 
 def trimmed(
     segments: Sequence[Segment], fitted: Fitted, around: System, names: Sequence[str]
@@ -25,8 +28,9 @@ def trimmed(
     """The fit with the optional terms of the named effects that do not pay left out.
 
     A term pays when −2 log L falls by more than ln n a parameter. What to first order does not pay
-    is left out in one refit; if that loses more than foreseen, one term after the other is. One
-    term with an amplitude always stays.
+    is left out in one refit; if that loses more than foreseen, one term after the other is, of
+    those as well that to first order pay less than twenty prices. One term with an amplitude always
+    stays.
     """
     price = math.log(max(around.size, 2))
     for name in names:
@@ -38,9 +42,8 @@ def trimmed(
         if less is not None:
             fitted, around = less
             continue
-        terms = {p.optional for p in effect.parameters_of(fitted.model.machine)}
         alone = spare if len(spare) > 1 else ()
-        for term in (*alone, *sorted(terms - {0, *spare})):
+        for term in (*alone, *_doubtful(fitted, around, effect, spare, price)):
             less = _unless_worth(segments, fitted, around, name, (term,), price)
             fitted, around = less or (fitted, around)
     return fitted, around
@@ -115,6 +118,20 @@ def _loss(fitted: Fitted, around: System, known: Grams, names: Sequence[str]) ->
     out = np.array([n for n in own if around.columns[n].name in names], dtype=int)
     move = np.array([-fitted.values[around.columns[n].name] for n in out])
     return known.moved(out, move).along(np.setdiff1d(own, out)).best().misfit - known.misfit()
+
+
+def _doubtful(
+    fitted: Fitted, around: System, effect: Effect, spare: Sequence[int], price: float
+) -> tuple[int, ...]:
+    """The optional terms that are not `spare` and that the tangent may be wrong about."""
+    known = around.grams()
+    terms = {p.optional for p in effect.parameters_of(fitted.model.machine)} - {0, *spare}
+    return tuple(
+        term
+        for term in sorted(terms)
+        if _loss(fitted, around, known, names := _parameters(fitted, effect, (term,)))
+        < _CLEARLY * price * len(names)
+    )
 
 
 def _without(

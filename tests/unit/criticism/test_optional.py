@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -52,6 +53,7 @@ def test_the_terms_that_pay_stay_whatever_the_tangent_says(tangent, refits, monk
 
     monkeypatch.setattr(optional, "_spare", lambda *_: tangent)
     monkeypatch.setattr(optional, "_without", without)
+    monkeypatch.setattr(optional, "_doubtful", lambda *known: sorted({*NEEDED} - {*known[3]}))
     model = Model(machine(), (SATURATION,))
     start = Fitted(model, {**BASE, **zero(SATURATION, model)}, (), BASE)
     fitted, around = trimmed((), start, Around(0.0), ("saturation",))
@@ -71,3 +73,15 @@ def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
     assert [effect.left_out for effect in full.model.effects] == [(), (1,)]
     assert full.values["saturation.q_fall"] == 0.2
     assert full.values["saturation.d_odd"] == 0.0 and full.values["saturation.d_bend"] == 1.0
+
+
+@pytest.mark.parametrize(("loss", "asked"), [(19.0, True), (21.0, False)])
+def test_what_clearly_pays_is_not_asked_for_by_a_refit(loss, asked, monkeypatch):
+    """In prices of a parameter: the tangent is not wrong about as much as that."""
+    price = 5.0
+    monkeypatch.setattr(optional, "_loss", lambda _f, _a, _k, names: loss * price * len(names))
+    model = Model(machine(), (SATURATION,))
+    fitted = Fitted(model, {**BASE, **zero(SATURATION, model)}, (), BASE)
+    around = SimpleNamespace(grams=lambda: None)
+    found = optional._doubtful(fitted, around, SATURATION, (Q_BEND,), price)
+    assert found == (tuple(sorted({*NEEDED} - {Q_BEND})) if asked else ())
