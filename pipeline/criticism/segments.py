@@ -31,12 +31,14 @@ from pipeline.criticism.traces import (
     even_clock,
     prepared,
     shaft_angle,
+    smoothed,
     tellable,
     thinned,
     window_of,
     with_angle,
     with_travel,
 )
+from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Campaign, Capture
 
@@ -46,6 +48,7 @@ _FEW = 12
 _LEAST_WINDOW = 8
 _WINDOWS = 48
 _WINDOWS_LOG = 32
+_LEAD = 0.05
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
@@ -149,9 +152,26 @@ def _shaft(capture: Capture, machine: Machine) -> Segment | None:
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, found, keep, channel)
     window = window_of(period, keep.size)
+    keep = keep & _coasts(found["theta_mech_rad"], window)
     told = prepared(found, period)
     weak = projection(found["theta_mech_rad"], window_starts(keep, window), window, ())
     return segment_of(capture, "shaft", "bench", period, found, told, (channel,), weak)
+
+
+def _coasts(theta: Array, window: int) -> NDArray[np.bool_]:
+    """Samples [n] in which a shaft coasts: all of a record that begins at speed, and of others not
+    those in which it is brought to its speed, or held there for a twentieth of the coast or more.
+    """
+    speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
+    runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
+    ends = [0, *(stop for _, stop in runs)]
+    driven = any(
+        start - end > _LEAD * (stop - start) for (start, stop), end in zip(runs, ends, strict=False)
+    )
+    free = np.full(theta.size, not driven)
+    for start, stop in runs:
+        free[start:stop] = True
+    return free
 
 
 def _slow_turn(

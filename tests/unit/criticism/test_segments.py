@@ -12,7 +12,7 @@ from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
-from tests.unit.criticism.machines import machine
+from tests.unit.criticism.machines import BASE, machine
 
 
 def slow_turn(turns):
@@ -104,3 +104,21 @@ def test_harmonics_of_a_high_cogging_order_are_found_too():
         Campaign("m", (Capture("cog.mcap", "0", "verified", meta, (table,)),)), Constants()
     )
     assert {264, 528} <= set(found.torque_orders)
+
+
+@pytest.mark.parametrize(("lead_s", "left"), [(0.0, 0.0), (0.01, 0.0), (0.6, 0.6)])
+def test_a_shaft_that_is_held_at_its_speed_does_not_coast(lead_s, left):
+    """A record from before the switch is opened: no drag of the machine's balances what holds it.
+    A moment of it, as any trigger leaves, is within the windows of the first speed anyhow.
+    """
+    t = 1e-3 * np.arange(3000)
+    rate = BASE["b_nm_s_rad"] / BASE["j_kgm2"]
+    late = np.maximum(t - lead_s, 0.0)
+    theta = 200.0 * np.minimum(t, lead_s) + 200.0 / rate * -np.expm1(-rate * late)
+    noisy = theta + np.random.default_rng(3).normal(0.0, 2e-6, t.size)
+    table = pl.DataFrame({"t_s": t, "theta_mech_rad": noisy})
+    meta = CaptureMeta("m", "spin_down", pole_pairs=7)
+    capture = Capture("coast.mcap", "0", "verified", meta, (table,))
+    (found,) = segments(Campaign("m", (capture,)), machine())
+    assert found.ts_s * float(found.weak.starts[0]) >= left
+    assert found.ts_s * float(found.weak.starts[0]) < left + 0.1
