@@ -53,7 +53,7 @@ def test_what_nobody_would_act_on_is_no_order():
     """A two-thousandth of the machine's torque of 1.6 N·m, as an rms."""
     size = 5e-4 * 1.6 / float(np.sqrt(0.5 * np.mean(log(16_000).recorded["iq_a"] ** 2)))
     assert left(*[spinning(seed, ((16, 0.6 * size),)) for seed in (1, 2)]) == ()
-    assert left(*[spinning(seed, ((16, 1.8 * size),)) for seed in (1, 2)]) == (16,)
+    assert left(*[spinning(seed, ((16, 1.2 * size),)) for seed in (1, 2)]) == (16,)
 
 
 @pytest.mark.parametrize("first", range(0, 12, 4))
