@@ -21,8 +21,9 @@ from pipeline.records.errors import CaptureError, UsageError
 
 _MB = 2**20
 _TIMEOUT = b"Timeout"
-LEAST_MB = 32
-"""Memory without which the libraries can read no file, however small."""
+LEAST_MB = 60
+"""Memory without which the libraries can read no file, however small: their threads ask for 8 MB at
+a time."""
 MOST = 1e9
 """Seconds and megabytes beyond which the system counts no more."""
 

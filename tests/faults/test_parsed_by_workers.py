@@ -23,7 +23,7 @@ PARSERS = (
     ("pipeline.io.inspect_file", "describe"),
 )
 HEAVY = "reading it takes more than"
-LITTLE = "read_memory_mb=60"
+LITTLE = f"read_memory_mb={LEAST_MB}"
 
 
 @pytest.fixture
