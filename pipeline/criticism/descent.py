@@ -155,8 +155,8 @@ def first_fit(segments: Sequence[Segment], near: Fitted) -> tuple[Fitted, System
     return min(ends, key=lambda end: end[1].misfit)
 
 
-def fit_anew(segments: Sequence[Segment], fitted: Fitted) -> tuple[Fitted, System]:
-    """A fit begun once more from orders of magnitude, shapes of effects as they are.
+def rough_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
+    """A rough fit begun once more from orders of magnitude, shapes of effects as they are.
 
     What was missing before an effect came in may have left constants, and floors that were made by
     them, where no step leads back from: an encoder off its centre shakes a light rotor less.
@@ -164,7 +164,7 @@ def fit_anew(segments: Sequence[Segment], fitted: Fitted) -> tuple[Fitted, Syste
     model = fitted.model
     shapes = [name for name, (_, p) in model.parameters().items() if not p.amplitude]
     near = rough_fit(segments, model, {name: fitted.values[name] for name in shapes})
-    return first_fit(segments, replace(near, tolerance=fitted.tolerance))
+    return replace(near, tolerance=fitted.tolerance)
 
 
 def _one_side_first(

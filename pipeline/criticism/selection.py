@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.closer import renamed
-from pipeline.criticism.descent import clipped, fit_anew, gauss_newton
+from pipeline.criticism.descent import clipped, first_fit, gauss_newton, rough_anew
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.floors import form_tolerance
 from pipeline.criticism.grams import Grams
@@ -61,6 +61,9 @@ _SURELY = 2.0
 """Standard uncertainties that an amplitude must be away from zero."""
 _OTHER_FLOOR = math.log(1.5)
 """Change of some noise floor that calls for a fit by the new ones."""
+_OTHER_INERTIA = 2.0
+"""Factor between a fit's inertia and a rough fit's from which on the fit is begun anew: a rough
+fit is a tenth off at most, an inertia that was spoiled before an effect came in tens of times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,9 +110,9 @@ def search(
 
 
 def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
-    """The fit by the noise floors that effects leave, or as it would be had it been asked for with
-    these effects, whichever is better; as it is where floors are not others by a half and nothing
-    is left over them.
+    """The fit by the noise floors that effects leave, as it is where these are not others by a half
+    and nothing is left over them. Where a rough fit finds another inertia, the better of that fit
+    and of one that is begun there.
 
     To undo a sensor's lag brings noise with it, and so does a twist that is told by an angle. An
     encoder off its centre leaves next to no inertia, and floors that it made.
@@ -123,7 +126,11 @@ def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
         ended = fitted, system(segments, fitted)
         if not told_groups(ended[1], segments).any():
             return fitted
-    return min(ended, fit_anew(segments, fitted), key=lambda end: end[1].misfit)[0]
+    near = rough_anew(segments, fitted)
+    lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (near, fitted))
+    if heavier < _OTHER_INERTIA * lighter:
+        return ended[0]
+    return min(ended, first_fit(segments, near), key=lambda end: end[1].misfit)[0]
 
 
 def _chosen(

@@ -19,9 +19,9 @@ from pipeline.criticism.linearise import (
     linearise,
     whitened_anew,
 )
-from pipeline.criticism.model import Model, zero
+from pipeline.criticism.model import Model
 from pipeline.criticism.residuals import over_inertia
-from pipeline.criticism.segment import Segment, row_index
+from pipeline.criticism.segment import Segment
 from pipeline.criticism.size import base_scales
 
 _SEED = 20260302
@@ -189,19 +189,16 @@ def floors_grown(segments: Sequence[Segment], fitted: Fitted) -> tuple[Array, ..
     """Factors by which the noise floor of every segment is another at a fit's values than at those
     it was made at, by the same noise.
     """
-    each = [(fitted.model, fitted.values, fitted.near, _SEED + n) for n in range(len(segments))]
+    what = fitted.model, fitted.values
+    each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fitted.sigma)]
     return on_each(_floor_grown, segments, each)
 
 
-def _floor_grown(segment: Segment, model: Model, values: Values, near: Values, seed: int) -> Array:
+def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, seed: int) -> Array:
     """One but where there are currents, whose noise is in the equations times what is fitted."""
     if _CURRENTS.isdisjoint(segment.recorded):
-        return np.ones(len(row_index(segment)[3]))
-    before = dict(near)
-    for effect in model.effects:
-        before = {**zero(effect, model), **before}
-    at_start, at_end = (noise_floor(segment, model, at, seed) for at in (before, values))
-    return at_end / at_start
+        return np.ones(sigma.size)
+    return noise_floor(segment, model, values, seed) / sigma
 
 
 def tolerances(
@@ -221,8 +218,8 @@ def system(
 ) -> System:
     """Linearises every segment around a fit, along its own columns and those of candidates.
 
-    Columns of hooks that are linear stay as they were in `before`, a system around a near fit with
-    the same noise floor; with `chord` all that it has stay.
+    Columns of hooks that are linear stay as they were in `before`, a system around a near fit; with
+    `chord` all that it has stay.
     """
     model, values = fitted.model, fitted.values
     columns = [*own_columns(model), *candidates]
@@ -291,19 +288,24 @@ def _kept(before: System | None, fitted: Fitted, chord: bool) -> dict[ColumnKey,
     """Columns of an earlier system that hold at a new fit too.
 
     A stale column costs no accuracy: a fit ends where the residual, which is always computed anew,
-    has nothing left along the columns, and those of two near fits span nearly the same space.
+    has nothing left along the columns, and those of two near fits span nearly the same space. Not
+    so where an error of the angle was found: what others do to an angle is another thing then.
     """
-    if before is None or before.around.sigma is not fitted.sigma:
+    if before is None:
         return {}
     if chord:
         return {c.key: before.matrix[:, place] for place, c in enumerate(before.columns)}
     if _moved_base(before.made_at, fitted.values):
         return {}
     heavier = abs(fitted.values["j_kgm2"] / before.made_at["j_kgm2"] - 1.0)
+    known = before.around.model.effects
+    turned = any(e.angle is not None and e not in known for e in fitted.model.effects)
     return {
         column.key: before.matrix[:, place]
         for place, column in enumerate(before.columns)
-        if _linear(column, fitted.model) and (column.name != "j_kgm2" or heavier < _HEAVIER)
+        if _linear(column, fitted.model)
+        and (column.name != "j_kgm2" or heavier < _HEAVIER)
+        and not (turned and column.effect is not None and column.effect.angle is not None)
     }
 
 

@@ -8,6 +8,7 @@ back a few megabytes.
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ class Mate:
         self._executor = executor
         # kept, so that no other segment takes its identity
         self._sent: dict[int, Segment] = {}
+        self._spent_s: dict[int, float] = {}
 
     @contextmanager
     def campaign(self) -> Iterator[None]:
@@ -38,6 +40,7 @@ class Mate:
         with done_by(self.share):
             yield
         self._sent.clear()
+        self._spent_s.clear()
         if self._executor is not None:
             self._executor.submit(_forget)
 
@@ -47,17 +50,25 @@ class Mate:
         """`work(segment, *arguments)` of every segment, in order, half of it by the worker."""
         if self._executor is None or len(segments) < 2:
             return by_threads(work, segments, arguments)
-        mine, theirs = halves([segment.size for segment in segments])
+        mine, theirs = halves(self._costs(segments))
         try:
             given = [segments[n] for n in theirs], [arguments[n] for n in theirs]
             there = self._handed(self._executor, work, *given)
-            done = {n: work(segments[n], *arguments[n]) for n in mine}
+            done = {n: _timed(work, segments[n], arguments[n]) for n in mine}
             done |= dict(zip(theirs, there.result(), strict=True))
         except Exception as error:  # noqa: BLE001 - if it is of the work, it is raised again here
             _log.info("work on segments is not shared any more: %s", error)
             self._executor = None
             return by_threads(work, segments, arguments)
-        return tuple(done[n] for n in range(len(segments)))
+        for n, (_, seconds) in done.items():
+            key = id(segments[n])
+            self._spent_s[key] = self._spent_s.get(key, 0.0) + seconds
+        return tuple(done[n][0] for n in range(len(segments)))
+
+    def _costs(self, segments: Sequence[Segment]) -> list[float]:
+        """What work on each segment costs: the time spent on it so far, or else its samples."""
+        spent = [self._spent_s.get(id(segment), 0.0) for segment in segments]
+        return spent if all(spent) else [float(segment.size) for segment in segments]
 
     def _handed(
         self,
@@ -65,7 +76,7 @@ class Mate:
         work: Work,
         segments: Sequence[Segment],
         arguments: Sequence[tuple[Any, ...]],
-    ) -> Future[list[Any]]:
+    ) -> Future[list[tuple[Any, float]]]:
         new = {id(one): one for one in segments if id(one) not in self._sent}
         there = executor.submit(_done, new, [id(one) for one in segments], work, arguments)
         self._sent |= new
@@ -83,10 +94,10 @@ def mate(effects_path: str | None) -> Iterator[Mate]:
         yield Mate(pool.executor)
 
 
-def halves(sizes: Sequence[int]) -> tuple[list[int], list[int]]:
+def halves(sizes: Sequence[float]) -> tuple[list[int], list[int]]:
     """Indices in two shares of about the same sum of sizes, the largest dealt out first."""
     shares: tuple[list[int], list[int]] = [], []
-    loads = [0, 0]
+    loads = [0.0, 0.0]
     for n in sorted(range(len(sizes)), key=lambda n: -sizes[n]):
         lighter = int(loads[1] < loads[0])
         shares[lighter].append(n)
@@ -107,6 +118,13 @@ def _learn(effects_path: str | None) -> None:
 
 def _done(
     new: dict[int, Segment], wanted: list[int], work: Work, arguments: Sequence[tuple[Any, ...]]
-) -> list[Any]:
+) -> list[tuple[Any, float]]:
     _HELD.update(new)
-    return [work(_HELD[key], *one) for key, one in zip(wanted, arguments, strict=True)]
+    return [_timed(work, _HELD[key], one) for key, one in zip(wanted, arguments, strict=True)]
+
+
+def _timed(work: Work, segment: Segment, arguments: tuple[Any, ...]) -> tuple[Any, float]:
+    """What comes of work on a segment, and the processor's time that it took [s]."""
+    begun = time.thread_time()
+    done = work(segment, *arguments)
+    return done, time.thread_time() - begun

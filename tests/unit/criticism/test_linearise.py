@@ -9,13 +9,14 @@ import pytest
 
 from pipeline.criticism.floors import offsets
 from pipeline.criticism.linearise import absorb, effect_columns, whitened_anew
-from pipeline.criticism.model import Model
+from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.segment import row_index
-from pipeline.criticism.system import Fitted, floors, own_columns, system
+from pipeline.criticism.system import Fitted, _kept, floors, own_columns, system
 from tests.unit.criticism.machines import BASE, log, machine
 
 PLAIN = Model(machine(), ())
+LIBRARY = effects()
 
 
 def test_rows_over_another_noise_have_their_offsets_absorbed_by_that():
@@ -48,3 +49,32 @@ def test_candidates_columns_survive_a_tolerance_of_form():
     names = [column.name for column in own_columns(PLAIN)]
     pair = kept[:, names.index("gain_torque")], kept[:, -1]
     assert pair[1] == pytest.approx(pair[0], rel=1e-6, abs=1e-9 * np.abs(pair[0]).max())
+
+
+def test_candidates_columns_survive_other_floors():
+    """A sensor's error that was found changes the floors, and little that other effects do."""
+    segments = (log(noise=1.0),)
+    start = Fitted(PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
+    offered = [
+        c for name in ("windage", "torque_scale") for c in effect_columns(LIBRARY[name], PLAIN)
+    ]
+    before = system(segments, start, offered)
+    louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma))
+    kept, made = (system(segments, louder, offered, b) for b in (before, None))
+    assert kept.matrix == pytest.approx(made.matrix, rel=1e-6, abs=1e-9 * np.abs(made.matrix).max())
+    assert kept.made_at is before.made_at
+
+
+def test_what_turns_the_angle_is_made_anew_where_another_error_of_it_was_found():
+    segments = (log(noise=1.0),)
+    start = Fitted(PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
+    off, late = LIBRARY["angle_eccentricity"], LIBRARY["angle_offset"]
+    drag = effect_columns(LIBRARY["windage"], PLAIN)
+    before = system(segments, start, [*effect_columns(late, PLAIN), *drag])
+    model = PLAIN.with_effects(off)
+    found = {**BASE, **zero(off, model), "angle_eccentricity.sine_rad": 0.1}
+    turned = Fitted(model, found, start.sigma, found)
+    kept = _kept(before, turned, chord=False)
+    assert drag[0].key in kept
+    assert not any(name.startswith("angle_offset.") for name, _ in kept)
+    assert any(name.startswith("angle_offset.") for name, _ in _kept(before, start, chord=False))

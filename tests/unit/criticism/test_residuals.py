@@ -11,10 +11,11 @@ from pipeline.criticism.floors import noise_floor, reading_error
 from pipeline.criticism.linearise import effect_columns, linearise
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.noise import sensor_noise
+from pipeline.criticism.operate import finer_of
 from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import projected, row_index
-from tests.unit.criticism.machines import BASE, log, machine, operating
+from pipeline.criticism.residuals import _averaged, residual
+from pipeline.criticism.segment import projected, row_index, slow_orders
+from tests.unit.criticism.machines import BASE, coasting, log, machine, operating
 
 LIBRARY = effects()
 PLAIN = Model(machine(), ())
@@ -207,3 +208,18 @@ def test_a_wave_that_turns_many_times_a_sample_averages_out_of_a_coasting_shaft(
     assert np.hypot(cosine, sine).min() == pytest.approx(1.0)
     slow = replace(x, theta_rad=turned / 3e3, finer=32, kept={})
     assert np.hypot(*slow.shaft_waves(84)).min() > 0.999
+
+
+@pytest.mark.parametrize("turn_rad", [0.15, 0.3, 2.0, 5.0, 9.0, 23.0, 31.0, 68.0, 140.0])
+def test_a_coasting_sample_is_averaged_over_parts_enough(turn_rad):
+    """The mean of a wave under a triangle of two samples is sinc² of what it turns in one."""
+    order = max(slow_orders(machine()))
+    theta = np.arange(40) * turn_rad / order
+    segment = replace(coasting(), recorded={"theta_mech_rad": theta})
+    finer = finer_of(segment, machine())
+    turned = np.arange(40 * finer) * turn_rad / order / finer
+    x = replace(operating(), theta_rad=turned, inverter=False, finer=finer)
+    mean = _averaged(x.shaft_waves(order)[0], finer)
+    true = np.sinc(turn_rad / (2 * np.pi)) ** 2 * np.cos(order * theta)
+    assert mean[2:-2] == pytest.approx(true[2:-2], abs=0.004)
+    assert finer <= max(8, np.ceil(turn_rad / 3.0))

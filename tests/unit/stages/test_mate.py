@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import replace
 from multiprocessing import parent_process
 
@@ -71,6 +72,22 @@ def test_half_of_the_samples_are_the_workers(found) -> None:
     sizes = np.array([one.size for one in found])
     assert 0.4 < sizes[np.array(theirs)].sum() / sizes.sum() < 0.6
     assert not any(on_each(whose, found, [(0,)] * len(found)))
+
+
+def slow(segment, _) -> bool:
+    """Takes its time over the first capture, and tells whether a worker did it."""
+    until = time.thread_time() + (0.4 if segment.capture == "0.mcap" else 0.01)
+    while time.thread_time() < until:
+        pass
+    return parent_process() is not None
+
+
+@workers
+def test_shares_are_by_the_time_that_segments_took(found) -> None:
+    with mate(None) as second, second.campaign():
+        on_each(slow, found, [(0,)] * len(found))
+        first, *others = on_each(slow, found, [(0,)] * len(found))
+    assert all(other is not first for other in others)
 
 
 @workers
