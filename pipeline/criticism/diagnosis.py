@@ -64,6 +64,9 @@ _EXPLAINED = 0.5
 still explain what is left."""
 _AS_GOOD = 0.1
 """Share of the fall that a rival's promise may be short of."""
+_NO_GUESS = 0.2
+"""Share of the held-out error that an effect must take to be named beside an unknown: a tenth of
+heat in a winding looked like skin effect."""
 _NOTHING = 0.01
 """Share of the held-out error that a further effect must take while anything is left."""
 
@@ -233,7 +236,7 @@ def trusted(
     """The ladder, and what is left over the floor at its end.
 
     Where that is structure that nothing here explains, the last rungs go that took less than a
-    tenth of the held-out error, but for one that cleared all waves of the angle: beside an unknown,
+    fifth of the held-out error, but for one that cleared all waves of the angle: beside an unknown,
     their names would be guesses. Where anything is
     left, so does a further effect with which captures held out are not predicted better by a
     hundredth.
@@ -244,7 +247,7 @@ def trusted(
         worse = count > 2 and held[count - 1].total > (1.0 - _NOTHING) * held[count - 2].total
         if count == 1 or not left or (_explained(kept, held, left) and not worse):
             break
-        if held[count - 1].total < (1.0 - LEAST_SHARE) * held[count - 2].total:
+        if held[count - 1].total < (1.0 - _NO_GUESS) * held[count - 2].total:
             break
         if not worse and _clears_orders(found, rungs[count - 2].around, around):
             break

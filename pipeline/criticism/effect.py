@@ -21,8 +21,7 @@ Complex = NDArray[np.complex128]
 SCALES = ("current_a", "voltage_v", "speed_rad_s", "freq_hz", "torque_nm", "period_s", "flux_wb")
 """What `Machine.scales` holds, and a parameter's `scale` may name."""
 
-_NEIGHBOURS = 2
-_SAMPLED = (
+SAMPLED = (
     "id_a",
     "iq_a",
     "eps_rad",
@@ -33,6 +32,8 @@ _SAMPLED = (
     "travel_rad",
     "freq_hz",
 )
+"""The arrays of an `Operating` that have one number a sample."""
+_NEIGHBOURS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +171,7 @@ class Operating:
 
     def at(self, rows: NDArray[np.int64]) -> Operating:
         """Some of the samples, for hooks that ask for nothing before or after a sample."""
-        arrays = {name: getattr(self, name)[rows] for name in _SAMPLED}
+        arrays = {name: getattr(self, name)[rows] for name in SAMPLED}
         run = None if self.run is None else self.run[rows]
         return replace(self, **arrays, psi_wb=None, torque_em_nm=None, run=run, kept={})
 

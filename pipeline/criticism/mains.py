@@ -26,17 +26,25 @@ from pipeline.criticism.segment import PAIR_RAD, Segment, clock
 
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 _BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
+"""Bins at either side that a line is held against: from the fifth on, clear of two Hann windows."""
 _CYCLES = 12.0
+"""Cycles that a recording must have of a line for the bins beside it to be there."""
 _CYCLES_EACH = 2.0
 _STANDS_OUT = 20.0
+"""Power over that beside it: of white noise, one bin in e^14 has as much."""
 _SEEN = 4.0
 _CAPTURES = 3
+"""Captures that must have a line: what one or two tests are like there is their own."""
 _SLIDE = 0.03
+"""Share of its mean that a speed may vary by while orders of the turn are lines."""
 _PARTS = 8
 _FINER = 2
 _STEADY = 0.5
+"""Of the share that one sine of that power has: below, its phase or size changed on the way."""
 _LARGEST = 0.01
+"""Of the machine's voltage or torque: more is no pick-up in a station that anybody would use."""
 _EVEN = 0.02
+"""Share that the time between two steps of a test may vary by while their rate makes lines."""
 _LINE_RAD = {"vab_v": PAIR_RAD["ab"], "vbc_v": PAIR_RAD["bc"], "vca_v": PAIR_RAD["ca"]}
 
 

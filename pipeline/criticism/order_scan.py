@@ -27,15 +27,21 @@ from pipeline.criticism.system import System
 from pipeline.numerics.projection import Projection, bump
 
 _HIGHEST = 128
+"""Orders looked at: beyond any tooth count times two of the machines here."""
 _SAMPLES = 5.0
 """Samples a cycle that an order must have at the mean speed of a part of a log."""
 _TURNS = 3.0
 """Turns a part must have for orders to be told apart."""
 _PARTS = 8
+"""Parts of a log whose spectra are averaged: of eight, noise varies by a third."""
 _BESIDE = 12
 _STANDS_OUT = 20.0
+"""Power over the median of what is beside: of noise averaged over eight parts one in a million has
+four."""
 _CAPTURES = 2
+"""Captures that must have an order: what only one has predicts no other."""
 _MOST = 4
+"""Orders of one log: each is another fit of the machine, and its harmonics follow the first."""
 
 
 def orders_left(segments: Sequence[Segment], around: System) -> tuple[int, ...]:

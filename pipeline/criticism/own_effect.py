@@ -17,7 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import SCALES, Effect, Machine, Operating, Parameter, Recorded
+from pipeline.criticism.effect import (
+    SAMPLED,
+    SCALES,
+    Effect,
+    Machine,
+    Operating,
+    Parameter,
+    Recorded,
+)
 from pipeline.records.errors import PipelineError, UsageError
 
 _HOOKS = (
@@ -30,16 +38,6 @@ _HOOKS = (
     "voltage",
     "shaft",
     "speed",
-)
-_OF_OPERATING = (
-    "id_a",
-    "iq_a",
-    "eps_rad",
-    "theta_rad",
-    "omega_rad_s",
-    "winding_k",
-    "magnet_k",
-    "freq_hz",
 )
 _OF_RECORDED = ("i_a", "torque_nm", "eps_rad", "omega_e_rad_s")
 _MEND = "correct the file"
@@ -95,7 +93,8 @@ def _inputs(first: Any) -> list[NDArray[Any]]:
         return [first]
     names: tuple[str, ...] = ()
     if isinstance(first, Operating):
-        names = ("omega_rad_s", *_OF_OPERATING)
+        # the angle since a reversal is infinite before the first, and no fault of a hook's
+        names = ("omega_rad_s", *(name for name in SAMPLED if name != "travel_rad"))
     elif isinstance(first, Recorded):
         names = _OF_RECORDED
     return [np.asarray(getattr(first, name)) for name in names]
@@ -180,7 +179,7 @@ def _try(effect: Effect, path: Path) -> None:
     try:
         parameters = effect.every(x.machine)
         q = _Named({p.name: p.scan[0] if p.scan else 0.0 for p in parameters})
-    except Exception:  # noqa: BLE001 (a machine of no slots may be nothing to it)
+    except UsageError:
         return
     for name, given in calls.items():
         _ask(getattr(effect, name), (*given, q), q, path)
