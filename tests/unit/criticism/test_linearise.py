@@ -59,7 +59,7 @@ def test_candidates_columns_survive_other_floors():
         c for name in ("windage", "torque_scale") for c in effect_columns(LIBRARY[name], PLAIN)
     ]
     before = system(segments, start, offered)
-    louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma))
+    louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma), values={**BASE})
     kept, made = (system(segments, louder, offered, b) for b in (before, None))
     assert kept.matrix == pytest.approx(made.matrix, rel=1e-6, abs=1e-9 * np.abs(made.matrix).max())
     assert kept.made_at is before.made_at
