@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from pipeline.criticism.choices import reconsidered
 from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import first_fit, gauss_newton, initial, rough_fit
 from pipeline.criticism.mains import Hum, hum_of, with_hum
@@ -57,4 +58,4 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
     unheard = {k: v for effect in shaped.values() for k, v in initial(effect, model).items()}
     whole = replace(fitted, model=model, values={**fitted.values, **unheard})
-    return Begun(heard, *gauss_newton(heard, whole), hum)
+    return Begun(heard, *reconsidered(heard, *gauss_newton(heard, whole)), hum)

@@ -173,10 +173,9 @@ def _orders(variable: Variable, machine: Machine) -> tuple[int, ...]:
     if variable.name == "theta_elec_rad":
         return (*LOWEST, 12)
     p = machine.pole_pairs
-    slots = () if machine.slots is None else (machine.slots, math.lcm(machine.slots, 2 * p))
-    return tuple(
-        sorted({*LOWEST, p, 2 * p, 6 * p, *slots, *machine.torque_orders, *machine.load_orders})
-    )
+    slots = {order for order in (machine.slots, machine.cogging_order) if order}
+    seen = slots.union(machine.torque_orders, machine.load_orders)
+    return tuple(sorted(seen.union(LOWEST, (p, 2 * p, 6 * p))))
 
 
 def _nodes(variable: Variable) -> Array:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 from scipy.special import gammaincc
 
 from pipeline.criticism.asked import Begun, fit_of
@@ -19,20 +18,20 @@ from pipeline.criticism.judge import (
     leave_out,
     over_floor,
     remainder,
-    told_groups,
 )
 from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.order_scan import orders_left
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
-from pipeline.criticism.scores import LEAST_SHARE, TIE, Candidate, Score, candidates
+from pipeline.criticism.scores import TIE, Candidate, Score, candidates
 from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import TESTS, segments
 from pipeline.criticism.selection import Rung, loss_without, search
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import System, own_columns
+from pipeline.criticism.trust import denied, explained, trusted
 from pipeline.criticism.unknown import unknown_structure
 from pipeline.criticism.wander import SIZE, wandering
 from pipeline.records.capture import Campaign
@@ -59,16 +58,8 @@ _WITHIN = (
 )
 _SEEN = 3.0
 """Standard deviations of a typical size from which on captures would show an effect."""
-_EXPLAINED = 0.5
-"""Share of the misfit, and of held-out power over the floor, that effects found may leave, and
-still explain what is left."""
 _AS_GOOD = 0.1
 """Share of the fall that a rival's promise may be short of."""
-_NO_GUESS = 0.2
-"""Share of the held-out error that an effect must take to be named beside an unknown: a tenth of
-heat in a winding looked like skin effect."""
-_NOTHING = 0.01
-"""Share of the held-out error that a further effect must take while anything is left."""
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -82,22 +73,22 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     if not _enough(found):
         return _insufficient(campaign, model, library)
     start_fit = fit_of(found, model_of(model, machine))
-    rungs, held, left = _climbed(start_fit, library)
+    rungs, held, left, against = _climbed(start_fit, library)
     unlooked = orders_left(start_fit.segments, rungs[-1].around)
     if unlooked:
         machine = replace(machine, load_orders=unlooked)
         start_fit = fit_of(segments(campaign, machine), model_of(model, machine))
-        rungs, held, left = _climbed(start_fit, library)
+        rungs, held, left, against = _climbed(start_fit, library)
     found = start_fit.segments
     stem = f"{file_stem(campaign.motor_id)}_unknown"
     sketch = _unknown(found, rungs, held, left, stem)
     large, calm = _large(found, rungs, left), None
-    if sketch is None and not _explained(rungs, held, large):
+    if sketch is None and not explained(rungs, held, large):
         calm = wandering(found, rungs[-1].fitted, large)
     if calm is not None:
         found = calm
         calmed = gauss_newton(found, start_fit.fitted)
-        rungs, held, left = _climbed(Begun(calm, *calmed, start_fit.hum), library)
+        rungs, held, left, against = _climbed(Begun(calm, *calmed, start_fit.hum), library)
         left = _large(found, rungs, left)
         sketch = _unknown(found, rungs, held, left, stem)
     within = None if sketch else _unknown(found, rungs, held, left, stem, in_parts=True)
@@ -123,6 +114,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *told_hum(start_fit.hum),
             *(() if calm is None else (_WANDER,)),
             *(() if within is None else (_WITHIN,)),
+            *against,
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
         ),
@@ -166,14 +158,17 @@ def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
 
 def _climbed(
     start: Begun, library: dict[str, Effect]
-) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...]]:
-    """The ladder as far as it is trusted, its held-out errors, and what is left at its end."""
+) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...], tuple[str, ...]]:
+    """The ladder as far as it is trusted, its held-out errors, what is left at its end, and a note
+    on every effect that would have taken some of that, had not captures spoken against it.
+    """
     found = start.segments
     rungs = search(found, start.fitted, library)
     alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
     held = in_common([r.around for r in kept], alone[: len(kept)])
-    return kept, list(held), left
+    against = (denied(rung) for rung in rungs[len(kept) :])
+    return kept, list(held), left, tuple(note for note in against if note)
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -215,75 +210,11 @@ def _unknown(
     """What the structure depends on that no effect explains; None where there is none, or where
     nothing that the machine does predicts it.
     """
-    if _explained(rungs, held, left):
+    if explained(rungs, held, left):
         return None
     last = rungs[-1]
     signals = list(dict.fromkeys(r.signal for r in left))
     return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]
-
-
-def _excess(rung: Rung, channels: set[str]) -> float:
-    around = rung.around
-    own = np.arange(len(own_columns(rung.fitted.model)))
-    spreads = around.grams(own).best().spreads
-    inside = np.array([channel in channels for _, channel, _ in around.labels])
-    return float((around.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())
-
-
-def trusted(
-    found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
-) -> tuple[tuple[Rung, ...], tuple[Remainder, ...]]:
-    """The ladder, and what is left over the floor at its end.
-
-    Where that is structure that nothing here explains, the last rungs go that took less than a
-    fifth of the held-out error, but for one that cleared all waves of the angle: beside an unknown,
-    their names would be guesses. Where anything is
-    left, so does a further effect with which captures held out are not predicted better by a
-    hundredth.
-    """
-    for count in range(len(rungs), 0, -1):
-        kept, around = tuple(rungs[:count]), rungs[count - 1].around
-        left = remainder(around, found, around.residual)
-        worse = count > 2 and held[count - 1].total > (1.0 - _NOTHING) * held[count - 2].total
-        if count == 1 or not left or (_explained(kept, held, left) and not worse):
-            break
-        if held[count - 1].total < (1.0 - _NO_GUESS) * held[count - 2].total:
-            break
-        if not worse and _clears_orders(found, rungs[count - 2].around, around):
-            break
-    return kept, left
-
-
-def _clears_orders(found: Sequence[Segment], before: System, after: System) -> bool:
-    """Whether waves of the angle were left over the floor before a rung, and none after it.
-
-    Cogging is no guess where it takes every wave there was, however much a drag of nobody's
-    library leaves at order nought.
-    """
-    waves = np.array([order != 0 for _, _, order in after.labels])
-    was, now = (told_groups(around, found)[waves].any() for around in (before, after))
-    return bool(was and not now)
-
-
-def _explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Remainder]) -> bool:
-    """Whether the effects found took most of the misfit of the signals that still miss, a tenth at
-    least of each one's own, and most of the power that held-out errors have over the floor.
-
-    An offset of the angle that takes all the torque's error explains nothing of a shaft that coasts
-    too short. Signals that had less than a tenth of the misfit do not count alone. Misfit is
-    logarithmic: of an equation that is given up at a million floors it takes half to come to a
-    thousand.
-    """
-    first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(rungs) - 1))
-    if last > _EXPLAINED * first:
-        return not left
-    signals = sorted({r.signal for r in left})
-    before, after = (
-        np.array([_excess(rung, {name}) for name in signals]) for rung in (rungs[0], rungs[-1])
-    )
-    large = before > LEAST_SHARE * before.sum()
-    taken = bool((after[large] <= (1.0 - LEAST_SHARE) * before[large]).all())
-    return not left or (taken and float(after.sum()) < _EXPLAINED * float(before.sum()))
 
 
 def _verdict(
@@ -293,7 +224,7 @@ def _verdict(
     held: Sequence[HeldOut],
     unexcited: Sequence[Unexcited],
 ) -> Verdict:
-    if left and not _explained(rungs, held, left):
+    if left and not explained(rungs, held, left):
         return "unknown"
     if missing:
         return "missing"

@@ -34,6 +34,8 @@ SAMPLED = (
 )
 """The arrays of an `Operating` that have one number a sample."""
 _NEIGHBOURS = 2
+_HIGHEST_COGGING = 400
+"""Order a turn beyond which slots and poles cog next to nothing together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,9 @@ class Parameter:
     for an amplitude. A `choice` takes one of these values
     and is never fitted. `optional`: the parameters of one number above 0 form a term that the
     effect can do without; without it they are zero. `u`: standard uncertainty, in its own unit,
-    of a value that a closer look told.
+    of a value that a closer look told. `at_least`: another amplitude of the effect that this one
+    comes to, as what a meter reads of a resistance that grows with the frequency; captures in which
+    it does not speak against the effect.
     """
 
     name: str
@@ -62,6 +66,7 @@ class Parameter:
     choice: bool = False
     optional: int = 0
     u: float = 0.0
+    at_least: str = ""
 
     @property
     def amplitude(self) -> bool:
@@ -88,6 +93,17 @@ class Machine:
     stated_u: Mapping[str, float] = field(default_factory=dict)
     encoder_rad: float = 0.0
     load_orders: tuple[int, ...] = ()
+
+    @property
+    def cogging_order(self) -> int | None:
+        """LCM(slots, 2p) [1/turn], the order that all slots and poles make together; None where the
+        slots are not known, or so many fractional ones that nothing is left of it: what stands out
+        of a slow turn counts all the same.
+
+        Reference: Zhu & Howe, IEEE Trans. Energy Convers. 15 (2000): its torque falls with it.
+        """
+        order = math.lcm(self.slots, 2 * self.pole_pairs) if self.slots else 0
+        return order if 0 < order <= _HIGHEST_COGGING else None
 
     def scale(self, parameter: Parameter) -> float:
         """Size [parameter.unit] of one relative unit of a parameter."""

@@ -27,8 +27,10 @@ from pipeline.criticism.segment import PAIR_RAD, Segment, clock
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 _BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
 """Bins at either side that a line is held against: from the fifth on, clear of two Hann windows."""
-_CYCLES = 12.0
-"""Cycles that a recording must have of a line for the bins beside it to be there."""
+_CYCLES = 8.0
+"""Cycles that a recording must have of a line for bins to be there at either side of it."""
+_LOBE = 3
+"""Bins from a peak to where the skirt of a Hann window is low: in 200 ms, 50 and 60 Hz are two."""
 _CYCLES_EACH = 2.0
 _STANDS_OUT = 20.0
 """Power over that beside it: of white noise, one bin in e^14 has as much."""
@@ -225,7 +227,7 @@ class _Spectrum:
         """Mean square of each line in a signal [n], and of what lies beside it.
 
         What is not of one size and phase from beginning to end is no line, whatever its spectrum,
-        nor what is more than `most`.
+        nor what is more than `most`, nor the skirt of a stronger one beside it.
         """
         flat = self.weight * self._about_its_mean(signal)
         whole = np.zeros(_FINER * self.bins)
@@ -241,7 +243,8 @@ class _Spectrum:
             top = first + int(np.argmax(power[first : middle + _FINER + 1]))
             line = float(power[top])
             one_sine = line / (line + _PARTS * level)
-            if line > most or self._share(flat, top) < _STEADY * one_sine:
+            skirt = power[max(middle - _LOBE * _FINER, 0) : middle + _LOBE * _FINER + 1].max()
+            if max(line, skirt) > min(line, most) or self._share(flat, top) < _STEADY * one_sine:
                 line = level
             told.append((line, level))
         return told

@@ -165,6 +165,7 @@ def slow_orders(machine: Machine) -> tuple[int, ...]:
     """Orders a turn looked at in a slow turn."""
     seen = set(electrical_orders(machine)) | set(machine.torque_orders)
     if machine.slots:
-        cogging = math.lcm(machine.slots, 2 * machine.pole_pairs)
-        seen |= {machine.slots, cogging, 2 * cogging}
+        seen.add(machine.slots)
+    if machine.cogging_order is not None:
+        seen |= {machine.cogging_order, 2 * machine.cogging_order}
     return tuple(sorted(seen))

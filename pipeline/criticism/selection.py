@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.choices import reconsidered
 from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import clipped, first_fit, gauss_newton, rough_anew
 from pipeline.criticism.effect import Array, Effect, Machine
@@ -99,7 +100,7 @@ def search(
             break
         newest = chosen[0].model.effects[-1].name
         chosen = renamed(segments, chosen, newest, library)
-        fitted, _ = _backward(segments, *chosen, base)
+        fitted, _ = reconsidered(segments, *_backward(segments, *chosen, base))
         found = fitted.model.effects[base:]
         fitted = replace(fitted, tolerance=tolerances(segments, fitted, found))
         if found and (found[-1].hook == "sensor" or found[-1].closer is not None):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pipeline.criticism.effect import Array, Effect, Machine, Operating, Parameter, Values
@@ -23,12 +21,13 @@ def _torque(x: Operating, q: Values) -> Array:
 def orders(machine: Machine) -> tuple[int, ...]:
     """Orders a turn that magnets and slots can make, of those that stand out of a slow turn.
 
-    Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them.
+    Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them, but where it is
+    out of all reason (`Machine.cogging_order`).
     """
     bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
     seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
-    if machine.slots:
-        seen.add(math.lcm(machine.slots, 2 * machine.pole_pairs))
+    if machine.cogging_order is not None:
+        seen.add(machine.cogging_order)
     return tuple(sorted(seen)) or (6 * machine.pole_pairs,)
 
 

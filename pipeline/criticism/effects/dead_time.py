@@ -18,21 +18,25 @@ def _drop(x: Operating, q: Values) -> Complex:
         axis = np.exp(2j * np.pi * k / 3)
         drop += np.tanh((stationary * np.conj(axis)).real / q["width_a"]) * axis
     rotor: Complex = drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * (x.eps_rad - turn))
-    return rotor
+    return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a
 
 
 EFFECT = Effect(
     name="dead_time",
-    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample",
+    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, "
+    "and on_v i/i_max in its switches",
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
-    reference="Jeong & Park, IEEE Trans. Ind. Electron. 38 (1991), dead-time effect in PWM",
+    reference="Jeong & Park, IEEE Trans. Ind. Electron. 38 (1991), dead-time effect in PWM; Mohan, "
+    "Undeland & Robbins, Power Electronics, 3rd ed. (2003), ch. 2, drop of a switch that is on",
     parameters=(
         Parameter("loss_v", "V", 0.01, 0.0005, "voltage_v", low=0.0, high=0.5),
         Parameter(
             "width_a", "A", 0.02, 0.0, "current_a", low=0.0003, high=0.3, scan=(0.001, 0.01, 0.05)
         ),
+        # of itself it would be any resistance: it makes no effect large enough to be named
+        Parameter("on_v", "V", 0.005, 0.0, "voltage_v", low=0.0, high=0.1, optional=1),
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
     ),
     signals=("vd_v", "vq_v"),

@@ -24,7 +24,7 @@ EFFECT = Effect(
     reference="Dowell, Proc. IEE 113 (1966), effects of eddy currents in windings",
     parameters=(
         Parameter("rise", "1", 0.2, 0.01, low=0.0, high=5.0),
-        Parameter("meter_rise", "1", 0.2, 0.02, low=0.0, high=50.0),
+        Parameter("meter_rise", "1", 0.2, 0.02, low=0.0, high=50.0, at_least="rise"),
         Parameter("knee", "1", 3.0, 0.0, low=0.3, high=1000.0, scan=(1000.0, 3.0)),
     ),
     signals=("vd_v", "vq_v"),

@@ -13,6 +13,7 @@ from pipeline.criticism.effect import Recorded
 from pipeline.criticism.effects import cogging
 from pipeline.criticism.model import Model, base_flux, effect_flux, evaluate, values_of
 from pipeline.criticism.registry import chosen, effects
+from pipeline.criticism.segment import slow_orders
 from pipeline.physics.glossary import COLUMNS, TESTS
 from pipeline.records.errors import UsageError
 from tests.unit.criticism.machines import BASE, machine, operating
@@ -70,13 +71,31 @@ def test_flux_is_reciprocal_and_torque_is_the_angles_share(name):
 def test_dead_time_is_a_sign_for_each_phase_in_the_abc_frame():
     x = operating()
     x.ts_s = 1.0
-    drop = LIBRARY["dead_time"].drop(x, {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0})
+    drop = LIBRARY["dead_time"].drop(x, {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0})
     stationary = (x.id_a + 1j * x.iq_a) * np.exp(1j * x.eps_rad)
     phases = [np.real(stationary * np.exp(-2j * np.pi * k / 3)) for k in range(3)]
     lost = [0.2 * np.sign(i) for i in phases]
     alpha = 2 / 3 * (lost[0] - 0.5 * lost[1] - 0.5 * lost[2])
     beta = (lost[1] - lost[2]) / math.sqrt(3)
     assert drop == pytest.approx((alpha + 1j * beta) * np.exp(-1j * x.eps_rad), abs=1e-12)
+
+
+def test_a_switch_that_is_on_drops_with_the_current():
+    x = operating()
+    of = {"loss_v": 0.0, "width_a": 1.0, "lag_s": 0.0, "on_v": 0.3}
+    drop = LIBRARY["dead_time"].drop(x, of)
+    assert drop == pytest.approx(0.3 * x.i_a / x.machine.scales["current_a"])
+    assert not np.any(LIBRARY["dead_time"].drop(replace(x, inverter=False), of))
+
+
+@pytest.mark.parametrize(("pole_pairs", "slots", "order"), [(7, 12, 84), (20, 63, None)])
+def test_slots_and_poles_that_share_no_factor_do_not_cog(pole_pairs, slots, order):
+    """63 slots and 40 poles make 2520 waves a turn of nothing: in a log they beat with anything."""
+    one = machine(pole_pairs, slots)
+    assert one.cogging_order == order
+    assert max(cogging.orders(one)) == (order or 6 * pole_pairs)
+    assert max(slow_orders(one)) == (2 * order if order else 12 * pole_pairs)
+    assert 2520 in cogging.orders(replace(one, torque_orders=(2520,))) or order
 
 
 def test_phase_imbalance_is_three_resistances_in_the_abc_frame():

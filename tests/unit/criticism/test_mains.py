@@ -209,11 +209,15 @@ def test_an_open_winding_s_hum_no_longer_misses_the_floor():
     assert spreads[1] < 1.5
 
 
-def test_a_short_capture_tells_what_it_holds_twelve_cycles_of():
-    """150 ms are too short for 50 Hz and long enough for its third harmonic."""
+def test_a_short_capture_tells_what_it_holds_eight_cycles_of():
+    """150 ms are too short for 50 Hz and long enough for its third harmonic; of 60 Hz they hold
+    nine cycles, but cannot tell it from 50.
+    """
     short = logs(0.05, 150.0, n=3000)
     assert {one.freq_hz for one in hum_of(short, PLAIN, BASE)} == {150.0}
     assert hum_of(logs(0.05, 50.0, n=3000), PLAIN, BASE) == ()
+    assert {one.freq_hz for one in hum_of(logs(0.05, 60.0, n=3000), PLAIN, BASE)} == {60.0}
+    assert {one.freq_hz for one in hum_of(logs(0.05, 50.0, n=4000), PLAIN, BASE)} == {50.0}
 
 
 def test_absorbed_rows_have_the_likelihood_of_their_covariance():

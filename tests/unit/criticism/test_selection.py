@@ -9,7 +9,6 @@ import pytest
 
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.diagnosis import trusted
 from pipeline.criticism.effect import Told
 from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.linearise import effect_columns
@@ -26,6 +25,7 @@ from pipeline.criticism.selection import (
     size_of,
 )
 from pipeline.criticism.system import Fitted, System, floors, own_columns, system
+from pipeline.criticism.trust import trusted
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, coasting, log, machine
 

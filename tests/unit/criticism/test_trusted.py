@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.diagnosis import _drop, _explained, trusted
+from pipeline.criticism.diagnosis import _drop
 from pipeline.criticism.judge import HeldOut
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
@@ -16,6 +16,7 @@ from pipeline.criticism.registry import effects
 from pipeline.criticism.scores import Candidate, Score
 from pipeline.criticism.selection import Rung, _holds, _refitted, _sure
 from pipeline.criticism.system import Fitted, System, own_columns
+from pipeline.criticism.trust import denied, explained, trusted
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, log, machine
 
@@ -47,9 +48,37 @@ def missing_by(**spreads):
 def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, kept, monkeypatch):
     rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.diagnosis.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
     totals = [HeldOut(rungs[0].around.residual, total) for total in (10.0, 5.0, after)]
     assert len(trusted((), rungs, totals)[0]) == kept
+
+
+@pytest.mark.parametrize(
+    ("meter_rise", "heard", "kept"), [(0.0, True, 1), (0.3, True, 2), (0.0, False, 2)]
+)
+def test_what_captures_speak_against_is_no_name_beside_an_unknown(
+    meter_rise, heard, kept, monkeypatch
+):
+    """A supply that sags with power looks like a resistance that grows with speed; but a meter of a
+    higher frequency than any drive's would show that too, where there is one.
+    """
+    skin = effects()["skin_effect"]
+    first = missing_by(vq_v=1e4)
+    model = first.fitted.model.with_effects(skin)
+    columns = own_columns(model)
+    matrix = np.zeros((100, len(columns)))
+    matrix[:, [c.name == "skin_effect.meter_rise" for c in columns]] = float(heard)
+    found = {"rise": 0.5, "meter_rise": meter_rise, "knee": 1000.0}
+    values = {**BASE, **{f"skin_effect.{name}": value for name, value in found.items()}}
+    rung = missing_by(vq_v=1e3)
+    around = replace(rung.around, columns=tuple(columns), matrix=matrix)
+    second = Rung(("skin_effect",), Fitted(model, values, (), BASE), around, ())
+    over = (Remainder("one", "vq_v", 0, 9.0, 1.0),)
+    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
+    held = [HeldOut(first.around.residual, total) for total in (10.0, 5.0)]
+    assert len(trusted((log(),), (first, second), held)[0]) == kept
+    assert ("meter_rise of 0" in denied(second)) is (kept == 1)
 
 
 def with_waves(*spreads: float) -> Rung:
@@ -67,8 +96,8 @@ def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeyp
     """Cogging beside a brake of nobody's library, which is nearly all of the error."""
     rungs = with_waves(1e6, 20.0, 5e3), with_waves(*left)
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.diagnosis.remainder", lambda *_: over)
-    monkeypatch.setattr("pipeline.criticism.diagnosis._explained", lambda *_: False)
+    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
     held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 98.0)]
     assert len(trusted((log(),), rungs, held)[0]) == kept
 
@@ -83,7 +112,7 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
     first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
     last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
     held = [HeldOut(first.around.residual, total) for total in (100.0, 2.0)]
-    assert _explained((first, last), held, left) is said
+    assert explained((first, last), held, left) is said
 
 
 @pytest.mark.parametrize(("total", "said"), [(239.7, False), (160.0, True)])
@@ -92,7 +121,7 @@ def test_what_predicts_no_capture_better_explains_nothing(total, said):
     left = [Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0)]
     first, last = missing_by(torque_shaft_nm=1e6), missing_by(torque_shaft_nm=900.0)
     held = [HeldOut(first.around.residual, one) for one in (244.1, total)]
-    assert _explained((first, last), held, left) is said
+    assert explained((first, last), held, left) is said
 
 
 @pytest.mark.parametrize(("doubt", "kept"), [(1.0, True), (0.3, False)])
