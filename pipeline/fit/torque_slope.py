@@ -20,15 +20,24 @@ HIGHEST_POWER = 7
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """Torque per q ampere at small current [N·m/A], its scatter and the doubt of its form."""
+    """Torque per q ampere at small current [N·m/A], its scatter and the doubt of its form.
+
+    `dof` are the degrees of freedom of the scatter: operating points less fitted columns.
+    """
 
     kt_nm_a: float
     u_nm_a: float
+    dof: int
     form_nm_a: float
 
     def times(self, factor: float) -> Slope:
-        """All three scaled."""
-        return Slope(factor * self.kt_nm_a, abs(factor) * self.u_nm_a, abs(factor) * self.form_nm_a)
+        """Value, scatter and doubt scaled."""
+        return replace(
+            self,
+            kt_nm_a=factor * self.kt_nm_a,
+            u_nm_a=abs(factor) * self.u_nm_a,
+            form_nm_a=abs(factor) * self.form_nm_a,
+        )
 
 
 def slope_without_d(
@@ -78,11 +87,11 @@ def _ladder(
         covariance = found.covariance * found.chi2_dof
         value, u = float(found.coefficients[at]), float(np.sqrt(covariance[at, at]))
         if best is None:
-            best = Slope(value, u, 0.0)
+            best = Slope(value, u, found.dof, 0.0)
             continue
         step = abs(value - best.kt_nm_a)
         added = float(found.coefficients[-1]) ** 2 / max(float(covariance[-1, -1]), 1e-300)
         if fdtrc(1.0, found.dof, added) > STRAIGHT_LEVEL:
             return replace(best, form_nm_a=step)
-        best = Slope(value, u, step / 2.0)
+        best = Slope(value, u, found.dof, step / 2.0)
     return best

@@ -198,16 +198,18 @@ def _estimates(
     paths = tuple(sorted({p.capture.path for p in points}))
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
 
-    def estimate(name: str, value: float, u: float, parts: Sequence[Contribution]) -> Estimate:
-        scatter = Contribution(f"scatter:{NAME}:{name}", u, "A", model.dof)
+    def estimate(
+        name: str, value: float, u: float, dof: int, parts: Sequence[Contribution]
+    ) -> Estimate:
+        scatter = Contribution(f"scatter:{NAME}:{name}", u, "A", dof)
         budget = budget_of([scatter, *parts])
         return Estimate(name, value, _unit(name), "measured", NAME, budget, at, paths, note)
 
     u = np.sqrt(np.diag(model.covariance))
-    found = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, type_b[0])]
+    found = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])]
     if "id iq" in model.names:
         u_rel = float(u[model.index("id iq")])
-        found.append(estimate(GIVES[1], _reluctance(model), u_rel, type_b[1]))
+        found.append(estimate(GIVES[1], _reluctance(model), u_rel, model.dof, type_b[1]))
     else:
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
         found.append(not_identifiable(GIVES[1], RELUCTANCE.unit, NAME, why))
@@ -218,7 +220,8 @@ def _estimates(
         else:
             u_drag = float(np.sqrt(covariance[index, index]))
             form = _untested_form(points, model, index)
-            found.append(estimate(name, float(drag[index]), u_drag, [*type_b[2 + index], *form]))
+            parts = [*type_b[2 + index], *form]
+            found.append(estimate(name, float(drag[index]), u_drag, model.dof, parts))
     return tuple(found)
 
 
@@ -296,11 +299,11 @@ def _slope(
     """K at small current: of all points, or of those without d current where the torque bends."""
     u = float(np.sqrt(model.covariance[model.index("iq"), model.index("iq")]))
     if not any(name in BENDING for name in chosen):
-        return Slope(model.kt_nm_a, u, 0.0)
+        return Slope(model.kt_nm_a, u, model.dof, 0.0)
     turned = any(name in chosen for name in ("id", "id sense", "iq^2 - id^2"))
     found = slope_without_d(points, alpha, turned, "|iq| sense" in chosen)
     if found is None:
-        return Slope(model.kt_nm_a, u, _form_doubt(points, alpha, chosen))
+        return Slope(model.kt_nm_a, u, model.dof, _form_doubt(points, alpha, chosen))
     return found.times(model.kt_nm_a / model.of("iq"))
 
 

@@ -103,6 +103,19 @@ def test_a_bent_map_leaves_the_small_current_torque_constant(effects: str) -> No
     assert form < 5e-3 * truth
 
 
+def test_the_torque_constant_has_the_freedom_of_the_points_that_it_is_fitted_to() -> None:
+    """16 points without d current less 3 speeds and 4 odd powers, where saturation bends the map;
+    44 points less 3 speeds, i_q and i_d i_q, where it does not. Never that of their samples.
+    """
+    bent = recorded("saturation,cross_saturation", "servo-ipm", ("torque_map",))
+    straight = recorded(tests=("torque_map",))
+    for captures, dof in ((bent, 9), (straight, 39)):
+        kt = chain(captures, TORQUE_MAP).best("kt_peak_nm_a")
+        assert kt is not None
+        scatter = next(p for p in kt.budget if p.source == "scatter:torque_map:kt_peak_nm_a")
+        assert scatter.dof == dof
+
+
 @pytest.mark.parametrize("effect", ["torque_offset", "torque_lag", "load_dependent_friction"])
 def test_sensor_and_friction_do_not_reach_the_torque_constant(effect: str) -> None:
     motor = design("gimbal-5208")
