@@ -216,10 +216,13 @@ def _birge(fit: LinearFit) -> tuple[float, float]:
 
     The noise of a speed is known from all its rows; what widens it, from the few speeds alone.
     """
-    if fit.dof < 2 or not math.isfinite(fit.chi2_dof):
-        return 1.0, math.inf
-    wide = fit.chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / fit.dof)
+    wide = _beyond_chance(fit.chi2_dof, fit.dof)
     return (fit.chi2_dof, float(fit.dof)) if wide else (1.0, math.inf)
+
+
+def _beyond_chance(chi2_dof: float, dof: int) -> bool:
+    """Whether chi squared per degree of freedom lies three of its standard deviations over 1."""
+    return dof >= 2 and chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / dof)
 
 
 def _instrument_shares(
@@ -254,7 +257,10 @@ def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:
 
 
 def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Estimate]:
-    """Weighted mean of the complex ratios, so that noise averages out before the magnitude."""
+    """Weighted mean of the complex ratios, so that noise averages out before the magnitude.
+
+    Speeds that differ by more than their noise widen it, and beyond chance it has their freedom.
+    """
     found = {}
     for order in ORDERS:
         name = f"bemf_harmonic_{order}"
@@ -267,9 +273,11 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
         weights = np.array([g.flux.u_harmonic**-2 for g in own])
         mean = complex(np.sum(weights * ratios) / weights.sum())
         spread = np.abs(ratios - mean) ** 2 * weights
-        factor = max(1.0, float(spread.sum()) / max(2 * len(own) - 2, 1))
-        u = math.sqrt(factor / float(weights.sum()))
-        budget = budget_of([Contribution(f"scatter:{NAME}:{name}", u, "A")])
+        free = 2 * len(own) - 2
+        excess = float(spread.sum()) / max(free, 1)
+        u = math.sqrt(max(1.0, excess) / float(weights.sum()))
+        dof = float(free) if _beyond_chance(excess, free) else math.inf
+        budget = budget_of([Contribution(f"scatter:{NAME}:{name}", u, "A", dof)])
         note = "" if abs(mean) > 3.0 * u else "within noise of zero"
         paths = tuple(c.path for c in used)
         found[name] = Estimate(name, abs(mean), "1", "measured", NAME, budget, {}, paths, note)

@@ -97,6 +97,14 @@ def test_speeds_that_disagree_have_the_freedom_of_their_number(apart):
     assert dof == (2 * len(SPEEDS) - 1 if apart else math.inf)
 
 
+@pytest.mark.parametrize("apart", [0.0, 0.01])
+def test_a_harmonic_that_differs_between_speeds_has_the_freedom_of_their_number(apart):
+    """Six speeds of two components each, one mean: ten; the noise of each speed alone is known."""
+    captures = [spin_capture(s, h5=0.03 + k * apart, seed=7) for k, s in enumerate(SPEEDS)]
+    fifth = estimates(open_circuit.ESTIMATOR, *captures)["bemf_harmonic_5"]
+    assert [part.dof for part in fifth.budget] == [2 * 6 - 2 if apart else math.inf]
+
+
 def test_a_gear_is_no_pole_pair_count():
     geared = spin_capture((40.0, 120.0))
     table = geared.tables[0].with_columns(pl.col("theta_mech_rad") / 1.07)
