@@ -22,6 +22,13 @@ MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
 WORTHWHILE = 0.8
 TOLERANCE = 0.03
 LEAST_ROWS = 20
+TURN_RAD = 2.0 * np.pi
+SAME_SPEED = 0.02
+# What a sensor's noise makes of a held shaft's speed is some thousandths of a turn, in one point
+# and in a whole capture; a shaft that turns passes more, or none of its ripple would average out.
+STILL_TURN, STILL_CAPTURE_TURN = 0.01, 0.1
+# A twelfth of a cogging period of 84 a turn: cogging there is one constant.
+SAME_ANGLE_TURN = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +38,7 @@ class Point:
     `omega_mech_rad_s` is the slope of the angle where it is there; `u_torque_nm`, `u_vd_v` and
     `u_vq_v` are standard errors of means, correlation included. `cos_turn`, `sin_turn` are means
     over the shaft angle (0 where it is missing), `period_s` the sampling period. `group` numbers
-    the constant-speed stretches.
+    the constant-speed stretches, and of a shaft that stands (speed 0) its angles.
     """
 
     group: int
@@ -50,6 +57,17 @@ class Point:
     sin_turn: float
     period_s: float
     capture: Capture
+
+    @property
+    def standing(self) -> bool:
+        """Whether the shaft is held still."""
+        return self.omega_mech_rad_s == 0.0
+
+    @property
+    def angle_rad(self) -> float:
+        """Mean shaft angle in a turn; NaN where no angle was logged."""
+        known = self.cos_turn != 0.0 or self.sin_turn != 0.0
+        return float(np.arctan2(self.sin_turn, self.cos_turn)) if known else float("nan")
 
     def shifted(self, shift: Mapping[str, float]) -> Point:
         """This point as it was if each instrument were off by `shift` (gains relative, K)."""
@@ -94,7 +112,7 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
     whole electrical cycles where that would cost too much, so that ripple averages out.
     """
     found: list[Point] = []
-    total = group = 0
+    total = 0
     for capture in captures:
         data = _columns(capture)
         n = data["iq_a"].size
@@ -106,16 +124,30 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         ):
             kept = _whole_cycles(rows, data, pole_pairs)
             found.append(_point(capture, data, kept))
-    groups: list[float] = []
-    numbered = []
-    for point in found:
-        speed = point.omega_mech_rad_s
-        near = [g for g, w in enumerate(groups) if abs(speed - w) <= 0.02 * abs(w)]
-        if not near:
-            groups.append(speed)
-        group = near[0] if near else len(groups) - 1
-        numbered.append(replace(point, group=group))
+    numbered = _numbered(found)
     return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
+
+
+def _numbered(points: Sequence[Point]) -> list[Point]:
+    """The points with their groups: those of one speed, or of one angle where the shaft stands."""
+    firsts: list[Point] = []
+    numbered = []
+    for point in points:
+        near = next((g for g, first in enumerate(firsts) if _alike(point, first)), len(firsts))
+        if near == len(firsts):
+            firsts.append(point)
+        numbered.append(replace(point, group=near))
+    return numbered
+
+
+def _alike(point: Point, first: Point) -> bool:
+    """Whether two points share drag, or cogging at rest: one speed, one angle, else one capture."""
+    if point.standing or first.standing:
+        apart = abs(np.angle(np.exp(1j * (point.angle_rad - first.angle_rad)))) / TURN_RAD
+        near = point.capture is first.capture if np.isnan(apart) else apart < SAME_ANGLE_TURN
+        return point.standing and first.standing and bool(near)
+    speed = first.omega_mech_rad_s
+    return abs(point.omega_mech_rad_s - speed) <= SAME_SPEED * abs(speed)
 
 
 def magnet_temperature(capture: Capture) -> tuple[float, str]:
@@ -204,6 +236,9 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
         omega = float(np.polyfit(t - t.mean(), theta - theta.mean(), 1)[0])
     else:
         omega = float(np.mean(data["omega_mech_rad_s"][rows]))
+    travel = abs(omega) * np.array([t[-1] - t[0], data["t_s"][-1] - data["t_s"][0]]) / TURN_RAD
+    if travel[0] < STILL_TURN and (cos_turn == 0.0 or travel[1] < STILL_CAPTURE_TURN):
+        omega = 0.0
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
     u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}
     if not np.isfinite(means["temp_magnet_degc"]):

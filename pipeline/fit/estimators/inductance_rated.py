@@ -62,9 +62,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     table = operating_points(captures, pairs)
-    points = [p for p in table.points if np.isfinite(p.vd_v) and np.isfinite(p.vq_v)]
+    points = [
+        p for p in table.points if np.isfinite(p.vd_v) and np.isfinite(p.vq_v) and not p.standing
+    ]
     if pairs is None or not points:
-        why = "pole pairs unknown" if points else "no settled points with voltages"
+        why = "pole pairs unknown" if points else "no settled points with voltages at speed"
         note = f"{why}; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, "H", NAME, note) for n in GIVES))
     magnet = magnet_coefficient(known)[0]

@@ -14,6 +14,7 @@ from pipeline.fit.instruments import (
     instrument_uncertainties,
     unstated_note,
 )
+from pipeline.fit.locked_rotor import HARMONICS, angle_doubt, standstill_words
 from pipeline.fit.magnet_coefficient import SOURCE, magnet_coefficient
 from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.operating_points import Point, PointTable, operating_points, pole_pairs_of
@@ -82,10 +83,11 @@ class Regression:
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """K, K_rel of T = K(T_m) i_q + K_rel i_d i_q + (odd terms of saturation) + drag of the speed.
 
-    Each constant-speed stretch has an offset of its own, so friction, iron loss at no current and
-    the transducer's zero never reach K. Columns of saturation and of sensor faults join only where
-    the data demand them, so K is the slope at small current, 1.5 p psi at 25 degC. Reference:
-    IEEE Std 1812-2014, 4.4 (torque against current).
+    Each constant-speed stretch, or angle of a locked rotor, has an offset of its own, so friction,
+    iron loss at no current, cogging at rest and the transducer's zero never reach K. Points at
+    standstill join where those at speed do not suffice. Columns of saturation and of sensor faults
+    join only where the data demand them, so K is the slope at small current, 1.5 p psi at 25 degC.
+    Reference: IEEE Std 1812-2014, 4.4 (torque against current).
     """
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "torque_shaft_nm")]
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
@@ -93,15 +95,25 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     points = [
         p for p in table.points if np.isfinite(p.torque_nm) and np.isfinite(p.temp_magnet_degc)
     ]
-    groups = len({p.group for p in points})
-    if len(points) < groups + 3 or np.ptp([p.iq_a for p in points]) == 0.0:
+    turning = [p for p in points if not p.standing]
+    if _enough(turning):
+        points = turning
+    if not _enough(points):
+        groups = len({p.group for p in points})
         note = f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
     alpha, alpha_parts = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
-    estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts)
+    still = angle_doubt(points, model.kt_nm_a, pairs, known)
+    estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts, still)
     return Fit(estimates, _evidence(points, model, alpha, chosen))
+
+
+def _enough(points: Sequence[Point]) -> bool:
+    """Whether offsets and slopes leave a point over, and the q current moves."""
+    groups = len({p.group for p in points})
+    return len(points) >= groups + 3 and bool(np.ptp([p.iq_a for p in points]) != 0.0)
 
 
 def _base(points: Sequence[Point], alpha_1_k: float) -> tuple[list[str], Array]:
@@ -180,6 +192,7 @@ def _estimates(
     chosen: Sequence[str],
     alpha: float,
     alpha_parts: Budget,
+    still: Budget,
 ) -> tuple[Estimate, ...]:
     gains = instrument_uncertainties(captures, ("current", "torque", "temperature"))
 
@@ -193,7 +206,7 @@ def _estimates(
     type_b = contributions(values, gains)
     slope = float((values({SOURCE: 1e-4}) - values({}))[0]) / 1e-4
     type_b[0] += propagate([(slope, alpha_parts)])
-    type_b[0].append(Contribution("assumed:torque_form", slope_k.form_nm_a, "B"))
+    type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
     note = _note(captures, table, points, chosen)
     paths = tuple(sorted({p.capture.path for p in points}))
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
@@ -226,19 +239,20 @@ def _estimates(
 
 
 def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, str]:
-    """Coulomb and viscous drag from the offsets of the speeds; the third answer says why not."""
-    numbers = sorted({p.group for p in points})
+    """Coulomb and viscous drag from the offsets of the speeds; the third answer says why not.
+
+    A shaft that stands has no drag: its offset is cogging and static friction.
+    """
+    turning = sorted({p.group for p in points if not p.standing})
     speeds = np.array(
-        [np.mean([p.omega_mech_rad_s for p in points if p.group == g]) for g in numbers]
+        [np.mean([p.omega_mech_rad_s for p in points if p.group == g]) for g in turning]
     )
     blank = np.zeros(2), np.zeros((2, 2))
     if np.unique(np.sign(speeds)).size < 2 or speeds.size < 3:
         return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
     design = np.column_stack([-np.sign(speeds), -speeds, np.ones(speeds.size)])
-    offsets, block = (
-        model.coefficients[: speeds.size],
-        model.covariance[: speeds.size, : speeds.size],
-    )
+    rows = [model.index(f"speed {g}") for g in turning]
+    offsets, block = model.coefficients[rows], model.covariance[np.ix_(rows, rows)]
     part = linear_fit(design, offsets)
     if not part.full_rank:
         return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
@@ -262,10 +276,10 @@ def _untested_form(
 
     `FORM_SHARE` of the drag at the slowest speed may be Stribeck's, iron's or windage.
     """
-    numbers = sorted({p.group for p in points})
-    if len(numbers) > 3:
+    turning = [p for p in points if not p.standing]
+    if len({p.group for p in turning}) > 3:
         return ()
-    speeds = _column(points, "omega_mech_rad_s")
+    speeds = _column(turning, "omega_mech_rad_s")
     drag = _drag(points, model)[0]
     slowest = float(np.min(np.abs(speeds)))
     torque = FORM_SHARE * abs(drag[0] + drag[1] * slowest)
@@ -314,6 +328,8 @@ def _note(
     chosen: Sequence[str],
 ) -> str:
     words = [table.note()]
+    if still := standstill_words(points, table.points):
+        words.append(still)
     if chosen:
         words.append(allowed_for(chosen))
     if not any(c.has("temp_magnet_degc") for c in captures):
@@ -335,8 +351,10 @@ def _evidence(
     for number in sorted({p.group for p in points}):
         rows = np.flatnonzero(group == number)
         rows = rows[np.argsort(i_q[rows], kind="stable")]
-        speed = float(np.mean([points[int(k)].omega_mech_rad_s for k in rows]))
-        series.append(Series(f"{speed:.0f} rad/s", i_q[rows], torque[rows], fitted[rows]))
+        own = [points[int(k)] for k in rows]
+        speed = float(np.mean([p.omega_mech_rad_s for p in own]))
+        label = f"{speed:.0f} rad/s" if speed else f"standstill, angle {number}"
+        series.append(Series(label, i_q[rows], torque[rows], fitted[rows]))
     extra = f", {', '.join(chosen)}" if chosen else ""
     caption = f"offset a speed, iq, id iq{extra}; magnet coefficient {alpha:.2g} 1/K"
     return (
@@ -361,7 +379,7 @@ ESTIMATOR = Estimator(
     tests=("torque_map",),
     experiment=EXPERIMENT,
     fit=fit,
-    uses=("pole_pairs", "temp_coeff_magnet_1_k"),
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),
     rank=5,
     terms=(RELUCTANCE,),
     options={"level": 0.01},
