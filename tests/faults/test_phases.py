@@ -112,6 +112,18 @@ def test_currents_that_do_not_sum_to_zero(rng: np.random.Generator) -> None:
     assert refused(_three_currents(healthy, -1.0)).code == "current_sum"
 
 
+@pytest.mark.parametrize(
+    ("u_rel", "codes"), [(None, ["current_sum"]), (0.01, []), (0.0, ["current_sum"])]
+)
+def test_only_stated_gains_excuse_a_sum(
+    u_rel: float | None, codes: list[str], rng: np.random.Generator
+) -> None:
+    """5 % of one gain, 2.9 % as a sum: silent where 1 % is stated (k = 5), warned where none is."""
+    capture = _three_currents(drive(MOTOR, rng), 1.05)
+    capture = replace(capture, meta=replace(capture.meta, u_rel_current=u_rel))
+    assert [finding.code for finding in validate(capture, {})[1]] == codes
+
+
 @pytest.mark.parametrize("make", [drive, torque_map])
 def test_two_line_currents_swapped(make, rng: np.random.Generator) -> None:
     """Refused: b and c exchanged, so that the currents turn against the shaft; silent in order."""
