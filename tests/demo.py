@@ -1,0 +1,36 @@
+"""Whether the demo came out as it should: `make demo` fails for another check than the expected.
+
+python -m tests.demo reports/demo
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from pipeline.io.datasheets import read_datasheets
+from pipeline.records.datasheet import Datasheet
+
+EXPECTED = {("G52-1402", "resistance_balance")}
+"""Motor and check that fail: that motor has a poor joint."""
+
+
+def surprises(sheets: Iterable[Datasheet]) -> list[str]:
+    """What failed beside `EXPECTED`, and what of it did not, a line each."""
+    failed = {(s.motor_id, c.name) for s in sheets for c in s.checks if c.status == "fail"}
+    return [
+        *(f"{motor}: {check} failed, and should hold" for motor, check in failed - EXPECTED),
+        *(f"{motor}: {check} holds, and should fail" for motor, check in EXPECTED - failed),
+    ]
+
+
+def main() -> int:
+    """Prints the surprises of the output folder named; 1 where there are any."""
+    lines = sorted(surprises(read_datasheets(Path(sys.argv[1]))))
+    sys.stderr.writelines(f"{line}\n" for line in lines)
+    return 1 if lines else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
