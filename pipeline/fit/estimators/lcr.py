@@ -48,6 +48,8 @@ TERMS = (
 GIVES = ("ld_h", "lq_h", *(term.name for term in TERMS))
 UNITS = {"ld_h": "H", "lq_h": "H", "r_lcr_ohm": "ohm", "lcr_angle_offset_deg": "deg"}
 Array = NDArray[np.float64]
+# Twice what noise alone makes: a swing four of its standard deviations long is one.
+SEEN = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +174,9 @@ def _at_unknown_angle(table: Table) -> Found | None:
     """Mean over the rotor positions at which all three pairs were read.
 
     Where the angle is stated it tells the axes: the low inductance is Lq if its place lies nearer
-    to a quarter period from the stated angle than to the angle itself.
+    to a quarter period from the stated angle than to the angle itself. Where it is not stated, the
+    low one is low by its noise as well: a swing that scatters as noise alone does is none, and
+    both are their mean, to half of it.
     """
     first, second, told = [], [], []
     for row in np.unique(table.row):
@@ -189,21 +193,38 @@ def _at_unknown_angle(table: Table) -> Found | None:
     if not first:
         return None
     values = {}
+    unparted = _swing_of_noise(np.array(second) - np.array(first)) and not any(told)
+    means = 0.5 * (np.array(first) + np.array(second))
     for name, found in (("ld_h", first), ("lq_h", second)):
         count = len(found)
         scatter = float(np.std(found, ddof=1)) / math.sqrt(count) if count > 1 else 0.0
         values[name] = (float(np.mean(found)), scatter, float(max(count - 1, 1)))
-    note = (
-        ""
-        if all(told)
-        else (
+        if unparted:
+            spread = float(np.std(means, ddof=1)) / math.sqrt(count)
+            half = abs(float(np.mean(found) - np.mean(means)))
+            values[name] = (float(np.mean(means)), math.hypot(spread, half), float(count - 1))
+    note = ""
+    if unparted:
+        note = "the three pairs differ by noise alone: Ld and Lq are not told apart"
+    elif not all(told):
+        note = (
             "rotor angle unknown: the low inductance is taken as d, as with interior magnets; "
             "a back-EMF or an alignment would tell"
         )
-    )
     if len(first) == 1:
         note = "; ".join(n for n in (note, "one position: scatter unknown") if n)
     return Found(values, note, None)
+
+
+def _swing_of_noise(swing_h: Array) -> bool:
+    """Whether swings Lq - Ld [n, H] of several positions may be those of equal inductances.
+
+    Noise alone has the length of a vector of two components, whose mean is 1.9 of its standard
+    deviations (Rayleigh's distribution); a swing that is there lies further off.
+    """
+    if swing_h.size < 2:
+        return False
+    return bool(np.mean(swing_h) < SEEN * np.std(swing_h, ddof=1))
 
 
 def _estimate(

@@ -206,6 +206,8 @@ def _saliency(given: Given) -> Answer | None:
     return Answer(tuple(lines), f"{PHASE}; a meter across two terminals reads twice as much")
 
 
+# A bridge reads to a part in a thousand: below that the angle is that of its errors.
+EQUAL = 1e-3
 PHASE = "inductances of one phase, wye equivalent"
 
 
@@ -219,13 +221,15 @@ def _from_three_pairs(given: Given, pairs: tuple[str, ...]) -> Answer:
     ratio = found.high_h / found.low_h
     angle = math.degrees(found.theta_low_rad)
     words = "L_d with interior magnets; the back-EMF or an alignment tells which is which"
-    lines = (
+    lines = [
         Line("l_low_h", found.low_h, "H", "(m − A)/2, m mean, A = √(⅔·Σ(L−m)²)", words),
         Line("l_high_h", found.high_h, "H", "(m + A)/2", "L_q with interior magnets"),
         Line("saliency_ratio", ratio, "1", "high/low", c.saliency_words(ratio)),
-        Line("theta_low_deg", angle, "deg", "", "electrical angle of the low axis, up to 180°"),
-    )
-    return Answer(lines, f"{PHASE}, from terminal readings with the third terminal open")
+    ]
+    if ratio - 1.0 > EQUAL:
+        place = "electrical angle of the low axis, up to 180°"
+        lines.append(Line("theta_low_deg", angle, "deg", "", place))
+    return Answer(tuple(lines), f"{PHASE}, from terminal readings with the third terminal open")
 
 
 SALIENCY = Calculator(

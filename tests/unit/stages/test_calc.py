@@ -99,6 +99,15 @@ def test_other_directions(line: str, name: str, value: float) -> None:
     assert answers(line)[name] == pytest.approx(value, rel=1e-3)
 
 
+@pytest.mark.parametrize("line", ["lab=2mH lbc=2mH lca=2mH", "lab=2mH lbc=2.001mH lca=2mH"])
+def test_equal_inductances_have_no_low_axis(line: str) -> None:
+    """Neither exactly equal ones nor those that a bridge reads as equal."""
+    found = answers(f"saliency {line}")
+    assert found["saliency_ratio"] == pytest.approx(1.0, abs=1e-3)
+    assert "theta_low_deg" not in found
+    assert "theta_low_deg" in answers("saliency lab=2mH lbc=2.01mH lca=2mH")
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
