@@ -55,7 +55,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     turns: list[Turn] = []
     for capture in captures:
         data = capture.arrays("theta_mech_rad", "torque_shaft_nm")
-        turns += whole_turns(data["theta_mech_rad"], data["torque_shaft_nm"])
+        there = np.isfinite(data["theta_mech_rad"])
+        turns += whole_turns(data["theta_mech_rad"][there], data["torque_shaft_nm"][there])
     if len(turns) < 2:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
@@ -262,13 +263,22 @@ def _variance_of_mean(
 
 
 def _speed(captures: Sequence[Capture]) -> float | None:
+    """Mean speed of the slow turns [rad/s], either sense; None where no angle tells it.
+
+    Rows without an angle are left out. The path is summed over a few hundred points, so that the
+    angle's noise does not lengthen it.
+    """
     speeds = []
     for capture in captures:
-        if capture.has("t_s", "theta_mech_rad"):
-            data = capture.arrays("t_s", "theta_mech_rad")
-            t, theta = data["t_s"], data["theta_mech_rad"]
-            speeds.append(float(np.sum(np.abs(np.diff(theta[:: max(1, t.size // 500)])))))
-            speeds[-1] /= float(t[-1] - t[0])
+        if not capture.has("t_s", "theta_mech_rad"):
+            continue
+        data = capture.arrays("t_s", "theta_mech_rad")
+        there = np.isfinite(data["t_s"]) & np.isfinite(data["theta_mech_rad"])
+        t, theta = data["t_s"][there], data["theta_mech_rad"][there]
+        every = max(1, t.size // 500)
+        t, theta = t[::every], theta[::every]
+        if t.size > 1:
+            speeds.append(float(np.sum(np.abs(np.diff(theta))) / (t[-1] - t[0])))
     return float(np.mean(speeds)) if speeds else None
 
 

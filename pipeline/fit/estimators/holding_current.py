@@ -65,7 +65,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     turns: list[Turn] = []
     for capture in captures:
         data = capture.arrays("theta_mech_rad", "iq_a")
-        turns += whole_turns(data["theta_mech_rad"], data["iq_a"])
+        there = np.isfinite(data["theta_mech_rad"])
+        turns += whole_turns(data["theta_mech_rad"][there], data["iq_a"][there])
     highest = largest_order(turns, int(options["highest_order"]))
     if len(turns) < 2 or highest < 1:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"

@@ -123,6 +123,40 @@ def test_sensor_and_friction_do_not_reach_the_torque_constant(effect: str) -> No
     assert kt == pytest.approx(1.5 * motor.pole_pairs * motor.psi_pm_wb, rel=1.5e-3)
 
 
+def without_some_angles(captures: Campaign, test: str) -> Campaign:
+    """The campaign with every tenth row of one test without an angle, the first row too."""
+
+    def holed(table: pl.DataFrame) -> pl.DataFrame:
+        blind = pl.Series(np.arange(table.height) % 10 == 0)
+        angle = pl.when(blind).then(float("nan")).otherwise(pl.col("theta_mech_rad"))
+        return table.with_columns(angle.alias("theta_mech_rad"))
+
+    damaged = (
+        replace(c, tables=tuple(holed(t) for t in c.tables)) if c.meta.test == test else c
+        for c in captures.captures
+    )
+    return Campaign("m", tuple(damaged))
+
+
+def test_lost_angles_do_not_take_creep_friction_away() -> None:
+    """Turns and speed are those of the other rows."""
+    captures = recorded("cogging")
+    both = (captures, without_some_angles(captures, "cogging"))
+    whole, found = (chain(c, SPIN_DOWN, COGGING).by("cogging", "torque_coulomb_nm") for c in both)
+    assert whole is not None
+    assert found is not None
+    assert found.number == pytest.approx(whole.number, rel=1e-3)
+    assert found.at["omega_mech_rad_s"] == pytest.approx(whole.at["omega_mech_rad_s"], rel=0.01)
+
+
+def test_lost_angles_leave_the_cogging_order_of_the_holding_current() -> None:
+    captures = recorded("cogging")
+    known = chain(captures, TORQUE_MAP)
+    damaged = without_some_angles(captures, "holding_current")
+    orders = [fitted(HOLDING_CURRENT, c, known).estimates[0] for c in (captures, damaged)]
+    assert [order.value for order in orders] == [84, 84]
+
+
 def test_torque_map_without_steps_names_the_experiment() -> None:
     captures = recorded()
     first = captures.of("torque_map")[0]
