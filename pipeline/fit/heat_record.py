@@ -95,9 +95,10 @@ def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, flo
 
 
 def reference_resistance(record: HeatRecord, known: Constants) -> Estimate | None:
-    """R at 25 degC, by the resistance test, of the mix of phases that this run's current saw.
+    """R at 25 degC of the mix of phases that this run's current saw, by the resistance test.
 
-    The mean of the phases where they or the mix are not known; None without a resistance test.
+    Where the phases or their mix are not known, the best R of the mean phase, whatever told it: a
+    resistance test, else a heat run or a drive log. None where nothing did.
     """
     phases = [known.best(f"r_{phase}_ohm") for phase in "abc"]
     if record.shares is None or any(one is None for one in phases):
