@@ -16,7 +16,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recordings.capture import capture_traces, recording_bytes, sample_table
+from pipeline.io.recordings.capture import recording_bytes
+from pipeline.io.recordings.capture_traces import capture_traces, sample_table
 from pipeline.io.recordings.stream import recording, send_trace
 from pipeline.records.capture import Capture, CaptureMeta
 from tests.looking import Viewer, need_viewer

@@ -27,11 +27,12 @@ import polars as pl
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.io.recordings.capture import LONG_ROWS, recording_bytes
+from pipeline.io.recordings.capture import recording_bytes
+from pipeline.io.recordings.capture_traces import LONG_ROWS
+from pipeline.io.recordings.fleet_columns import SHOWN
 from pipeline.io.recordings.font import RANGES, SINGLE, can_draw, drawable
 from pipeline.io.recordings.ladder import write_ladder_recording
 from pipeline.io.recordings.lots import lots_name, write_lots_recording
-from pipeline.io.recordings.motor import SHOWN
 from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.io.recordings.seal import SEAL, seal_of
 from pipeline.io.recordings.viewer import catalogue

@@ -70,6 +70,11 @@ def angle_of(signal: str) -> str:
     return "theta_mech_rad" if signal == "torque_shaft_nm" else "theta_elec_rad"
 
 
+def angle_words(signal: str) -> str:
+    """Which turn a signal's residual is drawn over."""
+    return "mechanical" if angle_of(signal) == "theta_mech_rad" else "electrical"
+
+
 def signal_floor(measured: Array) -> float:
     """1 % of the largest value of a signal [its unit]; 1 where it has none."""
     finite = np.abs(measured[np.isfinite(measured)])

@@ -11,8 +11,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.io.recordings.capture import FitTrace, angle_words
-from pipeline.io.recordings.capture_maps import ResidualMaps
+from pipeline.io.recordings.capture_maps import ResidualMaps, angle_words
+from pipeline.io.recordings.capture_traces import FitTrace
 from pipeline.io.recordings.error_map import map_view
 from pipeline.io.recordings.stream import TIME, Trace
 from pipeline.io.recordings.views import (

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.io.recordings.motor import APPLICATION, CAPTURE, SHOWN, STEPS_A_CAPTURE
+from pipeline.io.recordings.fleet_columns import APPLICATION, CAPTURE, SHOWN, STEPS_A_CAPTURE
 from pipeline.io.recordings.stream import ROW
 from pipeline.io.recordings.views import (
     MEASURED,

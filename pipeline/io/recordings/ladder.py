@@ -23,17 +23,26 @@ from pipeline.io.publish import canonical_json
 from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.ladder_page import rung_markdown
+from pipeline.io.recordings.ladder_scales import (
+    CURRENT,
+    RUNG,
+    SPEED,
+    angle_of,
+    angle_reach,
+    angle_scale,
+    common_reach,
+    error_scale,
+    shown_signals,
+)
+from pipeline.io.recordings.ladder_views import ladder_layout
 from pipeline.io.recordings.seal import write_sealed
 from pipeline.io.recordings.stream import recording, send_axis_ends, send_bars, send_property
 from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
-from pipeline.physics.notation import Scale, scale_for
-from pipeline.records.diagnosis import Diagnosis, LadderRung
+from pipeline.records.diagnosis import Diagnosis
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-RUNG = "rung"
-SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
 WORDS = ("speed [rad/s]", "iq [A]")
 
 
@@ -44,8 +53,6 @@ def write_ladder_recording(result: Diagnosis, path: Path) -> None:
 
 def ladder_bytes(result: Diagnosis) -> bytes:
     """The .rrd of one motor's ladder, made in memory."""
-    from pipeline.io.recordings.ladder_views import ladder_layout
-
     identity = canonical_json(result.document()).decode()
     name = f"{result.motor_id} ladder"
     with recording(name, (identity,), ladder_layout(result)) as made:
@@ -58,49 +65,6 @@ def ladder_bytes(result: Diagnosis) -> bytes:
         stated = {"motor_id": result.motor_id, "model": result.model, "verdict": result.verdict}
         send_property(made.stream, "diagnosis", stated)
     return made.content
-
-
-def shown_signals(result: Diagnosis) -> tuple[str, ...]:
-    """Signals with an error on every rung, the one farthest over its noise floor first."""
-    if not result.ladder:
-        return ()
-    first = result.ladder[0].errors
-    everywhere = [name for name in first if all(name in rung.errors for rung in result.ladder)]
-
-    def over(name: str) -> float:
-        return first[name].rmse / max(first[name].noise_floor, 1e-300)
-
-    mapped = [n for n in everywhere if result.ladder[0].map_of(n, SPEED, CURRENT) is not None]
-    rest = [name for name in everywhere if name not in mapped]
-    return (*sorted(mapped, key=lambda n: (-over(n), n)), *sorted(rest, key=lambda n: -over(n)))
-
-
-def angle_of(signal: str) -> str:
-    """The angle that a signal's error is drawn over: torque ripples with the shaft."""
-    return "theta_mech_rad" if signal == "torque_shaft_nm" else "theta_elec_rad"
-
-
-def common_reach(ladder: Sequence[LadderRung], signal: str) -> float:
-    """Full colour of a signal's maps on all rungs [unit]: no more than the first rung's largest."""
-    flat = [rung.map_of(signal, SPEED, CURRENT) for rung in ladder]
-    return max((one.reach for one in flat if one is not None), default=0.0)
-
-
-def error_scale(result: Diagnosis, signal: str) -> Scale:
-    """The unit in which a signal's errors are drawn on all rungs: mV where volts would be small."""
-    errors = [rung.errors[signal] for rung in result.ladder]
-    return scale_for(max(e.rmse for e in errors), errors[0].unit)
-
-
-def angle_reach(result: Diagnosis, signal: str) -> float:
-    """The largest mean error over the angle on any rung [unit]."""
-    turns = [rung.map_of(signal, angle_of(signal)) for rung in result.ladder]
-    return max((one.reach for one in turns if one is not None), default=0.0)
-
-
-def angle_scale(result: Diagnosis, signal: str) -> Scale:
-    """The unit in which a signal's error is drawn over the angle on all rungs."""
-    return scale_for(angle_reach(result, signal), result.ladder[0].errors[signal].unit)
 
 
 def _send(stream: RecordingStream, entity: str, rungs: Sequence[int], columns: Any) -> None:

@@ -5,6 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipeline.io.recordings.error_map import map_view
+from pipeline.io.recordings.ladder_scales import (
+    CURRENT,
+    RUNG,
+    SPEED,
+    angle_of,
+    angle_scale,
+    common_reach,
+    error_scale,
+    shown_signals,
+)
 from pipeline.io.recordings.views import PALETTE, bar_view, page_view, workspace
 from pipeline.physics.glossary import suffix_of
 from pipeline.physics.notation import quantity
@@ -16,8 +26,6 @@ if TYPE_CHECKING:
 
 def ladder_layout(result: Diagnosis) -> Blueprint:
     """A tab a signal: page and map above, bars below; a last tab with all rungs as lines."""
-    from pipeline.io.recordings.ladder import RUNG, shown_signals
-
     signals = shown_signals(result)
     tabs = [_workspace(result, signal) for signal in signals]
     tabs = [*tabs, _overview(signals)] if tabs else [_page()]
@@ -30,15 +38,6 @@ def _page() -> Any:
 
 def _workspace(result: Diagnosis, signal: str) -> Any:
     import rerun.blueprint as rrb
-
-    from pipeline.io.recordings.ladder import (
-        CURRENT,
-        SPEED,
-        angle_of,
-        angle_scale,
-        common_reach,
-        error_scale,
-    )
 
     named = signal_words(signal)
     unit, over = error_scale(result, signal).unit, angle_scale(result, signal).unit

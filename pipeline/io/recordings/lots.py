@@ -26,6 +26,16 @@ from numpy.typing import NDArray
 from pipeline.io.publish import canonical_json
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.lots_page import verdict_markdown
+from pipeline.io.recordings.lots_traces import (
+    COLOURS,
+    PLACE,
+    SIDES,
+    band_trace,
+    compared,
+    drift,
+    histogram,
+)
+from pipeline.io.recordings.lots_views import lots_layout
 from pipeline.io.recordings.seal import write_sealed
 from pipeline.io.recordings.stream import (
     Trace,
@@ -35,23 +45,14 @@ from pipeline.io.recordings.stream import (
     send_property,
     send_trace,
 )
-from pipeline.io.recordings.views import BASELINE, CANDIDATE
-from pipeline.physics.notation import Scale, scale_for
-from pipeline.records.lot_constant import ConstantResult, Side
-from pipeline.records.lot_regression import CoggingBand, LotRegression
+from pipeline.records.lot_constant import ConstantResult
+from pipeline.records.lot_regression import LotRegression
 from pipeline.records.naming import file_stem
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
 Array = NDArray[np.float64]
-
-PLACE = "place"
-SIDES: tuple[Side, ...] = ("baseline", "candidate")
-COLOURS = {"baseline": BASELINE, "candidate": CANDIDATE}
-BINS = 16
-COVERAGE = 2.0
-FILL = 8
 
 
 def lots_name(result: LotRegression) -> str:
@@ -66,8 +67,6 @@ def write_lots_recording(result: LotRegression, path: Path) -> None:
 
 def lots_bytes(result: LotRegression) -> bytes:
     """The .rrd of one comparison of lots, made in memory."""
-    from pipeline.io.recordings.lots_views import lots_layout
-
     identity = canonical_json(result.document()).decode()
     name = f"{result.baseline.selector} → {result.candidate.selector}"
     with recording(name, (identity,), lots_layout(result)) as made:
@@ -88,80 +87,6 @@ def lots_bytes(result: LotRegression) -> bytes:
         }
         send_property(made.stream, "regression", stated)
     return made.content
-
-
-def compared(result: LotRegression) -> tuple[ConstantResult, ...]:
-    """Constants that both sides have: those that fail first, then by size of the change."""
-    ranks = ("fail", "CONFOUNDED", "marginal", "undecided", "INSUFFICIENT_HISTORY")
-
-    def weight(one: ConstantResult) -> tuple[int, float, str]:
-        rank = ranks.index(one.verdict) if one.verdict in ranks else len(ranks)
-        return rank, -abs(one.effect.in_sd or 0.0), one.name
-
-    both = [one for one in result.constants if all(one.of(side) for side in SIDES)]
-    return tuple(sorted(both, key=weight))
-
-
-def constant_scale(one: ConstantResult) -> Scale:
-    """The unit in which a constant is shown."""
-    return scale_for(max(abs(motor.value) for motor in one.motors), one.unit)
-
-
-def histogram(one: ConstantResult) -> tuple[Array, dict[Side, Array]]:
-    """Left edges of common bins in the shown unit [B + 1], and motors per bin of each side [B]."""
-    scale = constant_scale(one)
-    shown = {s: np.array([scale.shown(m.value) for m in one.of(s)]) for s in SIDES}
-    every = np.concatenate(list(shown.values()))
-    low, high = float(every.min()), float(every.max())
-    if high <= low:
-        low, high = low - 0.5 * abs(low or 1.0) * 0.01, high + 0.5 * abs(high or 1.0) * 0.01
-    edges = np.linspace(low, high, BINS + 1)
-    counts = {s: np.histogram(v, edges)[0].astype(np.float64) for s, v in shown.items()}
-    return edges, counts
-
-
-def drift(one: ConstantResult) -> pl.DataFrame | None:
-    """Lot by lot: mean, its ±U, EWMA and its control limits as change from the baseline [%]."""
-    before = [lot.mean for lot in one.lots if lot.side == "baseline"]
-    centre = float(np.mean(before)) if before else 0.0
-    if not before or centre == 0.0:
-        return None
-
-    def change(value: float | None) -> float:
-        return np.nan if value is None else 100.0 * (value - centre) / abs(centre)
-
-    rows = [
-        {
-            "mean": change(lot.mean),
-            "low": change(lot.mean - COVERAGE * lot.u),
-            "high": change(lot.mean + COVERAGE * lot.u),
-            "ewma": change(lot.ewma),
-            "ewma_low": change(lot.ewma_low),
-            "ewma_high": change(lot.ewma_high),
-            # from the last lot before on, so that even a single one is a line
-            "candidate": change(lot.mean) if place >= len(before) - 1 else np.nan,
-        }
-        for place, lot in enumerate(one.lots)
-    ]
-    return pl.DataFrame(rows, schema=dict.fromkeys(rows[0], pl.Float64))
-
-
-def band_trace(band: CoggingBand) -> Trace:
-    """A band of cogging torque [mN·m] over 0.1°, with lines between its edges that fill it."""
-    low, high = 1e3 * np.array(band.low_nm), 1e3 * np.array(band.high_nm)
-    columns = {"mean": 1e3 * np.array(band.mean_nm), "low": low, "high": high}
-    for number in range(1, FILL):
-        columns[f"fill_{number}"] = low + (high - low) * number / FILL
-    frame = pl.DataFrame({name: v.astype(np.float32) for name, v in columns.items()})
-    tenths = np.rint(10.0 * np.degrees(np.array(band.theta_mech_rad))).astype(np.int64)
-    first = np.unique(tenths, return_index=True)[1]
-    index = pl.Series(PLACE, tenths[first])
-    return Trace(f"/cogging/{band.side}", PLACE, frame[first.tolist()].insert_column(0, index))
-
-
-def leading_order(result: LotRegression) -> int:
-    """The order of the largest mean amplitude on either side; 1 where none is told."""
-    return max(result.orders, key=lambda level: level.mean).order if result.orders else 1
 
 
 def _send_histograms(stream: RecordingStream, one: ConstantResult) -> None:

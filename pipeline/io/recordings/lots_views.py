@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pipeline.io.recordings.lots import (
+from pipeline.io.recordings.lots_traces import (
     COLOURS,
     FILL,
     PLACE,

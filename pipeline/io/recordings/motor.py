@@ -25,9 +25,11 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.io.recordings.capture import first_of_each, own_evidence
 from pipeline.io.recordings.capture_maps import FULL_COLOUR_SHARE, signal_floor
+from pipeline.io.recordings.capture_traces import first_of_each, own_evidence
 from pipeline.io.recordings.datasheet_page import checks_markdown, sheet_markdown
+from pipeline.io.recordings.fleet import motor_layout
+from pipeline.io.recordings.fleet_columns import APPLICATION, CAPTURE, SHOWN, STEPS_A_CAPTURE
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.stream import (
     ROW,
@@ -51,33 +53,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 POINTS_A_SERIES = 400
-CAPTURE, STEPS_A_CAPTURE = "capture", 1000
 WAVE_CELLS, PREVIEW_PERIODS = 720, 4
 HIGHEST_ORDER = 120
-APPLICATION = "fleet"
 ORDER = ("refused", "provisional", "released")
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
-    """A constant of the fleet's table: its property, heading, and factor from the SI unit."""
-
-    constant: str
-    key: str
-    heading: str
-    factor: float
-
-
-SHOWN = (
-    Shown("r_phase_ohm", "r_phase_mohm", "R [mΩ]", 1e3),
-    Shown("ld_h", "ld_uh", "Ld [µH]", 1e6),
-    Shown("lq_h", "lq_uh", "Lq [µH]", 1e6),
-    Shown("psi_pm_wb", "psi_pm_mwb", "ψ [mWb]", 1e3),
-    Shown("kt_peak_nm_a", "kt_peak_mnm_a", "Kt [mN·m/A]", 1e3),
-    Shown("cogging_amplitude_nm", "cogging_mnm", "cogging [mN·m]", 1e3),
-    Shown("j_rotor_kgm2", "j_rotor_gcm2", "J [g·cm²]", 1e7),
-    Shown("torque_coulomb_nm", "torque_coulomb_mnm", "friction [mN·m]", 1e3),
-)
 KEY_CONSTANTS = tuple(one.constant for one in SHOWN)
 
 
@@ -98,8 +78,6 @@ def motor_bytes(
     findings: Sequence[Finding],
 ) -> bytes:
     """The .rrd of one motor, made in memory."""
-    from pipeline.io.recordings.fleet import motor_layout
-
     strips = tuple(overview(campaign, evidence))
     with recording(
         datasheet.motor_id,

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
 from pipeline.io.recordings.fleet import write_layouts
-from pipeline.io.recordings.motor import APPLICATION
+from pipeline.io.recordings.fleet_columns import APPLICATION
 from pipeline.io.recordings.readback import fleet_shape
 from pipeline.records.errors import MachineError
 

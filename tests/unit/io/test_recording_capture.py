@@ -8,14 +8,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recordings.capture import (
+from pipeline.io.recordings.capture import recording_id, write_recording
+from pipeline.io.recordings.capture_traces import (
     LONG_ROWS,
     TABLE_ROWS,
     capture_traces,
     fit_traces,
     own_evidence,
-    recording_id,
-    write_recording,
 )
 from pipeline.io.recordings.capture_views import further_views, loupe_views, main_views
 from pipeline.io.recordings.datasheet_page import sheet_markdown

@@ -18,13 +18,9 @@ from pipeline.io.recordings.comparison import (
     write_comparison_recording,
 )
 from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
-from pipeline.io.recordings.ladder import (
-    common_reach,
-    error_scale,
-    shown_signals,
-    write_ladder_recording,
-)
+from pipeline.io.recordings.ladder import write_ladder_recording
 from pipeline.io.recordings.ladder_page import added, rung_markdown
+from pipeline.io.recordings.ladder_scales import common_reach, error_scale, shown_signals
 from pipeline.records.comparison import Comparison, SignalError, Trace
 from tests.unit.ladders import make_diagnosis, make_map
 

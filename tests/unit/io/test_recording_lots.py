@@ -8,16 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recordings.lots import (
-    SIDES,
-    compared,
-    constant_scale,
-    drift,
-    histogram,
-    lots_name,
-    write_lots_recording,
-)
+from pipeline.io.recordings.lots import lots_name, write_lots_recording
 from pipeline.io.recordings.lots_page import verdict_markdown
+from pipeline.io.recordings.lots_traces import SIDES, compared, constant_scale, drift, histogram
 from pipeline.io.recordings.lots_views import cogging_plan, drift_plan
 from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.io.recordings.seal import verify
