@@ -15,10 +15,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.terminals import PAIR_ANGLE_RAD, PAIRS, bridged
+from pipeline.fit.terminals import PAIRS, bridged
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
+from pipeline.physics.conventions import PAIR_AXES_RAD
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
@@ -70,7 +71,7 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
 
     Raises KeyError where no voltage is there.
     """
-    lines = {f"v{p}_v": (math.sqrt(3.0), PAIR_ANGLE_RAD[p]) for p in PAIRS}
+    lines = {f"v{p}_v": (math.sqrt(3.0), PAIR_AXES_RAD[p]) for p in PAIRS}
     phases = {f"v{p}_v": (1.0, k * TURN / 3.0) for k, p in enumerate("abc")}
     chosen = next(
         (

@@ -15,9 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.terminals import PAIR_ANGLE_RAD, pair_of, pair_signals
+from pipeline.fit.terminals import pair_of, pair_signals
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.physics.conventions import PAIR_AXES_RAD
 from pipeline.records.capture import Capture, VoltageTiming
 
 Array = NDArray[np.float64]
@@ -101,7 +102,7 @@ def read_step(capture: Capture) -> StepRecord | None:
     return StepRecord(
         capture,
         pair,
-        PAIR_ANGLE_RAD[pair] - angle,
+        PAIR_AXES_RAD[pair] - angle,
         wave,
         times,
         means,

@@ -9,7 +9,6 @@ from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
 PAIRS = ("ab", "bc", "ca")
-PAIR_ANGLE_RAD = {"ab": -np.pi / 6.0, "bc": np.pi / 2.0, "ca": 7.0 * np.pi / 6.0}
 
 
 def pair_of(capture: Capture) -> str | None:

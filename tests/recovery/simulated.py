@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import polars as pl
 
-from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.capture import Campaign
 from pipeline.simulator.bench import record
-from pipeline.simulator.design import Bench, Instruments, Motor, Recording
+from pipeline.simulator.design import Bench, Instruments, Motor
+from tests.simulated import campaign_of
 
 MOTOR = Motor(
     motor_type="recovery-150",
@@ -34,36 +34,7 @@ MOTOR = Motor(
     cth_magnet_j_k=80.0,
 )
 BENCH = Bench()
-NUMBERS = {
-    "ambient_degc",
-    "theta_elec_deg",
-    "pwm_hz",
-    "vdc_v",
-    "u_rel_current",
-    "u_rel_voltage",
-    "u_rel_torque",
-    "u_temp_degc",
-}
-WHOLE = {"pole_pairs", "slots"}
 Plan = Sequence[tuple[str, str, Mapping[str, Any]]]
-
-
-def capture_of(recording: Recording) -> Capture:
-    """A recording as the reader would hand it on."""
-    fields: dict[str, Any] = {}
-    extra: dict[str, str] = {}
-    for key, text in recording.meta.items():
-        if key in NUMBERS:
-            fields[key] = float(text)
-        elif key in WHOLE:
-            fields[key] = int(text)
-        elif key in CaptureMeta.__dataclass_fields__:
-            fields[key] = text
-        elif key != "contract":
-            extra[key] = text
-    tables = tuple(pl.DataFrame(table) for table in recording.tables)
-    meta = CaptureMeta(**fields, extra=extra)
-    return Capture(f"{recording.stem}.mcap", "0" * 64, "verified", meta, tables)
 
 
 def recorded(
@@ -73,9 +44,8 @@ def recorded(
     first, *rest = np.random.SeedSequence(seed).spawn(1 + len(plan))
     instruments = bench.drawn(np.random.default_rng(first))
     fixed = replace(bench, instruments=instruments)
-    captures = []
-    for child, (stem, test, protocol) in zip(rest, plan, strict=True):
-        recording = record(test, motor, fixed, np.random.default_rng(child), **protocol)
-        captures.append(capture_of(replace(recording, stem=stem)))
-    captures.sort(key=lambda capture: capture.path)
-    return Campaign(motor.motor_id, tuple(captures)), instruments
+    recordings = [
+        replace(record(test, motor, fixed, np.random.default_rng(child), **protocol), stem=stem)
+        for child, (stem, test, protocol) in zip(rest, plan, strict=True)
+    ]
+    return campaign_of(recordings), instruments

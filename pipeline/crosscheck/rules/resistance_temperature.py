@@ -6,13 +6,12 @@ from collections.abc import Mapping
 
 from pipeline.crosscheck.judge import judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
-from pipeline.physics.conventions import COPPER_ZERO_K
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
 
 NAME = "resistance_temperature"
-COPPER_1_K = 1.0 / (COPPER_ZERO_K + 25.0)
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
@@ -25,8 +24,8 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         return not_evaluated(NAME, _missing(constants))
     return judge_ratio(
         NAME,
-        alpha.number / COPPER_1_K,
-        alpha.u / COPPER_1_K,
+        alpha.number / COPPER_COEFFICIENT_25_1_K,
+        alpha.u / COPPER_COEFFICIENT_25_1_K,
         options["allowance"],
         "temperature coefficient of the resistance over copper's",
         otherwise="a thermometer that lags or sits off the winding, or a winding not of copper",
