@@ -6,19 +6,16 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.back_emf import Channel, Spin
+from pipeline.fit.integrals import REST, cubic
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma
 
 TURN = 2.0 * math.pi
-# What the cubic leaves of a sine's integral, a share of (w h)⁴: its first term of h.
-REST = 11.0 / 720.0
-GAP = 1.5
 Array = NDArray[np.float64]
 
 
@@ -55,24 +52,10 @@ def turns_of(spin: Spin) -> list[Turn]:
     return [t for t in (_by_swings(spin, c) for c in loud) if t is not None]
 
 
-def integral(t_s: Array, v: NDArray[Any]) -> NDArray[Any]:
-    """Running integral [n] of samples v [n] at times t_s [n, s], 0 at the first.
-
-    A step is that of the cubic with the slopes of the parabolas through each sample and its
-    neighbours, h (v0 + v1)/2 + h² (v0' - v1')/12. The trapezoid alone takes (w h)²/12 off a sine,
-    this `REST` (w h)⁴. Steps over a gap are trapezoids, for which the slopes beside it say
-    nothing. Reference: Davis and Rabinowitz, Methods of Numerical Integration, 2nd ed., 2.9.
-    """
-    step = np.diff(t_s)
-    slope = np.gradient(v, t_s)
-    bend = np.where(step < GAP * np.median(step), step**2 / 12.0, 0.0) * (slope[:-1] - slope[1:])
-    return np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * step + bend)])
-
-
 def _flux_of(spin: Spin, channel: Channel) -> Array:
     """Integral of a voltage [Wb], phase to star point, less the offset seen at rest."""
     v = channel.v_v - float(np.mean(channel.v_v[_quiet(channel.v_v)]))
-    flux: Array = integral(spin.t_s, v) / channel.gain
+    flux: Array = cubic(spin.t_s, v) / channel.gain
     return flux
 
 
@@ -155,7 +138,7 @@ def _by_vector(spin: Spin) -> list[Turn]:
     """
     rest = [replace(c, v_v=c.v_v - float(np.mean(c.v_v[_quiet(c.v_v)]))) for c in spin.channels]
     vector = replace(spin, channels=tuple(rest)).vector_v(centred=False)
-    flux = integral(spin.t_s, vector)
+    flux = cubic(spin.t_s, vector)
     flux = flux - flux.mean()
     time = (spin.t_s - spin.t_s.mean()) / float(np.ptp(spin.t_s))
     rows = _knots(np.unwrap(np.angle(flux)), TURN / 24.0)
@@ -202,7 +185,7 @@ def _by_swings(spin: Spin, channel: Channel) -> Turn | None:
     duration = float(np.ptp(spin.t_s))
     rate = white_noise_sigma(v) * math.sqrt(duration / spin.t_s.size) / channel.gain
     offset, u_offset = _rest(v)
-    flux = integral(spin.t_s, v - offset) / channel.gain
+    flux = cubic(spin.t_s, v - offset) / channel.gain
     noise, swing = 4.0 * rate * math.sqrt(duration), float(np.ptp(flux))
     unsure = 3.0 * u_offset * duration / channel.gain
     reversal = max(noise, min(0.1 * swing, max(0.005 * swing, unsure)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.fit.integrals import trapezoid
 from pipeline.fit.operating_points import magnet_temperature
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.plateaus import white_noise_sigma
@@ -146,7 +147,7 @@ def _part(capture: Capture) -> _Part | None:
     if t.size < LEAST_SAMPLES:
         return None
     if angle == "omega_mech_rad_s":
-        theta = np.concatenate([[0.0], np.cumsum(0.5 * (theta[1:] + theta[:-1]) * np.diff(t))])
+        theta = trapezoid(t, theta)
     try:
         weak = _windows(t, theta, kind)
         speed = smooth_speed(t, theta, max(0.005, 10.0 * float(np.median(np.diff(t)))))

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.fit.integrals import trapezoid
 from pipeline.fit.terminals import pair_of, pair_signals
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma
@@ -122,9 +123,7 @@ def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] |
     start for the fit, not an estimate: the trapezoid across an edge reads L up to half a sample of
     the time constant high. None where the two integrals are not told apart.
     """
-    step = np.diff(t_s)
-    volts = np.concatenate([[0.0], np.cumsum(0.5 * (v_v[1:] + v_v[:-1]) * step)])
-    amps = np.concatenate([[0.0], np.cumsum(0.5 * (i_a[1:] + i_a[:-1]) * step)])
+    volts, amps = trapezoid(t_s, v_v), trapezoid(t_s, i_a)
     fit = linear_fit(np.column_stack([volts, amps, np.ones(t_s.size)]), i_a)
     inverse, slope = float(fit.coefficients[0]), -float(fit.coefficients[1])
     if not fit.full_rank or inverse <= 0.0 or slope <= 0.0:

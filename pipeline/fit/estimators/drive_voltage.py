@@ -17,6 +17,7 @@ from pipeline.fit.instruments import (
     unstated_note,
     voltage_source,
 )
+from pipeline.fit.integrals import trapezoid
 from pipeline.fit.magnet_coefficient import magnet_coefficient
 from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.operating_points import pole_pairs_of
@@ -138,7 +139,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     if t.size < 10 * LEAST_SAMPLES:
         return None
     if angle == "omega_mech_rad_s":
-        theta = np.concatenate([[0.0], np.cumsum(0.5 * (theta[1:] + theta[:-1]) * np.diff(t))])
+        theta = trapezoid(t, theta)
     period = float(np.median(np.diff(t)))
     try:
         weak = weak_rows(t, min(max(WIDTHS_S[0], 3 * LEAST_SAMPLES * period), WIDTHS_S[1]))

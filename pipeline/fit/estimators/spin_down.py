@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.fit.drag import DRAG_FORMS, STRIBECK
 from pipeline.fit.instruments import budget_of
+from pipeline.fit.integrals import trapezoid
 from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.coasting import coast_down, coasting_rows
@@ -137,7 +138,7 @@ def _coasts(capture: Capture) -> list[Coast]:
     t, y = data["t_s"][fine], data[column][fine]
     if t.size < 3 * LEAST_SAMPLES:
         return []
-    angle = y if of_angle else np.append(0.0, np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t)))
+    angle = y if of_angle else trapezoid(t, y)
     try:
         speed = smooth_speed(t, angle, max(0.01, 20.0 * float(np.median(np.diff(t)))))
     except ValueError:

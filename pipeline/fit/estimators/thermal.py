@@ -23,6 +23,7 @@ from pipeline.fit.instruments import (
     temperature_source,
     voltage_source,
 )
+from pipeline.fit.integrals import trapezoid
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.least_squares import (
     LinearFit,
@@ -102,22 +103,17 @@ def _losses_w(record: HeatRecord, known: Constants) -> Array:
     return losses
 
 
-def _integral(values: Array, t_s: Array) -> Array:
-    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(t_s)
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
 def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | None:
     """The two-node balance where a second body was measured and takes heat, else one node."""
     t, winding = record.t_s, record.temp_winding_degc
-    ones, power = np.ones(t.size), _integral(losses_w, t)
-    outward = -_integral(winding - ambient, t)
+    ones, power = np.ones(t.size), trapezoid(t, losses_w)
+    outward = -trapezoid(t, winding - ambient)
     single = linear_fit(np.column_stack([ones, power, outward]), winding)
     if record.temp_second_degc is not None and np.isfinite(record.temp_second_degc).all():
         second = record.temp_second_degc
-        across = -_integral(winding - second, t)
+        across = -trapezoid(t, winding - second)
         double = _winding_fit(np.column_stack([ones, power, across, outward]), winding)
-        body = linear_fit(np.column_stack([ones, -across, -_integral(second - ambient, t)]), second)
+        body = linear_fit(np.column_stack([ones, -across, -trapezoid(t, second - ambient)]), second)
         start, direct = _start(double, body)
         found = None
         if start is not None:

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from pipeline.fit.estimators.hand_turn import ESTIMATOR
-from pipeline.fit.hand_turns import REST, integral
+from pipeline.fit.integrals import REST, cubic
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -113,7 +113,7 @@ def test_a_measured_magnet_coefficient_stays_the_same_error():
 def test_the_integral_of_a_sine_is_short_by_a_fourth_power_of_its_step():
     """The trapezoid alone is short by a second power: 2 % here for 0.1 %."""
     t_s = np.arange(1000) * 0.5
-    flux = integral(t_s, np.exp(1j * t_s))
+    flux = cubic(t_s, np.exp(1j * t_s))
     size = float(np.std(flux[1:-1]))
     assert size - 1.0 == pytest.approx(-REST * 0.5**4, rel=0.1)
 
@@ -122,7 +122,7 @@ def test_a_gap_is_bridged_by_a_straight_line():
     """Slopes of noise beside a gap of 100 rows would stand for a hundred steps."""
     t_s = np.delete(np.arange(400) * 1e-3, np.s_[150:250])
     v = np.random.default_rng(1).standard_normal(t_s.size)
-    flux = integral(t_s, v)
+    flux = cubic(t_s, v)
     assert flux[150] - flux[149] == pytest.approx(0.5 * (v[149] + v[150]) * 0.101)
 
 
