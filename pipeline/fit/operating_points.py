@@ -19,8 +19,11 @@ from pipeline.records.constants import Constants
 
 Array = NDArray[np.float64]
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
+# Whole turns, or cycles, are kept where they cost no more than a fifth of a point's rows.
 WORTHWHILE = 0.8
+# Ten levels a side step by a twentieth of the span; less than this is ripple, not a step.
 TOLERANCE = 0.03
+# The error of a mean is then known to a sixth (JCGM 100:2008, E.4.3).
 LEAST_ROWS = 20
 TURN_RAD = 2.0 * np.pi
 SAME_SPEED = 0.02

@@ -24,12 +24,20 @@ from pipeline.records.capture import Capture
 Array = NDArray[np.float64]
 
 DRIVE, COAST = 0, 1
+# Windows of a drive: the shortest in which the angle's noise is `QUIET`, as torque changes in them.
 WIDTHS_S = (0.02, 0.04, 0.08)
+# A coast only slows down: windows of a twentieth resolve its curve. Half or twice that moved T_c
+# and B by a ninth of their u at most, half or twice the longest window by nothing.
 COAST_SHARE = 0.05
 LONGEST_COAST_S = 0.5
+# Rows of a drive forget within seven windows, 0.07 s: a cluster is over three times that.
 CLUSTER_S = 0.25
+# The sign of friction is not known where the shaft may stand; twice that moved T_c and B by an
+# eighth of their u, where there is a Stribeck's excess to lose, and half of it nothing.
 SLOWEST_SHARE = 0.01
+# A fiftieth of the acceleration adds 0.02 % to its scatter.
 QUIET = 0.02
+# Half, as in Welch's spectra: no sample counts less than another, and more only repeats.
 OVERLAP = 0.5
 
 
