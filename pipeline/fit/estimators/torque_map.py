@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from pipeline.fit.instruments import (
     budget_of,
@@ -47,6 +48,7 @@ EXPERIMENT = (
     "are stepped, at two or more d currents, in both senses of rotation"
 )
 FORM_SHARE = 0.1
+BY_CHANCE = 0.01
 BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
 
 
@@ -226,7 +228,7 @@ def _estimates(
     else:
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
         found.append(not_identifiable(GIVES[1], RELUCTANCE.unit, NAME, why))
-    drag, covariance, why = _drag(points, model)
+    drag, covariance, dof, why = _drag(points, model)
     for index, name in enumerate(DRAG):
         if why:
             found.append(not_identifiable(name, _unit(name), NAME, why))
@@ -234,20 +236,21 @@ def _estimates(
             u_drag = float(np.sqrt(covariance[index, index]))
             form = _untested_form(points, model, index)
             parts = [*type_b[2 + index], *form]
-            found.append(estimate(name, float(drag[index]), u_drag, model.dof, parts))
+            found.append(estimate(name, float(drag[index]), u_drag, dof, parts))
     return tuple(found)
 
 
-def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, str]:
-    """Coulomb and viscous drag from the offsets of the speeds; the third answer says why not.
+def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, int, str]:
+    """Coulomb and viscous drag from the offsets of the speeds: values, covariance, dof, why not.
 
-    A shaft that stands has no drag: its offset is cogging and static friction.
+    A shaft that stands has no drag: its offset is cogging and static friction. Offsets that miss
+    the line by more than their scatter widen it, and beyond chance it has the speeds' freedom.
     """
     turning = sorted({p.group for p in points if not p.standing})
     speeds = np.array(
         [np.mean([p.omega_mech_rad_s for p in points if p.group == g]) for g in turning]
     )
-    blank = np.zeros(2), np.zeros((2, 2))
+    blank = np.zeros(2), np.zeros((2, 2)), 0
     if np.unique(np.sign(speeds)).size < 2 or speeds.size < 3:
         return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
     design = np.column_stack([-np.sign(speeds), -speeds, np.ones(speeds.size)])
@@ -258,11 +261,14 @@ def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, str
         return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
     inverse = np.linalg.pinv(design)
     covariance = inverse @ block @ inverse.T
+    dof = model.dof
     if part.dof > 0:
-        covariance = np.maximum(1.0, _lack(part.residuals, block, part.dof)) * covariance
+        lack = _lack(part.residuals, block, part.dof)
+        covariance = np.maximum(1.0, lack) * covariance
+        dof = part.dof if fdtrc(part.dof, model.dof, lack) < BY_CHANCE else dof
     if np.any(part.coefficients[:2] < -4.0 * np.sqrt(np.diag(covariance)[:2])):
         return *blank, "drag is not Coulomb and viscous: a fitted coefficient is negative"
-    return part.coefficients[:2], covariance[:2, :2], ""
+    return part.coefficients[:2], covariance[:2, :2], dof, ""
 
 
 def _lack(residuals: Array, block: Array, dof: int) -> float:

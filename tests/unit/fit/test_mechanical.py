@@ -77,6 +77,24 @@ def test_torque_constant_and_reluctance() -> None:
     assert shares["current@sim-1"] == pytest.approx(-0.002, rel=1e-3)
 
 
+@pytest.mark.parametrize("effects", ["", "windage"])
+def test_drag_of_a_map_that_misses_its_line_has_the_freedom_of_the_speeds(effects: str) -> None:
+    """Five speeds less two of drag and the transducer's zero: two, where windage bends the drag;
+    that of the points where the line holds.
+    """
+    machine = replace(design("gimbal-5208"), effects={})
+    machine = with_effects(machine, effects) if effects else machine
+    speeds = (0.15, 0.35, 0.55, -0.25, -0.45)
+    plan = tuple((f"at_{s}", "torque_map", {"speed": s}) for s in speeds)
+    captures = campaign_of(campaign(machine, EXACT_BENCH, 11, plan))
+    for name in ("torque_coulomb_nm", "b_visc_nm_s_rad"):
+        drag = chain(captures, TORQUE_MAP).by("torque_map", name)
+        assert drag is not None
+        scatter = next(p for p in drag.budget if p.source == f"scatter:torque_map:{name}")
+        assert (scatter.dof == 2) == bool(effects)
+        assert scatter.dof == 2 or scatter.dof > 100
+
+
 def test_saturation_does_not_bend_the_torque_constant() -> None:
     """Saturating q flux takes torque from large currents only; K is the slope at small ones."""
     motor = design("servo-ipm")
