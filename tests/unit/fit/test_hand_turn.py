@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from pipeline.fit.estimators.hand_turn import ESTIMATOR
-from pipeline.fit.integrals import REST, cubic
+from pipeline.fit.integrals import REST, cubic, trapezoid
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -108,6 +108,13 @@ def test_a_measured_magnet_coefficient_stays_the_same_error():
     parts = {part.source: part.u for part in psi.budget}
     assert parts["x"] == pytest.approx(-20.0 * 1e-5 * psi.number)
     assert not any(source.startswith("assumed:") for source in parts)
+
+
+@pytest.mark.parametrize("rule", [trapezoid, cubic])
+def test_a_straight_line_is_integrated_exactly_on_an_uneven_clock(rule):
+    t_s = np.cumsum(np.random.default_rng(0).uniform(0.9, 1.1, 50))
+    expected = 1.5 * (t_s**2 - t_s[0] ** 2) + 2.0 * (t_s - t_s[0])
+    assert rule(t_s, 3.0 * t_s + 2.0) == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_integral_of_a_sine_is_short_by_a_fourth_power_of_its_step():
