@@ -89,7 +89,11 @@ def _estimate() -> Schema:
             "orders": _list(
                 _object({"order": COUNT, "amplitude": SPREAD, "u": SPREAD, "phase_rad": NUMBER})
             ),
-            "budget": _list(_object({"source": NAME, "u": NUMBER, "kind": _one_of(Kind)})),
+            "budget": _list(
+                _object(
+                    {"source": NAME, "u": NUMBER, "kind": _one_of(Kind)}, {"dof": _or_null(SPREAD)}
+                )
+            ),
         },
     )
     schema["if"] = {"properties": {"status": {"const": "not_identifiable"}}}

@@ -45,8 +45,9 @@ def read_datasheet(path: Path) -> Datasheet:
 def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
     """The record that `Datasheet.document` wrote; the inverse of it.
 
-    A contribution's own degrees of freedom are not published: those of type A share what gives
-    the published total (GUM eq. G.2b). Raises LookupError, TypeError or ValueError otherwise.
+    A document of before contributions told their own degrees of freedom gives those of type A
+    what makes the published total (GUM eq. G.2b). Raises LookupError, TypeError or ValueError
+    for anything else.
     """
     provenance = document["provenance"]
     return Datasheet(
@@ -112,6 +113,11 @@ def _estimate(name: str, said: Mapping[str, Any]) -> Estimate:
 def _budget(said: Mapping[str, Any]) -> Budget:
     parts = said.get("budget", ())
     dof = said["dof"]
+    if all("dof" in p for p in parts):
+        return tuple(
+            Contribution(p["source"], p["u"], p["kind"], math.inf if p["dof"] is None else p["dof"])
+            for p in parts
+        )
     if dof is None or not parts:
         return tuple(Contribution(p["source"], p["u"], p["kind"]) for p in parts)
     # With one dof for every type A part, dof_total = dof * u^4 / sum(u_i^4).

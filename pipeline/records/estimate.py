@@ -133,7 +133,12 @@ class Estimate:
             "bounds": None if self.bounds is None else list(self.bounds),
             "at_bound": self.at_bound,
             "budget": [
-                {"source": part.source, "u": part.u, "kind": part.kind}
+                {
+                    "source": part.source,
+                    "u": part.u,
+                    "kind": part.kind,
+                    "dof": part.dof if math.isfinite(part.dof) else None,
+                }
                 for part in self.budget
                 if known
             ],

@@ -74,12 +74,35 @@ def write(folder: Path, *sheets: Datasheet) -> None:
 def test_a_datasheet_comes_back_as_it_was_written(resistance_alone: Datasheet) -> None:
     document = json.loads(canonical_json(resistance_alone.document()))
     again = datasheet_of(document)
-    back = json.loads(canonical_json(again.document()))
-    dof = [d["constants"]["r_phase_ohm"].pop("dof") for d in (document, back)]
-    other = [d["alternatives"][0].pop("dof") for d in (document, back)]
-    assert dof[1] == pytest.approx(dof[0])
-    assert other[1] == pytest.approx(other[0])
-    assert back == document
+    assert json.loads(canonical_json(again.document())) == document
+
+
+def two_scatters() -> Estimate:
+    """Ten points' scatter, a hundred rows' scatter and an instrument, all three alike."""
+    parts = (*type_a("points", 1.0, 10.0), *type_a("rows", 1.0, 100.0), *type_b("gain", 1.0))
+    return Estimate("r_phase_ohm", 50.0, "ohm", "measured", "resistance", parts)
+
+
+def test_the_freedom_of_a_datasheet_follows_from_its_contributions() -> None:
+    """Welch-Satterthwaite by hand: u^4 = 9 over 1/10 + 1/100; what has no end is null."""
+    written = two_scatters().document()
+    assert [part["dof"] for part in written["budget"]] == [10.0, 100.0, None]
+    assert written["dof"] == pytest.approx(9.0 / 0.11)
+    document = sheet("r-only", {"r_phase_ohm": two_scatters()}).document()
+    again = datasheet_of(json.loads(canonical_json(document))).constants["r_phase_ohm"]
+    assert again.budget == two_scatters().budget
+
+
+def test_a_datasheet_whose_contributions_tell_no_freedom_keeps_its_total() -> None:
+    """As the registry holds them from before."""
+    document = json.loads(
+        canonical_json(sheet("r-only", {"r_phase_ohm": two_scatters()}).document())
+    )
+    for said in (document["constants"]["r_phase_ohm"], *document["alternatives"]):
+        for part in said["budget"]:
+            del part["dof"]
+    again = datasheet_of(document).constants["r_phase_ohm"]
+    assert again.dof == pytest.approx(9.0 / 0.11)
 
 
 def reasons(text: str) -> set[str]:
