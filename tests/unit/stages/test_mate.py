@@ -18,10 +18,16 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.stages.fleet.pools import core_count
 from pipeline.stages.mate import halves, mate
 from tests.unit.criticism.machines import BASE, machine
 
-workers = pytest.mark.workers
+two_cores = pytest.mark.skipif(core_count() < 2, reason="a second worker needs a second core")
+
+
+def workers(test):
+    """A test that starts worker processes, where there is a core for one."""
+    return pytest.mark.workers(two_cores(test))
 
 
 def slow_turn(number: int) -> Capture:
