@@ -80,6 +80,22 @@ def _curved(size_nm):
     return lambda omega, _: size_nm * omega * np.abs(omega) / 250.0**2
 
 
+def test_choices_are_made_again_on_every_rung_and_at_the_end_of_what_is_asked_for(monkeypatch):
+    made = []
+
+    def watched(_, found, around):
+        made.append([effect.name for effect in found.model.effects])
+        return found, around
+
+    for place in ("selection", "asked"):
+        monkeypatch.setattr(f"pipeline.criticism.{place}.reconsidered", watched)
+    hidden = (with_drag(_curved(0.02)), with_drag(_curved(0.02), 6))
+    assert search(hidden, cautious(hidden, 3.0), LIBRARY)[-1].added == ("windage",)
+    assert made == [["windage"]]
+    fit_of(hidden, Model(machine(), (effects()["stribeck"],)))
+    assert made == [["windage"], ["stribeck"]]
+
+
 def _asking_for(negligible):
     """The library with windage that nobody minds below a part of the machine's torque."""
     windage = effects()["windage"]
