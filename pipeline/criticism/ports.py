@@ -74,7 +74,7 @@ def ports(machine: Machine, hooks: Iterable[str] = ("torque", "drop", "flux")) -
 
 def refined(port: Port, machine: Machine) -> Port:
     """The same port with narrow hats instead of a few smooth curves, where it has a curve."""
-    if port.variable is None or port.hook == "flux":
+    if port.variable is None or (port.hook == "flux" and port.variable.kind == "turn"):
         return port
     return _port(
         port.hook, port.variable, fine(port.variable, machine), port.carriers, port.signals
@@ -164,16 +164,32 @@ def _drop_ports(machine: Machine) -> list[Port]:
 
 
 def _flux_ports(machine: Machine) -> list[Port]:
+    """Co-energy that turns with the rotor, an inductance that goes with a temperature, any map."""
     d, q = (
         Carrier((), "", "x.id_a", lambda x: x.id_a),
         Carrier((), "", "x.iq_a", lambda x: x.iq_a),
     )
-    turn = variables(machine)["theta_elec_rad"]
+    known = variables(machine)
     both = ("psi_d_wb", "psi_q_wb")
+    turned = ((d, q), known["theta_elec_rad"])
+    stored = tuple(_stored(axis, 2.0 * machine.scales["current_a"]) for axis in ("d", "q"))
+    warm = ((stored, known[name]) for name in ("temp_winding_degc", "temp_magnet_degc"))
     return [
-        _port("flux", turn, coarse(turn, machine), (d, q), both),
+        *(_port("flux", v, coarse(v, machine), pair, both) for pair, v in (turned, *warm)),
         _flux_map(),
     ]
+
+
+def _stored(axis: str, twice_a: float) -> Carrier:
+    """What an inductance of one axis stores: a co-energy with the square of its current."""
+    name = f"i{axis}_a"
+
+    def square(x: Operating) -> Any:
+        current = getattr(x, name)
+        return current * current / float(f"{twice_a:.6g}")
+
+    code = f"x.{name} * x.{name} / {twice_a:.6g}"
+    return Carrier((name,), f"{name}²/({twice_a:.4g} A)", code, square)
 
 
 def _parameters(names: Iterable[str], hook: str) -> tuple[Parameter, ...]:
