@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.curves import coarse, fine, variables
+from pipeline.criticism.effect import Effect, Parameter
+from pipeline.criticism.model import Model
 from pipeline.criticism.ports import ports, refined
+from pipeline.criticism.residuals import residual
 from pipeline.criticism.terms import CENTRED, SHAPES, Term
 from pipeline.criticism.unknown import unknown_structure
-from tests.unit.criticism.machines import log, machine, operating
+from tests.unit.criticism.machines import BASE, log, machine, operating
 from tests.unit.criticism.test_selection import fitted, with_drag
 
 
@@ -64,6 +67,53 @@ def test_a_brake_comes_out_as_one_term_with_its_peak_and_speed(tmp_path):
     peak = re.search(r"odd, with its maximum (\S+) N·m at (\S+) rad/s", found.shape)
     assert float(peak[1]) == pytest.approx(0.03, rel=0.02)
     assert float(peak[2]) == pytest.approx(70.0, rel=0.03)
+
+
+def _softening(seed, fall_h_k):
+    """A log of a machine whose q inductance falls with the winding's temperature."""
+    warm = _warmed(seed).recorded["temp_winding_degc"]
+    segment = log(noise=1.0, seed=seed)
+    columns = {"temp_winding_degc": warm, "temp_magnet_degc": np.full(segment.size, 25.0)}
+    segment = replace(segment, recorded={**segment.recorded, **columns})
+    soft = Effect(
+        "soft",
+        "L_q falls",
+        "",
+        (),
+        "",
+        "",
+        (Parameter("fall_h_k", "H/K", 1.0, 0.1),),
+        coenergy=lambda x, q: -0.5 * q["fall_h_k"] * x.winding_k * x.iq_a * x.iq_a,
+    )
+    plain, model = Model(machine(), ()), Model(machine(), (soft,))
+    values = {**BASE, "soft.fall_h_k": fall_h_k}
+    more = residual(segment, plain, BASE) - residual(segment, model, values)
+    added = dict(zip(segment.channels, more, strict=True))
+    return replace(
+        segment,
+        recorded={n: column + added.get(n, 0.0) for n, column in segment.recorded.items()},
+    )
+
+
+def test_an_inductance_that_goes_with_a_temperature_comes_out_as_one_term(tmp_path):
+    fall = 2e-3 * BASE["lq_h"]
+    segments = tuple(_softening(seed, fall) for seed in (5, 6))
+    found, _ = unknown_structure(segments, fitted(segments), ["vd_v", "vq_v"], name="mine")
+    assert found.variables[0] == "temp_winding_degc" and "iq_a" in found.variables
+    ((term, size, unit),) = found.sketch
+    assert "q axis: iq_a²" in term
+    scale = float(re.search(r"u = \(temp_winding_degc - 25 degC\)/\((\S+) K\)", term)[1])
+    current = machine().scales["current_a"]
+    assert (size, unit) == (pytest.approx(-fall * scale * current, rel=0.03), "Wb")
+    path = tmp_path / "mine.py"
+    path.write_text(found.source, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("mine", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    x = operating()
+    (name,) = (p.name for p in module.EFFECT.parameters)
+    stored = module.EFFECT.coenergy(x, {name: size})
+    assert stored == pytest.approx(-0.5 * fall * x.winding_k * x.iq_a**2, rel=0.03)
 
 
 def shiver(omega, _):
