@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from scipy.special import gammaincc
@@ -56,6 +56,7 @@ _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
 )
+_AGAINST = "captures speak against it: see the note"
 _SEEN = 3.0
 """Standard deviations of a typical size from which on captures would show an effect."""
 _AS_GOOD = 0.1
@@ -97,7 +98,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     last = rungs[-1]
     offered = candidates(library, last.fitted)
     missing = last.added
-    ranking = _ranking(rungs, held, offered, library, found)
+    ranking = _ranking(rungs, held, offered, library, found, against)
     unexcited = _unexcited(campaign, library, last, offered)
     verdict = _verdict(missing, left, rungs, held, unexcited)
     return Diagnosis(
@@ -114,7 +115,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *told_hum(start_fit.hum),
             *(() if calm is None else (_WANDER,)),
             *(() if within is None else (_WITHIN,)),
-            *against,
+            *against.values(),
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
         ),
@@ -158,7 +159,7 @@ def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
 
 def _climbed(
     start: Begun, library: dict[str, Effect]
-) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...], tuple[str, ...]]:
+) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...], dict[str, str]]:
     """The ladder as far as it is trusted, its held-out errors, what is left at its end, and a note
     on every effect that would have taken some of that, had not captures spoken against it.
     """
@@ -167,8 +168,8 @@ def _climbed(
     alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
     held = in_common([r.around for r in kept], alone[: len(kept)])
-    against = (denied(rung) for rung in rungs[len(kept) :])
-    return kept, list(held), left, tuple(note for note in against if note)
+    against = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
+    return kept, list(held), left, {name: note for name, note in against.items() if note}
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -253,6 +254,7 @@ def _ranking(
     offered: Sequence[Candidate],
     library: dict[str, Effect],
     captured: Sequence[Segment],
+    against: Collection[str],
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last rung."""
     last = rungs[-1]
@@ -285,6 +287,7 @@ def _ranking(
             )
         )
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
+    others = [replace(r, shortfall=_AGAINST) if r.effect in against else r for r in others]
     return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
 
 
