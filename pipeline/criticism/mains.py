@@ -244,7 +244,7 @@ class _Spectrum:
             line = float(power[top])
             one_sine = line / (line + _PARTS * level)
             skirt = power[max(middle - _LOBE * _FINER, 0) : middle + _LOBE * _FINER + 1].max()
-            if max(line, skirt) > min(line, most) or self._share(flat, top) < _STEADY * one_sine:
+            if skirt > min(line, most) or self._share(flat, top) < _STEADY * one_sine:
                 line = level
             told.append((line, level))
         return told
