@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Machine, Operating
-from pipeline.criticism.model import GAINS
+from pipeline.criticism.model import GAINS, Model
+from pipeline.criticism.registry import effects
 from pipeline.criticism.segment import Segment
+from pipeline.criticism.system import Fitted, floors
 from pipeline.numerics.projection import projection
 
 BASE = {
@@ -144,3 +149,44 @@ def coasting(n: int = 3000, seed: int = 5) -> Segment:
         weak,
         {"ambient_k": 0.0},
     )
+
+
+LIBRARY = {
+    name: effects()[name]
+    for name in ("coulomb_friction", "windage", "stribeck", "dead_time", "saturation", "unbalance")
+}
+
+
+def fitted(segments, **start):
+    """The fit from the true constants, or from others that are given."""
+    model = Model(machine(), ())
+    begun = Fitted(model, {**BASE, **start}, floors(segments, model, BASE), BASE)
+    return gauss_newton(segments, begun)[0]
+
+
+def cautious(segments, times):
+    """A fit whose noise floors are some times what the sensors' noise makes."""
+    model = Model(machine(), ())
+    sigma = tuple(times * one for one in floors(segments, model, BASE))
+    return gauss_newton(segments, Fitted(model, dict(BASE), sigma, BASE))[0]
+
+
+def with_drag(drag, seed=5):
+    """The log with a further drag of speed and angle [N·m] at its shaft."""
+    segment = log(noise=1.0, seed=seed)
+    theta = segment.recorded["theta_mech_rad"]
+    omega = np.gradient(log().recorded["theta_mech_rad"], 5e-5)
+    torque = segment.recorded["torque_shaft_nm"] - drag(omega, theta)
+    return replace(segment, recorded={**segment.recorded, "torque_shaft_nm": torque})
+
+
+def curved(size_nm):
+    """A drag as windage has it [N·m], of this size at 250 rad/s."""
+    return lambda omega, _: size_nm * omega * np.abs(omega) / 250.0**2
+
+
+def asking_for(negligible):
+    """The library with windage that nobody minds below a part of the machine's torque."""
+    windage = effects()["windage"]
+    parameters = tuple(replace(p, negligible=negligible) for p in windage.parameters)
+    return {**LIBRARY, "windage": replace(windage, parameters=parameters)}

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.diagnosis import _as_told
 from pipeline.criticism.judge import (
     in_common,
@@ -18,8 +19,8 @@ from pipeline.criticism.judge import (
 )
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
-from pipeline.criticism.system import Fitted, System, system
-from tests.unit.criticism.machines import BASE, log, machine
+from pipeline.criticism.system import Fitted, System, own_columns, system
+from tests.unit.criticism.machines import BASE, fitted, log, machine
 
 ROWS = 400
 
@@ -142,3 +143,34 @@ def test_few_samples_are_over_their_floor_by_chance_far_more_often(count, q, tol
         unit=np.ones(count),
     )
     assert bool(over_floor(few, (running,), few.residual)) == told
+
+
+def test_a_capture_left_out_is_predicted_from_the_others():
+    """As a fit to the others alone predicts it, which is not as the fit to all of them has it."""
+    segments = tuple(log(noise=1.0, seed=n) for n in (5, 6, 7))
+    start = fitted(segments)
+    around = system(segments, start)
+    held = leave_out(around, len(own_columns(start.model)))
+    assert np.isfinite(held.residual).all()
+    in_sample = np.sqrt(np.mean((around.residual / around.soft) ** 2))
+    assert in_sample < held.total < 1.2
+    capture = np.array([number for number, _, _ in around.labels])[around.group]
+    for number in range(3):
+        others = [n for n in range(3) if n != number]
+        less = replace(start, sigma=tuple(start.sigma[n] for n in others))
+        alone = gauss_newton([segments[n] for n in others], less)[0]
+        told = system(segments, replace(start, values=alone.values)).residual[capture == number]
+        assert held.residual[capture == number] == pytest.approx(told, abs=1e-3)
+        assert np.abs(told - around.residual[capture == number]).max() > 0.1
+
+
+def test_one_capture_alone_has_the_error_of_its_fit_and_says_so():
+    start = fitted((log(noise=1.0),))
+    around = system((log(noise=1.0),), start)
+    held = leave_out(around, len(own_columns(start.model)))
+    assert not np.isfinite(held.residual).any()
+    rms = np.sqrt(np.mean((around.residual / around.soft) ** 2))
+    assert held.total == pytest.approx(rms, rel=1e-12)
+    assert "of the fit" in held.notes[0]
+    two = tuple(log(noise=1.0, seed=n) for n in (5, 6))
+    assert leave_out(system(two, fitted(two)), len(own_columns(start.model))).notes == ()

@@ -15,11 +15,11 @@ from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
 from pipeline.criticism.registry import effects
 from pipeline.criticism.scores import Candidate, Score
-from pipeline.criticism.selection import Rung, _holds, _refitted, _sure
+from pipeline.criticism.selection import Rung, _holds, _refitted, _sure, search
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.criticism.trust import denied, explained, trusted
 from pipeline.records.diagnosis import Remainder
-from tests.unit.criticism.machines import BASE, log, machine
+from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
 
 
 def missing_by(**spreads):
@@ -210,3 +210,14 @@ def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
     held = [HeldOut(np.zeros(1), total) for total in (math.e**4, math.e**3, math.e, math.e**1.5)]
     assert _drop(rungs, held, "saturation") == pytest.approx(2.0 / 2.5)
     assert _drop(rungs, held, "windage") == 0.0
+
+
+@pytest.mark.parametrize(("after", "kept"), [(9.5, 1), (8.5, 1), (5.0, 2)])
+def test_beside_an_unknown_a_name_must_take_a_fifth_of_the_error(after, kept):
+    segments = tuple(with_drag(lambda _, theta: 0.3 * np.cos(3.0 * theta), n) for n in (5, 6))
+    (first,) = search(segments, fitted(segments), {})
+    second = replace(first, added=("windage",))
+    totals = [HeldOut(first.around.residual, total) for total in (10.0, after)]
+    rungs, left = trusted(segments, (first, second), totals)
+    assert len(rungs) == kept
+    assert {one.signal for one in left} >= {"torque_shaft_nm"}

@@ -11,13 +11,14 @@ import pytest
 
 from pipeline.criticism.curves import coarse, fine, variables
 from pipeline.criticism.effect import Effect, Parameter
+from pipeline.criticism.judge import remainder
 from pipeline.criticism.model import Model
 from pipeline.criticism.ports import ports, refined
 from pipeline.criticism.residuals import residual
+from pipeline.criticism.system import system
 from pipeline.criticism.terms import CENTRED, SHAPES, Term
 from pipeline.criticism.unknown import unknown_structure
-from tests.unit.criticism.machines import BASE, log, machine, operating
-from tests.unit.criticism.test_selection import fitted, with_drag
+from tests.unit.criticism.machines import BASE, fitted, log, machine, operating, with_drag
 
 
 def told(drag, tmp_path):
@@ -254,3 +255,19 @@ def test_every_port_is_zero_at_zero_and_has_a_name_of_its_own():
             assert not np.any(hook(x, q))
         if fine_port is not port:
             assert fine_port.effect.name != port.effect.name
+
+
+def test_an_unknown_drag_is_told_by_its_variable_and_curve():
+    """An eddy-current brake, in no library: peak 0.2 N·m at 40 rad/s, falling beyond."""
+
+    def drag(omega, _):
+        return 0.4 * (omega / 40.0) / (1.0 + (omega / 40.0) ** 2)
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    start = fitted(segments)
+    assert remainder(system(segments, start), segments, system(segments, start).residual)
+    sketch, gain = unknown_structure(segments, start, ["torque_shaft_nm"])
+    assert gain > 100.0
+    assert sketch.signal == "torque_shaft_nm"
+    assert sketch.variables == ("omega_mech_rad_s",)
+    assert {unit for _, _, unit in sketch.sketch} == {"N·m"}

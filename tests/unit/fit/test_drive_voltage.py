@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.fit.estimators.drive_voltage import ESTIMATOR
+from pipeline.fit.magnet_coefficient import SOURCE, U_USUAL_1_K
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import type_b
 from tests.recovery.simulated import MOTOR, recorded
+from tests.simulated import design
+from tests.unit.fit.mechanical import fitted
+from tests.unit.fit.mechanical import recorded as exactly_recorded
 from tests.unit.fit.signals import capture, estimates, known_value
 
 
@@ -52,3 +61,32 @@ def test_a_mean_over_a_period_is_taken_back_to_its_instant(timing: str) -> None:
     found = estimates(ESTIMATOR, log, known=pairs)
     assert found["ke_phase_peak_v_s_rad"].number == pytest.approx(ke, rel=1e-3)
     assert found["r_phase_ohm"].number == pytest.approx(r, rel=3e-3)
+
+
+def test_back_emf_constant_from_a_drive() -> None:
+    """One log at 25, one at 42 degC: what is assumed of the magnet is in u until it is measured."""
+    motor = design("gimbal-5208")
+    coefficient = Estimate(
+        "temp_coeff_magnet_1_k", -0.0011, "1/K", "measured", "given", type_b("x", 1e-5)
+    )
+    for given, source in ((Constants((coefficient,)), "x"), (Constants(), SOURCE)):
+        ke, r_phase = fitted(ESTIMATOR, exactly_recorded(), given).estimates
+        low, high = ke.interval()
+        assert low <= motor.pole_pairs * motor.psi_pm_wb <= high
+        share = next(p.u for p in ke.budget if p.source == source)
+        assert ke.u < 0.003 * ke.number or source == SOURCE
+        assert abs(share) > 5.0 * (1e-5 if source == "x" else U_USUAL_1_K) * ke.number
+        assert r_phase.number == pytest.approx(motor.r_phase_ohm, rel=0.02)
+
+
+def test_angle_counts_where_the_bench_lags() -> None:
+    """The bench's own speed, late by 20 ms, must not change anything where the angle is there."""
+    captures = exactly_recorded()
+    late = []
+    for one in captures.of("drive"):
+        table = one.tables[0]
+        rate = 1.0 / float(table["t_s"][1] - table["t_s"][0])
+        shifted = table["omega_mech_rad_s"].shift(round(0.02 * rate), fill_value=0.0)
+        late.append(replace(one, tables=(table.with_columns(shifted.alias("omega_mech_rad_s")),)))
+    slow = fitted(ESTIMATOR, Campaign("m", tuple(late))).estimates
+    assert slow == fitted(ESTIMATOR, captures).estimates
