@@ -46,7 +46,7 @@ class Basis:
     names: tuple[str, ...]
     nodes: Array
     mix: Array
-    orders: tuple[int, ...]
+    orders: tuple[float, ...]
     period: float | None
 
     def curve(self, at: Any, weights: Array) -> Any:
@@ -153,23 +153,23 @@ def fine(variable: Variable, machine: Machine) -> Basis:
     """Hats narrow enough for any curve that the sketch may try, and the waves they miss."""
     nodes = _nodes(variable)
     periodic = variable.kind == "turn"
-    high: tuple[int, ...] = ()
+    high: tuple[float, ...] = ()
     if periodic:
-        high = tuple(k for k in _orders(variable, machine) if k > LOWEST[-1])
+        high = tuple(k for k in _orders(variable, machine) if k not in LOWEST)
     names = tuple(f"k{n}" for n in range(nodes.size)) + _wave_names(high)
     return Basis(names, nodes, np.eye(nodes.size), high, TURN_RAD if periodic else None)
 
 
-def waves(orders: tuple[int, ...]) -> Basis:
+def waves(orders: tuple[float, ...]) -> Basis:
     """Sine and cosine of each order."""
     return Basis(_wave_names(orders), np.empty(0), np.empty((0, 0)), orders, TURN_RAD)
 
 
-def _wave_names(orders: tuple[int, ...]) -> tuple[str, ...]:
+def _wave_names(orders: tuple[float, ...]) -> tuple[str, ...]:
     return tuple(f"{wave}{k}" for k in orders for wave in ("sin", "cos"))
 
 
-def _orders(variable: Variable, machine: Machine) -> tuple[int, ...]:
+def _orders(variable: Variable, machine: Machine) -> tuple[float, ...]:
     if variable.name == "theta_elec_rad":
         return (*LOWEST, 12)
     p = machine.pole_pairs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from scipy.special import gammaincc
 
@@ -63,6 +63,24 @@ _AS_GOOD = 0.1
 """Share of the fall that a rival's promise may be short of."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Ladder:
+    """The rungs as far as they are trusted and where they began, their held-out errors, what is
+    `left` at their end, and a note on every effect that would have taken some of that, had not
+    captures spoken `against` it.
+    """
+
+    begun: Begun
+    rungs: tuple[Rung, ...]
+    held: list[HeldOut]
+    left: tuple[Remainder, ...]
+    against: dict[str, str]
+
+    def explains(self, left: Sequence[Remainder]) -> bool:
+        """Whether its names explain what the captures show, but for what is `left`."""
+        return explained(self.rungs, self.held, left)
+
+
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
     """Which physical effects a model of one motor lacks, from its captures alone.
 
@@ -70,37 +88,47 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     """
     machine = machine_of(campaign, start)
     library = effects(model.effects_path)
+
     found = segments(campaign, machine)
     if not _enough(found):
         return _insufficient(campaign, model, library)
-    start_fit = fit_of(found, model_of(model, machine))
-    rungs, held, left, against = _climbed(start_fit, library)
-    unlooked = orders_left(start_fit.segments, rungs[-1].around)
-    if unlooked:
-        machine = replace(machine, load_orders=unlooked)
-        start_fit = fit_of(segments(campaign, machine), model_of(model, machine))
-        rungs, held, left, against = _climbed(start_fit, library)
-    found = start_fit.segments
+
+    def climb(*orders: float) -> _Ladder:
+        """The ladder where equations look at these orders a turn besides those of the design."""
+        wider = replace(machine, load_orders=orders)
+        return _climbed(fit_of(segments(campaign, wider), model_of(model, wider)), library)
+
+    ladder = _climbed(fit_of(found, model_of(model, machine)), library)
+    unlooked = orders_left(ladder.begun.segments, ladder.rungs[-1].around)
+    whole = tuple(order for order in unlooked if isinstance(order, int))
+    if whole:
+        ladder = climb(*whole)
     stem = f"{file_stem(campaign.motor_id)}_unknown"
-    sketch = _unknown(found, rungs, held, left, stem)
-    large, calm = _large(found, rungs, left), None
-    if sketch is None and not explained(rungs, held, large):
-        calm = wandering(found, rungs[-1].fitted, large)
+    sketch = _unknown(ladder, ladder.left, stem)
+    if sketch is None and len(unlooked) > len(whole) and not ladder.explains(ladder.left):
+        # steps of a programme make lines of any order too, and these predict no other capture
+        between = climb(*unlooked)
+        sketch = _unknown(between, between.left, stem)
+        ladder = between if sketch is not None else ladder
+    found, left, calm = ladder.begun.segments, ladder.left, None
+    large = _large(found, ladder.rungs, left)
+    if sketch is None and not ladder.explains(large):
+        calm = wandering(found, ladder.rungs[-1].fitted, large)
     if calm is not None:
         found = calm
-        calmed = gauss_newton(found, start_fit.fitted)
-        rungs, held, left, against = _climbed(Begun(calm, *calmed, start_fit.hum), library)
-        left = _large(found, rungs, left)
-        sketch = _unknown(found, rungs, held, left, stem)
-    within = None if sketch else _unknown(found, rungs, held, left, stem, in_parts=True)
+        calmed = gauss_newton(found, ladder.begun.fitted)
+        ladder = _climbed(Begun(calm, *calmed, ladder.begun.hum), library)
+        left = _large(found, ladder.rungs, ladder.left)
+        sketch = _unknown(ladder, left, stem)
+    within = None if sketch else _unknown(ladder, left, stem, in_parts=True)
     sketch = sketch or within
-    left = left if sketch else _large(found, rungs, left)
-    last = rungs[-1]
+    left = left if sketch else _large(found, ladder.rungs, left)
+    rungs, held, last = ladder.rungs, ladder.held, ladder.rungs[-1]
     offered = candidates(library, last.fitted)
     missing = last.added
-    ranking = _ranking(rungs, held, offered, library, found, against)
+    ranking = _ranking(rungs, held, offered, library, found, ladder.against)
     unexcited = _unexcited(campaign, library, last, offered)
-    verdict = _verdict(missing, left, rungs, held, unexcited)
+    verdict = _verdict(ladder, left, unexcited)
     return Diagnosis(
         campaign.motor_id,
         model.name,
@@ -112,10 +140,10 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         _as_told(found, last.around, left),
         (
             *_unused(campaign, found),
-            *told_hum(start_fit.hum),
+            *told_hum(ladder.begun.hum),
             *(() if calm is None else (_WANDER,)),
             *(() if within is None else (_WITHIN,)),
-            *against.values(),
+            *ladder.against.values(),
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
         ),
@@ -157,19 +185,15 @@ def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
     return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
 
 
-def _climbed(
-    start: Begun, library: dict[str, Effect]
-) -> tuple[tuple[Rung, ...], list[HeldOut], tuple[Remainder, ...], dict[str, str]]:
-    """The ladder as far as it is trusted, its held-out errors, what is left at its end, and a note
-    on every effect that would have taken some of that, had not captures spoken against it.
-    """
+def _climbed(start: Begun, library: dict[str, Effect]) -> _Ladder:
     found = start.segments
     rungs = search(found, start.fitted, library)
     alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
     held = in_common([r.around for r in kept], alone[: len(kept)])
     against = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
-    return kept, list(held), left, {name: note for name, note in against.items() if note}
+    noted = {name: note for name, note in against.items() if note}
+    return _Ladder(start, kept, list(held), left, noted)
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -201,33 +225,23 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
 
 
 def _unknown(
-    found: Sequence[Segment],
-    rungs: Sequence[Rung],
-    held: Sequence[HeldOut],
-    left: Sequence[Remainder],
-    name: str,
-    in_parts: bool = False,
+    ladder: _Ladder, left: Sequence[Remainder], name: str, in_parts: bool = False
 ) -> UnknownStructure | None:
     """What the structure depends on that no effect explains; None where there is none, or where
     nothing that the machine does predicts it.
     """
-    if explained(rungs, held, left):
+    if ladder.explains(left):
         return None
-    last = rungs[-1]
+    last = ladder.rungs[-1]
     signals = list(dict.fromkeys(r.signal for r in left))
+    found = ladder.begun.segments
     return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]
 
 
-def _verdict(
-    missing: Sequence[str],
-    left: Sequence[Remainder],
-    rungs: Sequence[Rung],
-    held: Sequence[HeldOut],
-    unexcited: Sequence[Unexcited],
-) -> Verdict:
-    if left and not explained(rungs, held, left):
+def _verdict(ladder: _Ladder, left: Sequence[Remainder], unexcited: Sequence[Unexcited]) -> Verdict:
+    if left and not ladder.explains(left):
         return "unknown"
-    if missing:
+    if ladder.rungs[-1].added:
         return "missing"
     return "insufficient" if unexcited else "adequate"
 

@@ -80,7 +80,8 @@ class Machine:
 
     `scales` [unit of the name's suffix]: the largest current, speed, torque and voltage seen,
     the sample period, and what follows from them. `torque_orders` are the orders per turn that
-    stand out of a slow turn, `load_orders` others that a fit left in logs under load, `slots` the
+    stand out of a slow turn, `load_orders` others that a fit left in logs under load, of which some
+    may be no whole numbers, `slots` the
     nameplate's. `stated_u`: the standard uncertainty of the
     station's gains and thermometers by the name of the nuisance that stands for each;
     `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none.
@@ -92,7 +93,7 @@ class Machine:
     torque_orders: tuple[int, ...] = ()
     stated_u: Mapping[str, float] = field(default_factory=dict)
     encoder_rad: float = 0.0
-    load_orders: tuple[int, ...] = ()
+    load_orders: tuple[float, ...] = ()
 
     @property
     def cogging_order(self) -> int | None:

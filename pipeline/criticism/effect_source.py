@@ -23,7 +23,7 @@ The form below is a fit, not physics. Once you know the cause:
 - name its parameters and give each its unit, its typical size and bounds;
 - rename the effect and fill in words, signature, experiment and reference.
 
-    compare model.effects=[{name}] effects_path=<this folder>
+    compare "model.effects=['{name}']" effects_path=<this folder>
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _body(port: Port, found: Expression, current_a: float) -> Iterator[str]:
 def _summand(port: Port, n: int, term: Term, current_a: float) -> str:
     amplitude = f'q["{_amplitude(port, n)}"]'
     if term.kind == POWER or port.variable is None:
-        d, q = port.monomials[term.order]
+        d, q = port.monomials[term.monomial]
         return f"{amplitude} * {current_a:.6g} * d**{d} * i**{q}"
     scale = f'q["{_scale(port, n)}"]' if "scale" in term.free else f"{term.scale:.6g}"
     centre = f'q["{_centre(port, n)}"]'

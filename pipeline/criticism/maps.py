@@ -235,7 +235,8 @@ def _turns(segment: Segment) -> bool:
 
 def _mechanical_cells(model: Model) -> int:
     """Four cells a wave of the highest order that a slow turn is looked at in."""
-    return min(max(4 * max(slow_orders(model.machine), default=1), 72), _MOST_ANGLE_CELLS)
+    highest = math.ceil(max(slow_orders(model.machine), default=1))
+    return min(max(4 * highest, 72), _MOST_ANGLE_CELLS)
 
 
 def _by_angle(

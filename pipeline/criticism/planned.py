@@ -114,7 +114,7 @@ def _shaft(
     recorded: Mapping[str, Array],
     noise: Mapping[str, float],
     channel: str,
-    orders: tuple[int, ...],
+    orders: tuple[float, ...],
 ) -> Segment:
     theta = recorded["theta_mech_rad"]
     slow = test == "cogging"

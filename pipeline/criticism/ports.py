@@ -102,12 +102,19 @@ def _torque_ports(machine: Machine) -> list[Port]:
         f"np.real(x.iq_a) / {current:.6g}",
         lambda x: np.real(x.iq_a) / float(f"{current:.6g}"),
     )
+    load = Carrier(
+        ("iq_a",),
+        f"|iq_a|/({current:.4g} A)",
+        f"np.abs(np.real(x.iq_a)) / {current:.6g}",
+        lambda x: np.abs(np.real(x.iq_a)) / float(f"{current:.6g}"),
+    )
     warm, turn = ("temp_winding_degc", "temp_magnet_degc"), ("theta_mech_rad", "theta_elec_rad")
     pairs = (
         *((one, name) for name in ("omega_mech_rad_s", "iq_a", "id_a", *warm, *turn)),
         *((omega, name) for name in (*warm, turn[0], "i_a")),
         *((sense, name) for name in (*warm, turn[0], "i_a")),
         *((iq, name) for name in (*warm, *turn, "omega_mech_rad_s")),
+        (load, turn[0]),
     )
     known = variables(machine)
     shaft = ("torque_shaft_nm",)

@@ -143,17 +143,18 @@ def row_index(
     orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
     windows = segment.size if weak is None else weak.starts.size
     valid = np.ones((windows, 1), dtype=bool) if weak is None else weak.valid
-    distinct = sorted(set(orders.tolist()))
+    told = [int(k) if k == int(k) else k for k in orders.tolist()]
+    distinct = sorted(set(told))
     groups = tuple((c, k) for c in segment.channels for k in distinct)
     number = {group: n for n, group in enumerate(groups)}
     shape = (len(segment.channels), windows, orders.size)
-    table = np.array([[number[(c, k)] for k in orders.tolist()] for c in segment.channels])
+    table = np.array([[number[(c, k)] for k in told] for c in segment.channels])
     group = np.broadcast_to(table[:, None, :], shape)
     window = np.broadcast_to(np.arange(windows)[None, :, None], shape)
     return group, window, np.broadcast_to(valid[None], shape), groups
 
 
-def electrical_orders(machine: Machine) -> tuple[int, ...]:
+def electrical_orders(machine: Machine) -> tuple[float, ...]:
     """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn; and others
     that were seen under load.
     """
@@ -161,7 +162,7 @@ def electrical_orders(machine: Machine) -> tuple[int, ...]:
     return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *machine.load_orders}))
 
 
-def slow_orders(machine: Machine) -> tuple[int, ...]:
+def slow_orders(machine: Machine) -> tuple[float, ...]:
     """Orders a turn looked at in a slow turn."""
     seen = set(electrical_orders(machine)) | set(machine.torque_orders)
     if machine.slots:

@@ -122,7 +122,7 @@ class Pursuit:
         basis = self.port.basis
         found = np.zeros(self.around.matrix.shape[1] - self.own)
         if basis is None or term.kind == POWER:
-            found[term.order] = 1.0
+            found[term.monomial] = 1.0
             return found
         first = term.carrier * len(basis.names)
         nodes = basis.nodes.size
@@ -216,7 +216,7 @@ def _promising(pursuit: Pursuit, known: Sequence[Term], offered: Sequence[Group]
         if any(t in known for t in group):
             continue
         gain = pursuit.linear_gain(base, pursuit.curves(group))
-        key = tuple((t.kind, t.parity, t.carrier, t.order) for t in group)
+        key = tuple((t.kind, t.parity, t.carrier, t.order, t.monomial) for t in group)
         if gain > best.get(key, (0.0, group))[0]:
             best[key] = gain, group
     ranked = sorted(best.values(), key=lambda one: -one[0])
@@ -274,7 +274,7 @@ def _dictionary(port: Port) -> Iterator[Group]:
     """Every group of terms offered for a port, at trial scales."""
     variable, basis = port.variable, port.basis
     if variable is None or basis is None:
-        yield from ((Term(POWER, order=n),) for n in range(len(port.monomials)))
+        yield from ((Term(POWER, monomial=n),) for n in range(len(port.monomials)))
         return
     for carrier in range(len(port.carriers)):
         if variable.kind == "turn":
@@ -283,7 +283,7 @@ def _dictionary(port: Port) -> Iterator[Group]:
             yield from _shapes(variable, carrier)
 
 
-def _turning(orders: tuple[int, ...], curved: bool, carrier: int) -> Iterator[Group]:
+def _turning(orders: tuple[float, ...], curved: bool, carrier: int) -> Iterator[Group]:
     for k in (*(range(1, 9) if curved else ()), *orders):
         yield Term("sin", carrier, order=k), Term("cos", carrier, order=k)
     if curved:

@@ -64,7 +64,7 @@ def told(
 def _columns(port: Port, found: Expression) -> tuple[str, ...]:
     if not port.monomials:
         return port.columns
-    used = [port.monomials[term.order] for term in found.terms]
+    used = [port.monomials[term.monomial] for term in found.terms]
     names = ("id_a", "iq_a")
     kept = tuple(c for n, c in enumerate(names) if any(powers[n] for powers in used))
     return kept or names
@@ -144,7 +144,7 @@ def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:
     for axis in (0, 1):
         rows = []
         for term in found.terms:
-            powers = pursuit.port.monomials[term.order]
+            powers = pursuit.port.monomials[term.monomial]
             own, other = powers[axis], powers[1 - axis]
             rows.append(own * at ** max(own - 1, 0) if other == 0 else np.zeros(at.size))
         slopes = np.stack(rows) if rows else np.zeros((0, at.size))
@@ -230,7 +230,7 @@ def _term(port: Port, found: Expression, n: int, current_a: float) -> str:
     """One term in words, its carrier in front."""
     term = found.terms[n]
     if term.kind == POWER or port.variable is None:
-        d, q = port.monomials[term.order]
+        d, q = port.monomials[term.monomial]
         over = f"/({current_a:.4g} A)"
         parts = [f"(id_a{over})^{d}"] * (d > 0) + [f"(iq_a{over})^{q}"] * (q > 0)
         return " ".join(parts)

@@ -72,7 +72,7 @@ class Term:
 
     `kind` is the name of a shape, `sin` or `cos` (of `order`), `bump` (in a turn, at `centre`, of
     width `scale`), `hump` or `resonance` (exp(-u²) or 1/(1 + u²) around a `centre` that is not
-    zero, of width `scale`), or `power` (`order` numbers the port's monomials). A shape is `even`,
+    zero, of width `scale`), or `power` (`monomial` numbers the port's). A shape is `even`,
     `odd` (times the sign of u), or `plain` (of u itself, no size). `carrier` numbers the port's
     carriers.
     """
@@ -81,8 +81,9 @@ class Term:
     carrier: int = 0
     parity: str = "even"
     scale: float = 1.0
-    order: int = 0
+    order: float = 0
     centre: float = 0.0
+    monomial: int = 0
 
     @property
     def shape(self) -> Shape:
@@ -121,7 +122,9 @@ class Term:
         """The term in a formula, its scale with unit."""
         name = variable.name
         if self.kind in WAVES:
-            return f"{self.kind}({self.order} {name})" if self.order > 1 else f"{self.kind}({name})"
+            return (
+                f"{self.kind}({self.order:g} {name})" if self.order > 1 else f"{self.kind}({name})"
+            )
         if self.kind == "bump":
             return f"exp((cos({name} - {self.centre:.4g} rad) - 1)/({self.scale:.4g} rad)²)"
         over = f"({name} - {_ABOVE_DEGC:g} degC)" if variable.kind == "warm" else name

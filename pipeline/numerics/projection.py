@@ -30,7 +30,7 @@ class Projection:
 
     starts: NDArray[np.int64]
     functions: Array
-    orders: NDArray[np.int64]
+    orders: NDArray[np.int64] | Array
     valid: NDArray[np.bool_]
 
     @property
@@ -88,7 +88,7 @@ def projection(
     theta_rad: Array,
     starts: NDArray[np.int64],
     length: int,
-    orders: tuple[int, ...],
+    orders: tuple[float, ...],
     cycles: float = 3.0,
     margin: float = 16.0,
 ) -> Projection:
@@ -98,7 +98,8 @@ def projection(
     least `margin` samples each; an order that counts in none is left out.
     """
     window = bump(length)
-    tags, functions = [0], [np.broadcast_to(window, (starts.size, length))]
+    tags: list[float] = [0]
+    functions = [np.broadcast_to(window, (starts.size, length))]
     angle = sliding_window_view(theta_rad, length)[starts] if starts.size else np.empty((0, length))
     turns = np.abs(angle[:, -1] - angle[:, 0]) / (2 * np.pi)
     valid = [np.ones(starts.size, dtype=bool)]

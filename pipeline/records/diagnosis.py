@@ -134,7 +134,7 @@ class Remainder:
 
     capture: str
     signal: str
-    order: int
+    order: float
     chi2_per_n: float
     size: float
     matters: bool = True

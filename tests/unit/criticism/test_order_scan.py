@@ -11,9 +11,11 @@ from pipeline.criticism.model import Model
 from pipeline.criticism.order_scan import orders_left
 from pipeline.criticism.segment import electrical_orders, row_index
 from pipeline.criticism.system import Fitted, floors, system
+from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 
 PLAIN = Model(machine(), ())
+TORQUE = "torque_shaft_nm"
 
 
 def spinning(seed, waves=(), name="torque_shaft_nm"):
@@ -38,6 +40,29 @@ def test_waves_under_load_are_found_by_their_orders():
     both = [spinning(seed, ((16, 2e-3), (37, 3e-3))) for seed in (1, 2)]
     assert left(*both) == (16, 37)
     assert left(*[spinning(seed, ((19, 0.02),), "vq_v") for seed in (1, 2)]) == (19,)
+
+
+@pytest.mark.parametrize("order", [4.83, 16.4])
+def test_an_order_that_is_no_whole_number_is_told_as_close_as_the_angles_tell_it(order):
+    """Fourteen turns tell orders apart by a fourteenth, and one that is clear a hundred times as
+    well.
+    """
+    (found,) = left(*[spinning(seed, ((order, 6e-3),)) for seed in (1, 2)])
+    assert found == pytest.approx(order, abs=1e-3)
+
+
+def test_a_wave_that_changes_its_sense_with_the_current_has_a_whole_order():
+    """Its power lies beside the order, half of it on either side."""
+    both = [spinning(seed) for seed in (1, 2)]
+    theta, current = (both[0].recorded[name] for name in ("theta_mech_rad", "iq_a"))
+    added = 0.02 * np.sign(current) * np.cos(16.0 * theta)
+    waved = [
+        replace(
+            s, recorded={**s.recorded, "torque_shaft_nm": s.recorded["torque_shaft_nm"] + added}
+        )
+        for s in both
+    ]
+    assert left(*waved) == (16,)
 
 
 def test_what_the_equations_look_at_is_theirs():
@@ -65,3 +90,14 @@ def test_orders_that_were_seen_have_rows_of_their_own():
     seen = replace(machine(), load_orders=(16,))
     assert set(electrical_orders(seen)) - set(electrical_orders(machine())) == {16}
     assert ("torque_shaft_nm", 42) in row_index(log())[3]
+
+
+def test_groups_of_whole_orders_are_named_by_whole_numbers():
+    """Beside one that is not, so that a remainder of order 42 is told as 42."""
+    segment = log()
+    theta, weak = segment.recorded["theta_mech_rad"], segment.weak
+    orders = (4.83, 42)
+    mixed = replace(segment, weak=projection(theta, weak.starts, weak.length, orders, cycles=0.0))
+    named = {order for _, order in row_index(mixed)[3]}
+    assert named == {0, 4.83, 42}
+    assert {type(order) for order in named if order != 4.83} == {int}

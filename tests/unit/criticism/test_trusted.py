@@ -84,7 +84,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     monkeypatch.setattr("pipeline.criticism.diagnosis.search", lambda *_: found)
     monkeypatch.setattr("pipeline.criticism.diagnosis.leave_out", lambda *_: next(totals))
     monkeypatch.setattr("pipeline.criticism.diagnosis.in_common", lambda _, alone: list(alone))
-    *_, against = _climbed(Begun((log(),), first.fitted, first.around, ()), {})
+    against = _climbed(Begun((log(),), first.fitted, first.around, ()), {}).against
     assert list(against) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0)
     (ranked,) = _ranking((replace(first, scores=(score,)),), held[:1], (), {}, (), against)

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.curves import coarse, fine, variables
+from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect, Parameter
 from pipeline.criticism.judge import remainder
 from pipeline.criticism.model import Model
 from pipeline.criticism.ports import ports, refined
 from pipeline.criticism.residuals import residual
-from pipeline.criticism.system import system
+from pipeline.criticism.system import Fitted, floors, system
 from pipeline.criticism.terms import CENTRED, SHAPES, Term
 from pipeline.criticism.unknown import unknown_structure
 from tests.unit.criticism.machines import BASE, fitted, log, machine, operating, with_drag
@@ -271,3 +272,20 @@ def test_an_unknown_drag_is_told_by_its_variable_and_curve():
     assert sketch.signal == "torque_shaft_nm"
     assert sketch.variables == ("omega_mech_rad_s",)
     assert {unit for _, _, unit in sketch.sketch} == {"N·m"}
+
+
+def test_a_wave_of_an_order_that_is_no_whole_number_is_told_with_its_phase():
+    """0.03 N·m sin(4.83 θ + 0.5) at the largest current, whichever way that pushes."""
+    current = log().recorded["iq_a"]
+    top = machine().scales["current_a"]
+    load = 0.03 * np.abs(current) / top
+    segments = tuple(with_drag(lambda _, th: load * np.sin(4.83 * th + 0.5), n) for n in (5, 6))
+    model = Model(replace(machine(), load_orders=(4.83,)), ())
+    begun = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
+    sketch, _ = unknown_structure(segments, gauss_newton(segments, begun)[0], ["torque_shaft_nm"])
+    assert sketch.variables == ("theta_mech_rad", "iq_a")
+    sizes = {term: size for term, size, _ in sketch.sketch}
+    (sine,) = (size for term, size in sizes.items() if "sin(4.83 theta_mech_rad)" in term)
+    (cosine,) = (size for term, size in sizes.items() if "cos(4.83 theta_mech_rad)" in term)
+    assert np.hypot(sine, cosine) == pytest.approx(0.03, rel=0.02)
+    assert np.arctan2(cosine, sine) == pytest.approx(0.5, abs=0.02)
