@@ -18,7 +18,7 @@ from pipeline.criticism.model import BASE, PHYSICAL, Model
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import segments
-from pipeline.criticism.size import machine_of
+from pipeline.criticism.size import PAIRLESS, machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.capture import Campaign
@@ -33,6 +33,8 @@ from pipeline.records.comparison import (
 from pipeline.records.constants import Constants
 from pipeline.records.error_map import ErrorMap
 
+_IDLE = "no capture holds what an equation needs: record a torque map"
+
 
 def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Comparison:
     """Fits a model's parameters to all captures and tells its errors, capture by capture.
@@ -41,12 +43,13 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     capture that alone carries a constant.
     """
     machine = machine_of(campaign, start)
+    if machine is None:
+        return _nothing(campaign, model, model.effects, PAIRLESS)
     found = segments(campaign, machine)
     asked = model_of(model, machine)
     names = tuple(effect.name for effect in asked.effects)
     if not found:
-        note = "no capture holds what an equation needs: record a torque map"
-        return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
+        return _nothing(campaign, model, names, _IDLE)
     begun = fit_of(found, asked)
     found = begun.segments
     fitted, around = trimmed(found, begun.fitted, begun.around, names)
@@ -71,6 +74,11 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         bare,
         tuple(traces(found, fitted, simulated)),
     )
+
+
+def _nothing(campaign: Campaign, model: ModelSpec, names: tuple[str, ...], note: str) -> Comparison:
+    """No errors, and why there are none."""
+    return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
 
 
 def _parameters(fitted: Fitted, around: System, held: HeldOut) -> dict[str, ModelParameter]:

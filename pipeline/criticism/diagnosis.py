@@ -28,7 +28,7 @@ from pipeline.criticism.scores import TIE, Candidate, Score, candidates
 from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import TESTS, segments
 from pipeline.criticism.selection import Rung, loss_without, search
-from pipeline.criticism.size import machine_of
+from pipeline.criticism.size import PAIRLESS, machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import System, own_columns
 from pipeline.criticism.trust import denied, explained, trusted
@@ -47,6 +47,10 @@ from pipeline.records.diagnosis import (
 )
 from pipeline.records.naming import file_stem
 
+_TOO_LITTLE = (
+    "the captures cannot fit the base model: record a torque map or drive log with dq voltages, "
+    "currents and angle"
+)
 _WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
 _STATELESS = (
     "no state of the machine predicts what is left in captures it was not fitted to: see the "
@@ -88,10 +92,12 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     """
     machine = machine_of(campaign, start)
     library = effects(model.effects_path)
+    if machine is None:
+        return _insufficient(campaign, model, library, PAIRLESS)
 
     found = segments(campaign, machine)
     if not _enough(found):
-        return _insufficient(campaign, model, library)
+        return _insufficient(campaign, model, library, _TOO_LITTLE)
 
     def climb(*orders: float) -> _Ladder:
         """The ladder where equations look at these orders a turn besides those of the design."""
@@ -204,8 +210,9 @@ def _enough(found: Sequence[Segment]) -> bool:
     return "terminal" in kinds and bool(kinds & {"shaft", "open"})
 
 
-def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effect]) -> Diagnosis:
-    wanted = "a torque map or drive log with dq voltages, currents and angle"
+def _insufficient(
+    campaign: Campaign, model: ModelSpec, library: dict[str, Effect], note: str
+) -> Diagnosis:
     ranking = tuple(
         RankedEffect(e.name, 0.0, 0.0, 1.0, (), e.signature, e.experiment, {})
         for e in library.values()
@@ -219,7 +226,7 @@ def _insufficient(campaign: Campaign, model: ModelSpec, library: dict[str, Effec
         (),
         None,
         (),
-        (f"the captures cannot fit the base model: record {wanted}",),
+        (note,),
         asked=model.effects,
     )
 

@@ -196,7 +196,8 @@ def _lines(log: Log) -> list[float]:
     found: list[float] = []
     while len(found) < _MOST and count > 2 * _BESIDE:
         power = np.mean([part.spectrum(count) for part in parts], axis=0)
-        clear = power / median_filter(power, (1, 2 * _BESIDE + 1), mode="nearest")
+        beside = median_filter(power, (1, 2 * _BESIDE + 1), mode="nearest")
+        clear = power / np.maximum(beside, 1e-300)
         clear = np.where((power > log.least**2) & (grid >= _LOWEST), clear, 0.0).max(axis=0)
         best = int(np.argmax(clear))
         if clear[best] <= _STANDS_OUT:

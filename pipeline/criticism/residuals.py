@@ -17,7 +17,9 @@ from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Value
 from pipeline.criticism.model import Model, Pieces, air_gap_torque, evaluate, ripple, values_of
 from pipeline.criticism.operate import angle_error, current_slope, operate
 from pipeline.criticism.segment import Segment
+from pipeline.criticism.traces import LINES_V
 from pipeline.numerics.projection import Projection
+from pipeline.physics.frames import vector_of_lines
 
 RIPPLES = ("ripple_edge", "ripple_shift")
 TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
@@ -73,18 +75,7 @@ def measured(segment: Segment, signals: Mapping[str, Array], model: Model, value
 
 
 def _open_voltage(signals: Mapping[str, Array], model: Model, values: Values) -> Complex:
-    lines = {name: signals[name] for name in ("vab_v", "vbc_v", "vca_v") if name in signals}
-    if len(lines) == 3:
-        mean = sum(lines.values()) / 3.0
-        lines = {name: line - mean for name, line in lines.items()}
-    ab = lines.get("vab_v")
-    bc = lines.get("vbc_v")
-    if ab is None:
-        ab = -lines["vbc_v"] - lines["vca_v"]
-    if bc is None:
-        bc = -lines["vab_v"] - lines["vca_v"]
-    # a = (2 ab + bc)/3 and b - c = bc with a + b + c = 0
-    stationary = (2 * ab + bc) / 3.0 + 1j * bc / math.sqrt(3)
+    stationary = vector_of_lines({name: signals[name] for name in LINES_V if name in signals})
     eps = model.machine.pole_pairs * signals["theta_mech_rad"] - values["bench_angle_rad"]
     voltage: Complex = stationary * np.exp(-1j * eps)
     return voltage

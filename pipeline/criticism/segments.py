@@ -23,6 +23,7 @@ from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
 from pipeline.criticism.segments_table import flux_table
 from pipeline.criticism.traces import (
+    LINES_V,
     PAD,
     SMOOTHED,
     coarse_steps,
@@ -207,7 +208,7 @@ def _slow_turn(
 
 
 def _open(capture: Capture, machine: Machine) -> Segment | None:
-    lines = [n for n in ("vab_v", "vbc_v", "vca_v") if capture.has(n)]
+    lines = [n for n in LINES_V if capture.has(n)]
     if len(lines) < 2:
         return None
     extra = ["temp_magnet_degc"] if capture.has("temp_magnet_degc") else []

@@ -11,31 +11,46 @@ import numpy as np
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.noise import rounding_step
 from pipeline.criticism.orders import holding_orders
-from pipeline.criticism.traces import tellable
+from pipeline.criticism.traces import LINES_V, tellable
+from pipeline.numerics.orders import TURN_RAD
+from pipeline.physics.frames import vector_of_lines
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
 _TABLES = ("flux_map", "holding_current")
+_TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
+_LINES_A = ("ia_a", "ib_a", "ic_a")
 # orders a turn that a slow turn is searched for, and harmonics of the cogging order
 _HIGHEST = 400
 _HARMONICS = 3
 _SAME_STEP = 0.02
 
 
-def machine_of(campaign: Campaign, start: Constants) -> Machine:
-    """Pole pairs, slots and scales of the motor on the bench.
+PAIRLESS = (
+    "nothing tells the pole pairs, without which no speed means anything to the winding: record an "
+    "open circuit spin with line voltages and angle, or state pole_pairs in the captures"
+)
+
+
+def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
+    """Pole pairs, slots and scales of the motor on the bench; None where it turned and nothing
+    tells its pole pairs, without which no speed means anything to a winding.
 
     Pole pairs come from the back-EMF against the angle, else from `start`, else the nameplate.
     """
     slots, stated = campaign.nameplate("slots"), stated_u(campaign)
     pole_pairs = pole_pairs_of(campaign, start)
+    if pole_pairs is None:
+        if any(capture.has(name) for capture in campaign.captures for name in _TURNING):
+            return None
+        pole_pairs = 1
     captures = tuple(c for c in map(tellable, campaign.captures) if c is not None)
     campaign = replace(campaign, captures=captures)
     logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
-    current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, ("ia_a", "ib_a"))
+    current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, _LINES_A)
     current = current or _largest(tables, ("id_a", "iq_a"))
-    voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, ("vab_v",))
+    voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, LINES_V)
     voltage = voltage or _largest(tables, ("vq_v",))
     speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
     current = current or 1.0
@@ -127,24 +142,36 @@ def base_scales(machine: Machine) -> dict[str, float]:
     }
 
 
-def pole_pairs_of(campaign: Campaign, start: Constants) -> int:
-    """Electrical cycles a turn, counted in an open-circuit spin of a turn where there is one."""
-    for recorded in campaign.of("open_circuit"):
-        capture = tellable(recorded)
-        if capture is not None and capture.has("vab_v", "vbc_v", "theta_mech_rad"):
-            found = capture.arrays("vab_v", "vbc_v", "theta_mech_rad")
-            turned = float(np.ptp(found["theta_mech_rad"])) if found["vab_v"].size else 0.0
-            if turned < 2.0 * math.pi:
-                continue
-            plane = (2 * found["vab_v"] + found["vbc_v"]) / 3 + 1j * found["vbc_v"] / math.sqrt(3)
-            ratio = float(np.ptp(np.unwrap(np.angle(plane)))) / turned
-            if ratio > 0.5 and abs(ratio - round(ratio)) < 0.02:
-                return round(ratio)
+def pole_pairs_of(campaign: Campaign, start: Constants) -> int | None:
+    """Electrical cycles a turn: counted, else from `start`, else the nameplate's; None unknown."""
+    counted = counted_pole_pairs(campaign)
+    if counted is not None:
+        return counted
     known = start.best("pole_pairs")
     if known is not None:
         return round(known.number)
     stated = campaign.nameplate("pole_pairs")
-    return int(str(stated)) if stated else 1
+    return int(str(stated)) if stated else None
+
+
+def counted_pole_pairs(campaign: Campaign) -> int | None:
+    """Electrical cycles a turn, counted in an open-circuit spin of a turn; None where none is."""
+    for recorded in campaign.of("open_circuit"):
+        capture = tellable(recorded)
+        if capture is None or not capture.has("theta_mech_rad"):
+            continue
+        lines = [name for name in LINES_V if capture.has(name)]
+        if len(lines) < 2:
+            continue
+        found = capture.arrays(*lines, "theta_mech_rad")
+        theta = found.pop("theta_mech_rad")
+        turned = float(np.ptp(theta)) if theta.size else 0.0
+        if turned < TURN_RAD:
+            continue
+        ratio = float(np.ptp(np.unwrap(np.angle(vector_of_lines(found))))) / turned
+        if ratio > 0.5 and abs(ratio - round(ratio)) < 0.02:
+            return round(ratio)
+    return None
 
 
 def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:

@@ -20,6 +20,7 @@ from pipeline.records.capture import Capture
 if TYPE_CHECKING:
     import polars as pl
 
+LINES_V = ("vab_v", "vbc_v", "vca_v")
 _WINDOW_S = 0.02
 _WINDOW_SAMPLES = 40
 _SMOOTHING_S = 0.05

@@ -96,9 +96,10 @@ def outcome_of(folder: str, found: Gathered, told: Sequence[str], *, undecided: 
 
 def start_constants(campaign: Campaign) -> Constants:
     """Constants to start criticism from: none where a nameplate or a spin tells the pole pairs."""
+    from pipeline.criticism.size import counted_pole_pairs
     from pipeline.fit.registry import fit_all
     from pipeline.records.constants import Constants
 
-    if campaign.nameplate("pole_pairs") is not None or campaign.of("open_circuit"):
+    if campaign.nameplate("pole_pairs") is not None or counted_pole_pairs(campaign) is not None:
         return Constants()
     return fit_all(campaign, {})[0]

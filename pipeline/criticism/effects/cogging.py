@@ -22,18 +22,34 @@ def orders(machine: Machine) -> tuple[int, ...]:
     """Orders a turn that magnets and slots can make, of those that stand out of a slow turn.
 
     Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them, but where it is
-    out of all reason (`Machine.cogging_order`).
+    out of all reason (`Machine.cogging_order`), and twice that where no slow turn tells of it.
     """
     bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
     seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
     if machine.cogging_order is not None:
         seen.add(machine.cogging_order)
-    return tuple(sorted(seen)) or (6 * machine.pole_pairs,)
+    return tuple(sorted(seen | _untold(machine))) or (6 * machine.pole_pairs,)
+
+
+def _untold(machine: Machine) -> set[int]:
+    """The second harmonic of cogging where no torque spectrum says whether it is there."""
+    order = machine.cogging_order
+    return set() if order is None or machine.torque_orders else {2 * order}
 
 
 def _expand(machine: Machine) -> tuple[Parameter, ...]:
+    untold = _untold(machine)
     return tuple(
-        Parameter(f"{wave}_{order}_nm", "N·m", 0.01, 0.0002, "torque_nm", -1.0, 1.0)
+        Parameter(
+            f"{wave}_{order}_nm",
+            "N·m",
+            0.01,
+            0.0002,
+            "torque_nm",
+            -1.0,
+            1.0,
+            optional=int(order in untold),
+        )
         for order in orders(machine)
         for wave in ("sin", "cos")
     )

@@ -1,33 +1,83 @@
-"""Alternating-current resistance of the winding."""
+"""Alternating current in the winding: it meets more resistance, and less inductance."""
 
 from __future__ import annotations
 
-from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
+
+
+def _bench(x: Operating) -> NDArray[np.bool_]:
+    """Whether an instrument drives each sample [n] at standstill: a step, or an LCR meter."""
+    still: NDArray[np.bool_] = (x.omega_rad_s == 0.0) & (not x.inverter)
+    return still
+
+
+def _square(x: Operating) -> Array:
+    """Square [n] of the frequency over the machine's highest."""
+    square: Array = (x.freq_hz / x.machine.scales["freq_hz"]) ** 2
+    return square
+
+
+def _inner_h(x: Operating, q: Values) -> float:
+    """Inductance of the field inside the conductors [H], the same for both axes."""
+    return q["inner"] * 0.5 * (x.base["ld_h"] + x.base["lq_h"])
+
+
+def _coenergy(x: Operating, q: Values) -> Any:
+    bent = q["bend"] * _square(x)
+    lost = _inner_h(x, q) * np.where(_bench(x), 1.0, bent / (1.0 + bent))
+    return -0.5 * lost * (x.id_a * x.id_a + x.iq_a * x.iq_a)
 
 
 def _drop(x: Operating, q: Values) -> Complex:
-    relative = x.freq_hz / x.machine.scales["freq_hz"]
-    rise = q["rise"] * relative**2 / (1.0 + (relative / q["knee"]) ** 2)
-    if not x.inverter:
-        rise = q["meter_rise"] * (x.freq_hz > 0.0).astype(float)
+    square, bench = _square(x), _bench(x)
+    turning = q["rise"] * square * (1.0 + q["bend"]) / (1.0 + q["bend"] * square)
+    rise = np.where(bench, q["meter_rise"] * (x.freq_hz > 0.0), turning)
     drop: Complex = x.base["r_ohm"] * rise * x.i_a
+    if q["inner"] and q["bend"] and bench.all() and not x.freq_hz.any():
+        drop = drop + _in_a_step(x, q)
     return drop
+
+
+def _in_a_step(x: Operating, q: Values) -> Complex:
+    """Voltage [n, V] while the field moves into the conductors: L_i di/dt, late by τ = √bend/ω_max
+    as the current in a resistance beside L_i is, straight lines from sample to sample.
+    """
+    late = math.sqrt(q["bend"]) / (2.0 * math.pi * x.machine.scales["freq_hz"])
+    kept = math.exp(-x.ts_s / late)
+    new = 1.0 - (1.0 - kept) * late / x.ts_s
+    current = np.asarray(x.i_a)
+    first = (1.0 - new) * current[:1]
+    inside = lfilter([new, 1.0 - kept - new], [1.0, -kept], current, zi=first)[0]
+    voltage: Complex = _inner_h(x, q) / late * (current - inside)
+    return voltage
 
 
 EFFECT = Effect(
     name="skin_effect",
-    words="resistance R (1 + rise s²/(1 + (s/knee)²)), s = f/f_max, f the electrical frequency; "
-    "an LCR meter at its own, higher frequency reads R (1 + meter_rise)",
+    words="resistance R (1 + rise s² (1 + bend)/(1 + bend s²)), s = f/f_max of the electrical "
+    "frequency, and inductance L (1 - inner bend s²/(1 + bend s²)); in a step the field inside the "
+    "conductors comes late by √bend/(2π f_max); an LCR meter at its own, higher frequency reads "
+    "R (1 + meter_rise) and L (1 - inner)",
     signature="resistance that grows with electrical speed, whatever the temperature",
     tests=("torque_map", "drive", "lcr"),
     experiment="current steps at the highest speed and at a tenth of it",
-    reference="Dowell, Proc. IEE 113 (1966), effects of eddy currents in windings",
+    reference="Dowell, Proc. IEE 113 (1966), effects of eddy currents in windings; Foster, Bell "
+    "Syst. Tech. J. 3 (1924), a reactance theorem",
     parameters=(
         Parameter("rise", "1", 0.2, 0.01, low=0.0, high=5.0),
         Parameter("meter_rise", "1", 0.2, 0.02, low=0.0, high=50.0, at_least="rise"),
-        Parameter("knee", "1", 3.0, 0.0, low=0.3, high=1000.0, scan=(1000.0, 3.0)),
+        Parameter("inner", "1", 0.03, 0.002, low=0.0, high=0.9, optional=1),
+        Parameter("bend", "1", 0.3, 0.0, low=0.0, high=11.0, scan=(0.0, 1.0)),
     ),
     signals=("vd_v", "vq_v"),
     rivals={"current_delay": "current steps at standstill and at speed"},
+    coenergy=_coenergy,
     drop=_drop,
 )

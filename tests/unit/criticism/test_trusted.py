@@ -69,7 +69,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     columns = own_columns(model)
     matrix = np.zeros((100, len(columns)))
     matrix[:, [c.name == "skin_effect.meter_rise" for c in columns]] = float(heard)
-    found = {"rise": 0.5, "meter_rise": meter_rise, "knee": 1000.0}
+    found = {"rise": 0.5, "meter_rise": meter_rise, "inner": 0.0, "bend": 0.0}
     values = {**BASE, **{f"skin_effect.{name}": value for name, value in found.items()}}
     rung = missing_by(vq_v=1e3)
     around = replace(rung.around, columns=tuple(columns), matrix=matrix)

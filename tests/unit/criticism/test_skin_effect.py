@@ -1,0 +1,75 @@
+"""Skin effect held against an inductance beside a resistance (Foster), in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.effects.skin_effect import EFFECT
+from pipeline.criticism.model import effect_flux
+from tests.unit.criticism.machines import operating
+
+BRANCH_OHM, LATE_S = 0.02, 0.7e-3
+
+
+def values(x):
+    """What a branch of a resistance beside an inductance is in the effect's own terms."""
+    bend = (2.0 * np.pi * x.machine.scales["freq_hz"] * LATE_S) ** 2
+    henry = 0.5 * (x.base["ld_h"] + x.base["lq_h"])
+    return {
+        "rise": BRANCH_OHM / x.base["r_ohm"] * bend / (1.0 + bend),
+        "meter_rise": 0.3,
+        "inner": BRANCH_OHM * LATE_S / henry,
+        "bend": bend,
+    }
+
+
+def test_a_turning_machine_has_the_impedance_of_the_branch():
+    """Less j ω R τ, the inductance that the branch has at standstill."""
+    x = operating(50)
+    q = values(x)
+    omega = 2.0 * np.pi * x.freq_hz
+    branch = BRANCH_OHM * 1j * omega * LATE_S / (1.0 + 1j * omega * LATE_S)
+    voltage = EFFECT.drop(x, q) + 1j * omega * effect_flux(EFFECT, x, q)[0]
+    expected = (branch - 1j * omega * BRANCH_OHM * LATE_S) * x.i_a
+    assert voltage == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_step_finds_the_branch_as_a_resistance_first_and_an_inductance_at_last():
+    """A ramp of current: the branch takes R τ di/dt (1 − e^{−t/τ}), and no inductance besides."""
+    n, ts, slope = 4000, 2e-6, 500.0
+    t, still = ts * np.arange(n), np.zeros(n)
+    x = replace(
+        operating(n),
+        id_a=slope * t,
+        iq_a=still,
+        omega_rad_s=still,
+        freq_hz=still,
+        inverter=False,
+        ts_s=ts,
+        kept={},
+    )
+    q = values(x)
+    lost = np.gradient(effect_flux(EFFECT, x, q)[0].real, ts)
+    whole = BRANCH_OHM * LATE_S * slope
+    assert lost == pytest.approx(np.full(n, -whole), rel=1e-6)
+    expected = whole * (1.0 - np.exp(-t / LATE_S))
+    assert EFFECT.drop(x, q).real == pytest.approx(expected, abs=2e-3 * whole)
+
+
+def test_a_meter_has_a_resistance_of_its_own_and_none_of_the_inner_field():
+    x = replace(operating(3), omega_rad_s=np.zeros(3), inverter=False, kept={}, ts_s=1.0)
+    q = values(x)
+    assert EFFECT.drop(x, q) == pytest.approx(0.3 * x.base["r_ohm"] * x.i_a)
+    henry = 0.5 * (x.base["ld_h"] + x.base["lq_h"])
+    assert effect_flux(EFFECT, x, q)[0] == pytest.approx(-q["inner"] * henry * x.i_a)
+
+
+def test_without_a_bend_resistance_grows_with_the_square_of_the_frequency():
+    x = operating(50)
+    q = {"rise": 0.2, "meter_rise": 0.0, "inner": 0.1, "bend": 0.0}
+    square = (x.freq_hz / x.machine.scales["freq_hz"]) ** 2
+    assert EFFECT.drop(x, q) == pytest.approx(0.2 * square * x.base["r_ohm"] * x.i_a)
+    assert effect_flux(EFFECT, x, q)[0] == pytest.approx(np.zeros(50))
