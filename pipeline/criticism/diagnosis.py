@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from scipy.special import gammaincc
@@ -61,6 +61,7 @@ _WITHIN = (
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
 )
 _AGAINST = "captures speak against it: see the note"
+_GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
 _SEEN = 3.0
 """Standard deviations of a typical size from which on captures would show an effect."""
 _AS_GOOD = 0.1
@@ -70,15 +71,15 @@ _AS_GOOD = 0.1
 @dataclass(frozen=True, slots=True)
 class _Ladder:
     """The rungs as far as they are trusted and where they began, their held-out errors, what is
-    `left` at their end, and a note on every effect that would have taken some of that, had not
-    captures spoken `against` it.
+    `left` at their end, and every effect that would take some of that and was `cut`: with a note
+    where captures speak against it, with none where it would be a guess.
     """
 
     begun: Begun
     rungs: tuple[Rung, ...]
     held: list[HeldOut]
     left: tuple[Remainder, ...]
-    against: dict[str, str]
+    cut: dict[str, str]
 
     def explains(self, left: Sequence[Remainder]) -> bool:
         """Whether its names explain what the captures show, but for what is `left`."""
@@ -132,7 +133,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     rungs, held, last = ladder.rungs, ladder.held, ladder.rungs[-1]
     offered = candidates(library, last.fitted)
     missing = last.added
-    ranking = _ranking(rungs, held, offered, library, found, ladder.against)
+    ranking = _ranking(rungs, held, offered, library, found, ladder.cut)
     unexcited = _unexcited(campaign, library, last, offered)
     verdict = _verdict(ladder, left, unexcited)
     return Diagnosis(
@@ -149,7 +150,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *told_hum(ladder.begun.hum),
             *(() if calm is None else (_WANDER,)),
             *(() if within is None else (_WITHIN,)),
-            *ladder.against.values(),
+            *(note for note in ladder.cut.values() if note),
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
         ),
@@ -197,9 +198,8 @@ def _climbed(start: Begun, library: dict[str, Effect]) -> _Ladder:
     alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
     kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
     held = in_common([r.around for r in kept], alone[: len(kept)])
-    against = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
-    noted = {name: note for name, note in against.items() if note}
-    return _Ladder(start, kept, list(held), left, noted)
+    cut = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
+    return _Ladder(start, kept, list(held), left, cut)
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -275,7 +275,7 @@ def _ranking(
     offered: Sequence[Candidate],
     library: dict[str, Effect],
     captured: Sequence[Segment],
-    against: Collection[str],
+    cut: Mapping[str, str],
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last rung."""
     last = rungs[-1]
@@ -308,7 +308,8 @@ def _ranking(
             )
         )
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
-    others = [replace(r, shortfall=_AGAINST) if r.effect in against else r for r in others]
+    reasons = {name: _AGAINST if note else _GUESS for name, note in cut.items()}
+    others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
     return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.noise import sensor_noise
 from pipeline.criticism.segment import Segment, Sensors, segment_of
 from pipeline.numerics.orders import TURN_RAD, passes
 from pipeline.records.capture import Capture
@@ -15,13 +16,18 @@ from pipeline.records.capture import Capture
 _CELLS = 1024
 _SECTORS = 24
 _FEW = 4
+"""Rows that a cell must have for their scatter about a line to be told."""
+_ENOUGH = 0.5
+"""Share of the cells that must have them: the few where a pass turns round, and the rotor stays,
+scatter otherwise than the rest."""
 
 
 def standing(capture: Capture, _: Machine) -> Segment | None:
     """Mean angle, current and sense of arrival of every cell; sectors are held out one by one.
 
     The noise of a cell's mean comes from the scatter within cells about a straight line, with its
-    correlation from sample to sample; a loop that holds does not repeat better than that.
+    correlation from sample to sample; a loop that holds does not repeat better than that. Where
+    few cells have rows enough it comes from the differences between neighbours.
     """
     if not capture.has("theta_mech_rad", "iq_a"):
         return None
@@ -37,7 +43,7 @@ def standing(capture: Capture, _: Machine) -> Segment | None:
         return None
     table = np.concatenate(rows)
     recorded = {"theta_mech_rad": table[:, 0], "iq_a": table[:, 1], "sense": table[:, 2]}
-    noise = {"iq_a": _noise(spread, current)}
+    noise = {"iq_a": _noise(spread, [cells[:, 1] for cells in rows])}
     sectors = sectors_of(table[:, 0])
     return segment_of(
         capture, "standing", "drive", 1.0, recorded, Sensors(noise), ("iq_a",), None, blocks=sectors
@@ -65,11 +71,13 @@ def _about_a_line(theta: Array, current: Array) -> Array:
     return rest
 
 
-def _noise(spread: list[Array], current: Array) -> float:
-    """Standard deviation [A] of a cell's mean; never below a ten-thousandth of the largest."""
-    least = 1e-4 * float(np.abs(current).max())
-    if not spread:
-        return max(least, 1e-12)
+def _noise(spread: list[Array], means: list[Array]) -> float:
+    """Standard deviation [A] of a cell's mean, of cells' `means` pass by pass and of their rows'
+    scatter; never below a ten-thousandth of the largest.
+    """
+    least = max(1e-4 * max(float(np.abs(one).max()) for one in means), 1e-12)
+    if len(spread) < _ENOUGH * sum(one.size for one in means):
+        return max(*(sensor_noise(one) for one in means), least)
     power = sum(float(s @ s) for s in spread)
     n = sum(s.size for s in spread)
     after = sum(float(s[1:] @ s[:-1]) for s in spread)

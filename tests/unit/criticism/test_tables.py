@@ -53,6 +53,19 @@ def test_cells_of_a_held_rotor_keep_the_sense_of_arrival_and_their_own_noise():
     assert set(segment.blocks.tolist()) == set(range(24))
 
 
+@pytest.mark.parametrize("every", [3, 6, 10])
+def test_cells_of_a_row_or_two_have_the_noise_of_their_neighbours(every):
+    """And not a ten-thousandth of the current, nor that of two cells where the pass turns round."""
+    whole = held({5: 0.1}, 0.01).tables[0]
+    theta, current = (whole[name].to_numpy()[::every] for name in ("theta_mech_rad", "iq_a"))
+    resting = np.random.default_rng(3).normal(0.0, 0.1, (2, 40))
+    theta = np.concatenate([np.zeros(40), theta, np.zeros(40)])
+    current = np.concatenate([resting[0], current, resting[1]])
+    segment = standing(capture("holding_current", theta_mech_rad=theta, iq_a=current), MACHINE)
+    a_cell = max(6000 / every / 1024, 1.0)
+    assert segment.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(a_cell), rel=0.35)
+
+
 def test_orders_that_repeat_are_found_and_noise_adds_none():
     true = {5: 0.01, 12: 0.02, 30: 0.1}
     assert holding_orders([held(true, 0.01)], (5, 6)) == (5, 12, 30)

@@ -84,10 +84,10 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     monkeypatch.setattr("pipeline.criticism.diagnosis.search", lambda *_: found)
     monkeypatch.setattr("pipeline.criticism.diagnosis.leave_out", lambda *_: next(totals))
     monkeypatch.setattr("pipeline.criticism.diagnosis.in_common", lambda _, alone: list(alone))
-    against = _climbed(Begun((log(),), first.fitted, first.around, ()), {}).against
-    assert list(against) == ["skin_effect"] * (kept == 1)
+    cut = _climbed(Begun((log(),), first.fitted, first.around, ()), {}).cut
+    assert list(cut) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0)
-    (ranked,) = _ranking((replace(first, scores=(score,)),), held[:1], (), {}, (), against)
+    (ranked,) = _ranking((replace(first, scores=(score,)),), held[:1], (), {}, (), cut)
     assert ("speak against" in ranked.shortfall) is (kept == 1)
 
 
@@ -110,6 +110,23 @@ def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeyp
     monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
     held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 98.0)]
     assert len(trusted((log(),), rungs, held)[0]) == kept
+
+
+@pytest.mark.parametrize(("after", "kept"), [(0.5, 2), (20.0, 1)])
+def test_waves_that_another_signal_keeps_do_not_make_a_guess_of_what_clears_one(
+    after, kept, monkeypatch
+):
+    """An open winding whose magnet's temperature was not logged, beside cogging in a slow turn."""
+    labels = ((0, "torque_shaft_nm", 84), (1, "vd_v", 42))
+    rungs = [
+        replace(rung, around=replace(rung.around, labels=labels))
+        for rung in (missing_by(cogging=5e3, winding=1e6), missing_by(cogging=after, winding=1e6))
+    ]
+    over = (Remainder("one", "vd_v", 42, 9.0, 1.0),)
+    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
+    held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 97.0)]
+    assert len(trusted((log(), log()), rungs, held)[0]) == kept
 
 
 @pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])
