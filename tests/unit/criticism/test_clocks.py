@@ -62,6 +62,20 @@ def test_samples_that_are_missing_leave_their_numbers_out():
     assert found["theta_mech_rad"][keep] == pytest.approx(angle(even)[keep], abs=1e-12)
 
 
+@pytest.mark.parametrize("missing", [1, 30])
+def test_a_gap_of_samples_that_came_unevenly_is_bridged_and_not_kept(missing):
+    even, stamps = instants()
+    there = np.ones(even.size, dtype=bool)
+    there[1500 : 1500 + missing] = False
+    capture = log(stamps[there], angle(stamps[there]))
+    period, found, keep = even_clock(capture, ("theta_mech_rad",))
+    at = stamps[0] + period * np.arange(found["theta_mech_rad"].size)
+    inside = (at > stamps[1499]) & (at < stamps[1500 + missing])
+    assert inside.sum() >= missing
+    assert not keep[inside].any()
+    assert keep[~inside][1:-1].all()
+
+
 def test_a_clock_that_runs_by_fits_and_starts_cannot_be_counted():
     steps = np.random.default_rng(3).choice([0.2, 1.0, 7.0], 4000, p=[0.3, 0.5, 0.2])
     assert counted(PERIOD * np.cumsum(steps)) is None

@@ -147,6 +147,36 @@ def test_a_wrong_resistance_leaves_the_current_that_ohms_law_says():
     assert np.abs(left - theory).max() < 0.1 * np.abs(theory).max()
 
 
+def test_a_run_begins_at_the_measured_speed_and_goes_on_at_the_models_rate():
+    """A shaft braked by a constant torque, and a model with three times that torque: ω₀ − 3 T/J t
+    from the first sample on, to a hundredth of what a sample period brakes.
+    """
+    friction, drag = effects()["coulomb_friction"], 0.01
+    rate = drag / BASE["j_kgm2"]
+    t = TS * np.arange(N)
+    theta = 200.0 * t - 0.5 * rate * t**2
+    segment = Segment(
+        "coast",
+        "spin_down",
+        "shaft",
+        "bench",
+        "instant",
+        TS,
+        {"theta_mech_rad": theta, "t_s": t},
+        {"theta_mech_rad": 1e-9},
+        ("omega_mech_rad_s",),
+        projection(theta, np.arange(0, N - WINDOW + 1, WINDOW // 2), WINDOW, ()),
+        {"ambient_k": 0.0},
+    )
+    values = {**BASE, "b_nm_s_rad": 0.0, "coulomb_friction.torque_nm": 3.0 * drag}
+    run = free_run(segment, Model(machine(), (friction,)), values)
+    assert run is not None
+    speed = run.simulated["omega_mech_rad_s"]
+    since = run.t_s - run.t_s[:, :1]
+    told = (200.0 - rate * run.t_s[:, :1]) - 3.0 * rate * since
+    assert np.abs(speed - told)[:, 1:].max() < 0.01 * rate * TS
+
+
 def test_the_noise_floor_is_the_scatter_of_a_true_model():
     """Errors over the floor have a mean square near 1 over four recordings, at a noise that drowns
     the allowance for linearity; offsets that the priors absorb take a little of it away.

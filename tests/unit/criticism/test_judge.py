@@ -88,6 +88,18 @@ def test_a_column_that_one_capture_carries_predicts_nothing_better():
     assert np.array_equal(np.isfinite(after.residual), around.group != 4)
 
 
+@pytest.mark.parametrize(("times", "carries"), [(4.0, False), (6.0, True)])
+def test_a_capture_without_which_a_variance_grows_fivefold_is_not_held_out(times, carries):
+    """Of three captures the first has 2 (times − 1) the information of one of the others, so that
+    the variance without it is `times` that with it; the other two are predicted all the same.
+    """
+    around = captures([0.0, 0.0, 0.0])
+    strong = np.sqrt(2.0 * (times - 1.0))
+    matrix = np.where(around.group == 0, strong, 1.0)[:, None] * around.matrix
+    held = leave_out(replace(around, matrix=matrix, residual=0.01 * around.residual), 1)
+    assert np.array_equal(np.isfinite(held.residual), (around.group != 0) | (not carries))
+
+
 def test_at_standstill_a_voltage_is_measured_by_what_is_there():
     """Half a per cent of R i at standstill is told, however high the machine's own voltage is."""
     running = log()

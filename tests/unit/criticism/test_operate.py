@@ -98,6 +98,19 @@ def test_an_angle_error_of_nothing_leaves_the_drive_s_own_speed(name: str):
     assert operate(alone, signals, model, values).omega_rad_s == pytest.approx(speed, abs=1e-9)
 
 
+def test_an_encoder_off_its_centre_does_not_make_the_speed_uneven():
+    """Recorded ωt + a sin ωt, 12 turns: the true speed is ω, and the recorded one off it by a ω."""
+    eccentric = LIBRARY["angle_eccentricity"]
+    model = Model(machine(), (eccentric,))
+    values = {**BASE, **zero(eccentric, model), "angle_eccentricity.sine_rad": 2e-3}
+    true = 100.0 * 5e-5 * np.arange(8000)
+    signals = {**log().recorded, "theta_mech_rad": true + 2e-3 * np.sin(true)}
+    x = operate(replace(log(), recorded=signals), signals, model, values)
+    inner = slice(60, -60)
+    assert x.theta_rad[inner] == pytest.approx(true[inner], abs=1e-7)
+    assert x.omega_rad_s[inner] == pytest.approx(100.0, abs=0.01 * 2e-3 * 100.0)
+
+
 def test_a_finer_clock_keeps_reversals_in_their_place():
     n = 400
     at = np.arange(n) * 1e-3

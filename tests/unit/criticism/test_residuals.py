@@ -9,12 +9,13 @@ import pytest
 
 from pipeline.criticism.floors import noise_floor, reading_error
 from pipeline.criticism.linearise import effect_columns, linearise
-from pipeline.criticism.model import Model, zero
+from pipeline.criticism.model import Model, mean_current, zero
 from pipeline.criticism.noise import sensor_noise
 from pipeline.criticism.operate import finer_of
 from pipeline.criticism.registry import effects
 from pipeline.criticism.residuals import _averaged, residual
 from pipeline.criticism.segment import projected, row_index, slow_orders
+from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, coasting, log, machine, operating
 
 LIBRARY = effects()
@@ -125,6 +126,28 @@ def test_what_a_period_leaves_of_the_mean_current_is_within_what_is_known_of_it(
     assert abs(0.3 - center) > 5.0 * u
 
 
+def test_a_period_s_mean_is_that_of_an_earlier_instant():
+    """Of a ramp at steady speed: current and electrical angle s T before the sample."""
+    part, ts, omega = 0.4, 5e-5, 120.0
+
+    def at(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return (2.0 - 300.0 * t) + 1j * (1.0 + 500.0 * t), 7 * omega * t
+
+    t = ts * np.arange(60)
+    current, eps = at(t)
+    x = replace(
+        operating(),
+        id_a=current.real,
+        iq_a=current.imag,
+        eps_rad=eps,
+        omega_rad_s=np.full(60, omega),
+    )
+    mean = mean_current(x, {**BASE, "ripple_slope": part})
+    before, turned = at(t - part * ts)
+    assert mean.eps_rad == pytest.approx(turned, abs=1e-12)
+    assert mean.i_a[1:-1] == pytest.approx(before[1:-1], abs=1e-12)
+
+
 def test_the_noise_floor_is_the_scatter_over_seeds():
     """chi²/n of a sound machine is 1 in every signal, over 6 logs of fresh noise."""
     total: dict[str, list[float]] = {}
@@ -173,6 +196,30 @@ def test_a_jump_of_voltage_is_known_to_a_quarter_of_a_sample():
     near = np.sqrt(np.maximum(allowed**2 - calm[1, :, 0] ** 2, 0.0))
     assert near[over] == pytest.approx(np.abs(told[over]), rel=0.05, abs=0.02 * told.max())
     assert near[~over].max() < 0.1 * told.max(), "of the reading itself"
+
+
+@pytest.mark.parametrize("omega", [60.0, 120.0])
+def test_a_line_of_the_encoder_s_error_is_a_torque_by_the_square_of_its_pace(omega):
+    """θ + a cos kθ at a steady pace is J (kω)² a on order k, for an a of 0.03 steps."""
+    step, theta = 1e-3, omega * 5e-5 * np.arange(8000)
+    running = log()
+    weak = projection(theta, running.weak.starts, running.weak.length, (14, 28, 42))
+    running = replace(running, recorded={**running.recorded, "theta_mech_rad": theta}, weak=weak)
+    exact, coarse = (
+        reading_error(replace(running, noise={**running.noise, "theta_mech_rad": u}), PLAIN, BASE)
+        for u in (0.0, step / np.sqrt(12.0))
+    )
+    torque = running.channels.index("torque_shaft_nm")
+    more = np.sqrt(coarse[torque] ** 2 - exact[torque] ** 2)
+    assert more[:, 0] == pytest.approx(0.0, abs=1e-12)
+    for place in np.flatnonzero(weak.orders):
+        order = weak.orders[place]
+        cosine = place == np.flatnonzero(weak.orders == order)[0]
+        wave = np.cos(order * theta) if cosine else np.sin(order * theta)
+        line = weak.project(BASE["j_kgm2"] * (order * omega) ** 2 * 0.03 * step * wave[None])
+        valid = weak.valid[:, place]
+        assert valid.any()
+        assert more[valid, place] == pytest.approx(np.abs(line[0, valid, place]), rel=0.01)
 
 
 def test_friction_at_rest_may_be_anything_between_both_its_senses():

@@ -13,7 +13,7 @@ from pipeline.criticism.registry import effects
 from pipeline.criticism.scores import Candidate, Score, candidates, score_all, widened
 from pipeline.criticism.selection import _floored_anew
 from pipeline.criticism.system import Fitted, System, own_columns
-from tests.unit.criticism.machines import BASE, LIBRARY, fitted, log, machine, with_drag
+from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
 
 
 @pytest.mark.parametrize(
@@ -76,6 +76,19 @@ def test_a_drag_of_the_wrong_sign_is_no_friction():
     offered = candidates(LIBRARY, start)
     scores = score_all(widened(segments, start, offered), start, offered)
     assert "windage" not in {s.candidate.effect.name for s in scores if s.passes}
+
+
+@pytest.mark.parametrize(("size_nm", "told"), [(-0.03, True), (0.03, False)])
+def test_an_amplitude_that_may_not_be_above_zero_is_not_offered_above_it(size_nm, told):
+    """Windage with its bounds exchanged: what pushes is told, and what brakes is not."""
+    windage = LIBRARY["windage"]
+    (braking,) = windage.parameters
+    pushing = replace(windage, parameters=(replace(braking, low=-1.0, high=0.0),))
+    segments = (with_drag(curved(size_nm)), with_drag(curved(size_nm), 6))
+    start = fitted(segments)
+    offered = candidates({"windage": pushing}, start)
+    scores = score_all(widened(segments, start, offered), start, offered)
+    assert [s.candidate.effect.name for s in scores] == ["windage"] * told
 
 
 def test_zero_of_an_effect_takes_the_trial_shape():

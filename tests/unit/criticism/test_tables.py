@@ -230,6 +230,20 @@ def test_the_others_take_up_what_a_parameter_at_its_bound_cannot_do():
     assert at[0] + step[0] == pytest.approx(alone)
 
 
+def test_a_parameter_at_its_upper_bound_stays_there():
+    """Windage stands at the machine's whole torque; Coulomb friction goes to its best beside it."""
+    both = tuple(effects()[n] for n in ("coulomb_friction", "windage"))
+    scales = dict.fromkeys(("current_a", "voltage_v", "speed_rad_s", "torque_nm", "flux_wb"), 1.0)
+    model = Model(Machine(1, None, scales), both)
+    columns = [Column("coulomb_friction.torque_nm", 1.0), Column("windage.drag_nm", 1.0)]
+    a = np.array([[2.0, 1.5], [1.5, 2.0]])
+    target, at = np.array([0.5, 1.4]), np.array([0.1, 1.0])
+    values = {c.name: float(v) for c, v in zip(columns, at, strict=True)}
+    step = bounded_step(Quadratic(a, target, at).best, columns, model, values)
+    assert step[1] == 0.0
+    assert at[0] + step[0] == pytest.approx(target[0] + a[0, 1] / a[0, 0] * (target[1] - at[1]))
+
+
 def test_a_term_that_is_left_out_is_zero_and_no_parameter():
     full = effects()["saturation"]
     less = replace(full, left_out=(2, 5))
