@@ -17,7 +17,10 @@ from pipeline.criticism.model import Model
 from pipeline.criticism.size import base_scales
 
 _AT = 1e-9
+"""Share of its own size by which a value that stands at a bound may miss it by rounding."""
 _LEAST_INERTIA = 1e-3
+"""Least inertia, in the machine's order of magnitude for it: by judgement, far below any motor's.
+At zero a coasting shaft's equation divides by nothing."""
 
 
 def limits_of(model: Model) -> dict[str, tuple[float, float]]:

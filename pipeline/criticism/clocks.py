@@ -10,9 +10,14 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array
 
 _SCATTER = 0.5
+"""Scatter of the stamps [periods] from which on a stamp does not tell the number of its sample."""
 _MISSING = 1.6
+"""Distance of two stamps [periods] from which on a sample may be missing between them. By
+judgement: at 1 the scatter alone passes for missing samples, at 2 it hides half of them."""
 _SURELY = 2.0
+"""Ratio of roughnesses that decides. By judgement: at 1 noise decides."""
 _REACH = 2
+"""Samples at either side that a cubic goes through; it needs four."""
 
 
 def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:

@@ -25,11 +25,19 @@ from pipeline.criticism.effect import Array, Operating, Told, Values, Whole
 from pipeline.criticism.twist import Shaft, law_of_twist
 
 _BLOCK_S = 0.5e-3
-# six blocks and a difference stay within the samples kept around a window
+"""Length of a running mean [s]: a ringing of 290 Hz passes to one per cent (docs/criticism.md).
+Longer means take a part of it, shorter ones leave the encoder's rounding."""
 _MOST = 7
+"""Samples of a running mean at the most: six of them and a difference stay within the samples
+that are kept around a window."""
 _SURE = 3.5
+"""Standard uncertainties that a gap or softness must be away from what it is held against. By
+judgement: chance passes it once in four thousand."""
 _FEW = 6
+"""Windows with torque of both signs that a look needs: their scatter is the uncertainty, and of
+fewer it is not known. By judgement."""
 _NO_GAP_RAD = 2e-4
+"""Gap [rad] below which none matters: the negligible size of `backlash`, by judgement."""
 
 
 def passed_on(x: Operating, share: float) -> Array:

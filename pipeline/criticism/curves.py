@@ -14,12 +14,20 @@ from pipeline.criticism.effect import Array, Machine, Operating
 
 TURN_RAD = 2.0 * math.pi
 _BEND = 1.6
+"""Exponent that crowds the knots near zero, where friction bends most. By judgement: at 1 they are
+even, at 3 the upper half of the range has two."""
 _PIECES = 8
-_NODES = 40
-_TURN_NODES = 48
+"""Knots of the smooth curve of one sign. By judgement: fewer miss a bump, each one more costs."""
+_NODES, _TURN_NODES = 40, 48
+"""Hats of one sign, and of a turn (7.5° each). By judgement: hats that are too wide round off what
+a sketch may say, and the cost goes with their number."""
 _WARM_K = (-15.0, 0.0, 10.0, 20.0, 35.0, 55.0, 80.0, 110.0)
+"""Knots over 25 °C [K], from a cold hall to a hot winding: by judgement closer where most
+recordings are."""
 _EDGE = 1e-9
+"""First hat, as a share of the range: beside zero and not at it, where friction jumps."""
 LOWEST = tuple(range(1, 9))
+"""Orders a turn that are offered on every machine."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,17 +21,27 @@ from pipeline.criticism.segments import sparse
 from pipeline.criticism.size import base_scales
 from pipeline.criticism.system import Fitted, System, floors, system
 
-_ITERATIONS = 12
+_ITERATIONS, _HALVINGS = 12, 3
+"""Steps of a fit at the most, and how often one that does harm is shortened. By judgement: a bound
+of the cost, since a fit ends by itself."""
 _LEAST = 0.1
+"""Reach of a step, as a share of the constant's order of magnitude, at the least: a constant that
+a rough fit left at nothing comes back (viscous friction did not)."""
 _SHORT = 8
+"""Segments up to which a programme is short, and is begun from either side as well. By judgement:
+two fits more, which a long programme does not need."""
 _SILENT = 1e4
+"""Times its noise floor that an equation counts with while it is set aside."""
 _CONVERGED = 1.0
-_HALVINGS = 3
+"""Fall of −2 log L that is not worth a step: a twelfth of what parts two explanations (`TIE`)."""
 _KEPT = 0.9
+"""Share of its promise that a step must keep for its columns to stay. By judgement: at 1 columns
+are made anew at every step; much lower, and steps along stale columns gain little."""
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
 )
+"""Signals of the winding, and of the shaft."""
 
 
 def start_values(model: Model, machine: Machine) -> dict[str, float]:

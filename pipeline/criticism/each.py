@@ -15,6 +15,7 @@ Doing = Callable[[Work, Sequence[Segment], Sequence[tuple[Any, ...]]], tuple[Any
 """Does `work(segment, *arguments)` to every segment with its arguments; results in order."""
 
 _THREADS = 2
+"""Threads: two are worth 1.4 cores on arrays of this size (docs/criticism.md)."""
 
 
 def by_threads(

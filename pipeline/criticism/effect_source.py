@@ -10,8 +10,9 @@ from pipeline.criticism.sketch import Expression
 from pipeline.criticism.terms import CENTRED, POWER, Term
 
 _SUFFIX = {"torque": "nm", "drop": "v", "flux": "wb"}
-_REACH = 30.0
-_STEP = 0.01
+_REACH, _STEP = 30.0, 0.01
+"""Bounds and negligible size of a sketched parameter, in multiples of the value found. By
+judgement: wide enough for a user's own form, and a hundredth of a drag is nobody's concern."""
 _TESTS = {"torque": "torque_map", "drop": "torque_map", "flux": "torque_map"}
 _HEAD = '''"""{title}
 

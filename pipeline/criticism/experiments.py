@@ -27,8 +27,11 @@ from pipeline.criticism.system import Fitted, System, own_columns
 from pipeline.records.diagnosis import Separation
 
 _LEVEL = 0.01
+"""Probability of a false alarm of the test whose power is told."""
 _REPEATS = 4
+"""Recordings of a test that a repeat makes of one: they halve its noise."""
 _CALIBRATED = 2e-3
+"""Standard uncertainty of a calibrated instrument, as a share: as the words below say."""
 _GAIN_WORDS = {
     "gain_current": "the current sensors calibrated to 0.2 %",
     "gain_voltage": "the bench's voltmeters calibrated to 0.2 %",
@@ -40,8 +43,9 @@ _KNOWN_WORDS = {
     "psi_wb": "the magnet's flux known to 0.2 % (back-EMF with a calibrated meter)",
 }
 _SEED = 20260303
-_MOST = 3
-_WORTH = 0.02
+_MOST, _WORTH = 3, 0.02
+"""Experiments that are told at the most, and the power that one must add. By judgement: a longer
+list is not read."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,19 +16,35 @@ from pipeline.criticism.operate import operate
 from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import Segment, projected, row_index
 
-_REPLICATES = 2
+_REPLICATES, _POOLED = 2, 128
+"""Times that noise is added at the least, and weak samples of a group that are then pooled: a floor
+is known to some 6 %, the root of 1/(2·128). Fewer make a floor of chance, more cost time."""
 _SHIFTS = 16
-_POOLED = 128
-_ALLOWANCE = 5e-5
-_MODEL_DRIVE = 1e-4
-_MODEL_BENCH = 2e-5
+"""Shifts of a coarse signal at the least: all its rounding can do depends on the shift."""
+_ALLOWANCE, _MODEL_DRIVE, _MODEL_BENCH = 5e-5, 1e-4, 2e-5
+"""Of the reading, and of the machine's own scale under a drive and on a bench: what no sensor and
+no equation is better than, by judgement. Smaller, and structure of no concern names effects;
+larger, and effects hide: half of the reference captures' floors is this allowance."""
 _OFFSET = 0.5
+"""Prior of a sensor's offset in one capture, in standard deviations of its noise. By judgement:
+a larger one lets offsets explain a drag, with none an offset passes for an effect."""
 _ZERO = 2e-3
+"""Prior of a terminal voltage's offset, as a share of its largest reading. By judgement: with
+none, the zero of a bench's voltmeter passes for a drop."""
 _ROUGH = 0.05
+"""Of the machine's own scale, how far equations may be off in a rough fit. By judgement: smaller,
+and equations far off are given up before the constants are near."""
 FORM = 0.02
+"""Of what an effect does, what its formula may be wrong by. By judgement: smaller, and the tail of
+a wrong form is named as a further effect; larger, and small effects beside it are lost."""
 _LINE = 0.03
+"""Steps of the encoder that a harmonic of its rounding has: 1/(10 π), the tenth of a saw-tooth."""
 _JUMP = 8.0
+"""Standard deviations of its noise from which on a bend of the voltage is a jump. White
+noise comes to 6 in a log of 1e5 samples."""
 _WHEN = 0.25
+"""Sample periods that a jump's instant is known to: 1/√12 = 0.29 for one that may be anywhere
+in between. With none, seven of the benchmark's twenty ties were named wrong, with this two."""
 _CREEPS, _REST_S = 1e-3, 5e-3
 """Share of the machine's largest speed below which, for so long, friction may hold the shaft."""
 

@@ -34,8 +34,12 @@ ELECTRICAL = ("torque_map", "drive")
 MECHANICAL = ("spin_down",)
 SPEED = "omega_mech_rad_s"
 _REPLICATES, _POOLED = 2, 96
+"""Times that noise is added at the least, and window means that are then pooled: a floor is known
+to 7 %, the root of 1/(2·96)."""
 _OFFSET = 0.5
+"""Prior of a sensor's offset in standard deviations of its noise, as in `floors`."""
 _OFFSETS = ("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
+"""Signals whose sensors may have an offset."""
 _SEED = 20261121
 
 

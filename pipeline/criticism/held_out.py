@@ -22,6 +22,8 @@ from pipeline.records.comparison import SignalError, Trace
 
 Split = Literal["fit", "held_out"]
 _LOOK_S = 0.001
+"""Length of the means that pictures show [s]: shorter, and noise covers the torque; longer, and
+the currents' steps are rounded."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,13 +20,16 @@ from pipeline.records.diagnosis import Remainder
 _GROWTH = 5.0
 """Growth of a variance without a capture from which on the capture carries the constant alone."""
 _MOST_BLOCKS = 10_000
+"""More than the blocks of any capture, so that every block has a number of its own."""
 _OVER = 1.0
 """Excess of χ²/n that is told: a floor from the recording itself is good to a factor of two."""
 _CHANCE = float(ndtr(-5.0))
+"""Probability that chance alone may have of what is told: of five standard deviations, one side."""
 _MATERIAL, _MATERIAL_BENCH, _MATERIAL_READING = 5e-4, 1e-2, 5e-3
 """Error that matters: of the machine's own scale, of a bench meter's largest reading, and of the
 largest voltage of a log, which is less than the machine's at standstill."""
 _VOLTS = ("vd_v", "vq_v")
+"""Channels whose reading is little beside the machine's voltage at standstill."""
 
 
 @dataclass(frozen=True, slots=True)

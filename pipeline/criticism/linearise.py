@@ -30,8 +30,9 @@ from pipeline.criticism.residuals import RIPPLES, TORQUE_RIPPLES, measured, pred
 from pipeline.criticism.segment import Segment, projected, row_index
 
 _CHUNK = 32
-# what complex steps leave of a term that is zero
+"""Columns that are projected at a time: more need more memory, fewer more calls."""
 _NOTHING = 1e-40
+"""What complex steps leave of a term that is zero."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +169,11 @@ _NEEDS: dict[str, tuple[str, ...]] = {
     "steady": ("r_ohm", "ld_h", "psi_wb"),
     "standing": ("psi_wb",),
 }
+"""Constants of the base that the equations of each kind of segment hold."""
 
 
 _FINE = 1e-3
+"""Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 

@@ -30,7 +30,9 @@ from pipeline.criticism.effect import (
 )
 
 _STEP = 1e-30
+"""Complex step [A, rad]: its square is below the rounding of anything."""
 _FREE = float("inf")
+"""Standard uncertainty of a prior that says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +73,7 @@ BASE: tuple[Constant, ...] = (
 )
 GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
+"""The base's constants of the station, and of the motor; the others are nuisances of a log."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,14 +15,20 @@ from pipeline.criticism.segment import Segment, slow_orders
 from pipeline.criticism.traces import smoothed
 
 _SPEED_S = 0.002
+"""Length of the mean that makes a speed of differenced angles [s]. By judgement: shorter, and the
+encoder's rounding is in drags of the speed; longer, and a reversal is blurred."""
 _SAME_RAD, _PARTS, _PART_RAD = 0.2, 8, 3.0
 """What the highest order turns in a coasting sample that is as good as an instant; how many parts a
 longer one is averaged over at least, and what that wave may turn in one: the steps that stand for
 the triangle are wrong by a third of a percent of the wave at most."""
-_FINEST = 48
-_FINEST_LOG = 6
+_FINEST, _FINEST_LOG = 48, 6
+"""Parts of a sample at the most, of a coasting shaft and of a drive's log: a bound of the
+cost, by judgement."""
 _ANGLE_ROUNDS = 2
+"""Times that an angle error is looked up at the angle it gives: each round leaves of the error its
+own size times its order a turn."""
 _CRAWL = 1e-9
+"""Speed [rad/s] of a held rotor that creeps: it has a sense and nothing else."""
 
 
 def operate(

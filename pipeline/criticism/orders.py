@@ -13,8 +13,12 @@ from pipeline.criticism.segments_standing import standing
 from pipeline.records.capture import Capture
 
 _MOST = 12
+"""Orders at the most: a bound of the cost."""
 _CLEAR = 3.0
+"""Standard errors of the sectors' mean gain that an order must gain by. By judgement: at 2, chance
+brings in one of some dozens that are offered."""
 _FEWEST_SECTORS = 6
+"""Sectors whose scatter is known well enough; by judgement."""
 
 
 def holding_orders(

@@ -42,6 +42,7 @@ _HOOKS = (
 _OF_RECORDED = ("i_a", "torque_nm", "eps_rad", "omega_e_rad_s")
 _MEND = "correct the file"
 _TRIED = 3
+"""Samples that a hook is tried on: a few, since it may difference them."""
 
 
 @dataclass(frozen=True, slots=True)

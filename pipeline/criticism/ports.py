@@ -17,6 +17,7 @@ from pipeline.criticism.curves import Basis, Variable, coarse, fine, variables
 from pipeline.criticism.effect import Effect, Machine, Operating, Parameter, Values
 
 _WIDE = 1e6
+"""Bound of a coefficient in machine scales: none, but finite."""
 _SCALES = {
     "torque": ("torque_nm", "N·m"),
     "drop": ("voltage_v", "V"),

@@ -23,6 +23,7 @@ from pipeline.physics.frames import vector_of_lines
 
 RIPPLES = ("ripple_edge", "ripple_shift")
 TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
+"""Nuisances of the current's ripple that are in the voltage, and in the torque (`model.BASE`)."""
 
 
 def residual(

@@ -15,8 +15,9 @@ from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import loss_without, shaped
 from pipeline.criticism.system import Fitted, System, own_columns
 
-_NEAR = 0.5
-_MOST = 6
+_NEAR, _MOST = 0.5, 6
+"""Share of what an effect explains that a refit with another in its place may lose to first order,
+and how many are refitted. By judgement: the tangent may be wrong, and each costs a fit."""
 
 
 def rivals_of(

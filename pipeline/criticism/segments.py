@@ -44,12 +44,20 @@ from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Campaign, Capture
 
 _STEP_WINDOW_S = 0.002
+"""Window of a current step [s]: short, since all that it tells is over after a few L/R."""
 _LEAST_METER_NOISE = 1e-4
+"""Share of its largest reading that a meter is known no better than, by judgement: with the
+scatter alone, a meter that reads the same at every angle had a noise of 1e-16."""
 _FEW = 12
+"""Windows of a segment in a rough fit: enough to meet a sound J to a tenth."""
 _LEAST_WINDOW = 8
-_WINDOWS = 48
-_WINDOWS_LOG = 32
+"""Samples of a window at the least: its test function vanishes at both ends."""
+_WINDOWS, _WINDOWS_LOG = 48, 32
+"""Windows of a map or open winding, and of a drive's log, at the most. By judgement: cost goes with
+them, and a programme has several logs."""
 _LEAD = 0.05
+"""Share of a coast for which a shaft must be held before it for the hold to count as driven. By
+judgement: the moment of letting go is shorter."""
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:

@@ -12,10 +12,14 @@ from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
 
 _BLOCKS = 12
-_STALE = 12
-_LATE = 1.5
-_MOTION_WINDOWS = 160
-_PAD = 8
+"""Parts that a log is held out in: by judgement. Fewer leave little to fit, more
+are like their neighbours."""
+_STALE, _LATE = 12, 1.5
+"""Samples given up before a reading that came late, and twice as many from it on; periods from
+which on it did. By judgement: what a host reads after a hold-up is of before."""
+_MOTION_WINDOWS, _PAD = 160, 8
+"""Windows of the motion at the most, and samples kept at either side. By judgement: cost goes with
+both, and the angle's second difference needs a few beyond a window."""
 
 
 def q_log(capture: Capture, machine: Machine) -> tuple[Segment, ...] | None:

@@ -13,11 +13,18 @@ from pipeline.criticism.segment import Segment, Sensors, segment_of
 from pipeline.records.capture import Capture
 
 _FLUX_NOISE = 1e-3
+"""Noise of a table's column, as a share of its range: a table does not tell its own, and 0.1 % is
+what such tables are good to, by judgement."""
 _OTHER_AXIS = 0.1
+"""Share of the other axis's range that an axis has at the least: one that stands still has none."""
 _LEAST_NOISE = 1e-5
+"""Share of the largest voltage that the noise is never below: straight lines may fit exactly."""
 _FEW_LEVELS = 4
+"""Levels of d current from which on they can be held out one by one: the others tell a curve."""
 _ROWS_A_LEVEL = 3
+"""Rows a level on the average: two make a straight line, a third its scatter."""
 _CLEAR_OF_NOISE = 2.0
+"""Widths of the widest level that levels must be apart. By judgement: at 1 noise parts a level."""
 
 
 def flux_table(capture: Capture, _: Machine) -> Segment | None:

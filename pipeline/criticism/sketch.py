@@ -26,19 +26,26 @@ from pipeline.criticism.scores import TIE
 from pipeline.criticism.system import System
 from pipeline.criticism.terms import CENTRED, POWER, SHAPES, WAVES, Term
 
-_MOST = 4
+_MOST, _WORTH = 4, 0.01
+"""Groups of terms at the most, and the share of the whole gain that one must add. By judgement: a
+longer formula is the curve once more, and says nothing."""
 _TRIED = 6
-_WORTH = 0.01
+"""Groups whose scales are refined at each step. By judgement: each costs a search."""
 _SCALES = 18
+"""Trial scales from a hundredth to twice the range, a third apart: refining goes on from there."""
 _CENTRES = 24
 _WIDTHS_RAD = (0.15, 0.3, 0.6, 1.2)
-# where in its range a variable may have a hump, and how wide it may be
+"""Places a turn at which a bump is tried, and its widths [rad]: neighbours overlap."""
 _PARTS = (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9)
 _PARTS_WIDE = (0.03, 0.06, 0.12, 0.25)
-_ROUNDS = 12
-_SETTLED = 0.3
+"""Where in its range a variable may have a hump, and how wide it may be, as shares of the range."""
+_ROUNDS, _SETTLED = 12, 0.3
+"""Renewals of the weights at the most, and the change of −2 log L that ends them, as in `grams`."""
 _RIDGE = 1e-9
+"""Share of a curve's own information that is added to it: two curves of one shape do not run away,
+and no amplitude moves by more than that."""
 Group = tuple[Term, ...]
+"""Terms that come in together, as the sine and cosine of an order do."""
 
 
 @dataclass(frozen=True, slots=True)

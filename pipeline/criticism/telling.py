@@ -13,15 +13,17 @@ from pipeline.criticism.sketch import Expression, Pursuit, curve_about
 from pipeline.criticism.terms import POWER
 from pipeline.records.diagnosis import CurvePoint, UnknownStructure
 
-_POINTS = 17
-_TURN_POINTS = 48
-_DENSE = 2001
+_POINTS, _TURN_POINTS, _DENSE = 17, 48, 2001
+"""Points of a curve that is told, of one over a turn, and of one that is looked at."""
 _SURE = 1.96
-_ONE_SIDED = 0.1
+"""Standard uncertainties to either side of a band of 95 %."""
+_ONE_SIDED, _SLACK = 0.1, 0.05
+"""Share of a curve's size that it may miss its own mirror image by to be called odd or even, and
+part of the range around zero that is not asked: friction jumps there. By judgement."""
 _INSIDE = 0.97
-# the last part of a range, and how much of a change in it is none
 _TAIL, _LEVEL = 0.1, 0.02
-_SLACK = 0.05
+"""Part of a range up to which a maximum lies inside it; the last part of a range, and the share of
+a change in it that is none. By judgement: they choose words and nothing else."""
 _WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
 

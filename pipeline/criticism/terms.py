@@ -18,6 +18,7 @@ WAVES = ("sin", "cos")
 POWER = "power"
 CENTRED = ("hump", "resonance")
 _ABOVE_DEGC = 25.0
+"""Temperature that curves count from [°C], as everything in the model."""
 
 
 @dataclass(frozen=True, slots=True)

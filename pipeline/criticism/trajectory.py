@@ -26,13 +26,21 @@ from pipeline.criticism.residuals import measured, predicted
 from pipeline.criticism.segment import Segment
 
 ROUNDS = 15
+"""Newton's steps at the most: what has not settled by then does not."""
 _STATE = ("id_a", "iq_a", "theta_mech_rad")
 _PAD = 23
+"""Samples kept around a window: one less than a thinned log has there (`traces.PAD`)."""
 _START_S = 0.002
+"""Length [s] of the straight line that tells the first speed, as of `operate._SPEED_S`."""
 _SHORTEST = 32
-_SETTLED = 1e-4
-_LOST = 30.0
+"""Samples of a window that is worth a run; by judgement."""
+_SETTLED, _LOST = 1e-4, 30.0
+"""Last correction of a window that has settled, and one from which on it never will: in the
+machine's largest current and in electrical turns. By judgement: the first is what drives are
+modelled to (`floors._MODEL_DRIVE`), the second beyond any machine."""
 _PROBE = 1e-3
+"""Step of the finite differences, as a share of the machine's scale [A, rad/s], and in electrical
+radians: small against what bends the equations, large against rounding."""
 
 
 @dataclass(frozen=True, slots=True)

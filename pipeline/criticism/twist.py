@@ -34,18 +34,26 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array
 
 _BLOCKS_S = (0.5e-3, 1e-3, 2e-3, 4e-3)
-_WINDOW_S = 0.03
-_SHORTEST = 12
-_SURE = 5.0
-_FINE = 0.08
-_RANGE = 10.0
-_MOVES = 0.5
-_LEAST = 10
+"""Lengths of a block [s], of which the first serves that keeps noise small against the torque:
+what a gap does is short."""
+_SURE, _FINE = 5.0, 0.08
+"""Standard deviations of its noise from which on a torque is surely one, and the share of the
+torque's own scatter that these may come to. By judgement: lower, and blocks in which the gap is
+open count as closed; a larger share, and few blocks are closed."""
+_WINDOW_S, _SHORTEST, _LEAST = 0.03, 12, 10
+"""Length of a window [s], and blocks that it has, and in which torque is passed on, at the least.
+By judgement: in a longer one an unrecorded load is no constant, and a parabola and three columns
+leave little of a shorter one."""
+_RANGE, _MOVES = 10.0, 0.5
+"""How far the torque must move in a window: times what is surely a torque, and as a share of its
+scatter in the log. By judgement: under an even torque a twist is a constant."""
 _STARTS_RAD = (0.0, 3e-4, 1e-3, 3e-3, 1e-2)
-_ROUNDS = 40
-_USUAL = 0.25
-_ODD = 25.0
-_SETTLED = 1e-3
+"""Gaps [rad] that a fit is begun with: a factor of three apart over what couplings have."""
+_ROUNDS, _SETTLED = 40, 1e-3
+"""Renewals of the weights at the most, and the relative change that ends them."""
+_USUAL, _ODD = 0.25, 25.0
+"""Quantile of the turning windows' χ²/n up to which a window counts in full, and the most that it
+may be. By judgement: a higher one lets windows in which a load jumps decide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +252,8 @@ def _fitted(told: Sequence[_Window], inertia: float) -> tuple[Array, Array]:
     """Coefficients [3] of the columns, and their covariance [3, 3].
 
     What noise explains is little beside what the coupling's damping does, which no column knows:
-    a window counts in full up to the median χ²/n of those in which the torque turns. Weights that
+    a window counts in full up to the lower quartile of χ²/n of those in which the torque turns.
+    Weights that
     redescend have more than one end: a few gaps are begun with, and the end stays that leaves
     most windows near their noise.
     """

@@ -22,11 +22,20 @@ from pipeline.criticism.telling import told
 from pipeline.records.diagnosis import UnknownStructure
 
 _NEAR = 0.05
+"""Share of the best port's evidence within which another does as well. By judgement: at 0 noise
+chooses the variable, at 0.5 most ports are named."""
 _PRIOR = 1.0
+"""Standard deviation of a port's coefficient, in the machine's own scale. By judgement:
+no curve is larger."""
 _CARRIED = 5.0
+"""Growth of a variance without a unit from which on the unit carries the constant alone, as in
+`judge`."""
 _PARTS = 12
+"""Parts that a capture without a second is held out in, as logs are (`segments_log`)."""
 _EFFORT = ((1.0, 0.0), 20)
+"""Exponents of the weights that a descent begins with, and its steps, as for a thorough score."""
 _SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
+"""Signals of the shaft, to which a torque comes."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,8 +30,11 @@ SIZE = 4.0
 """Standard deviation at a capture's end, in standard deviations of the sensor's noise."""
 
 _TERMS = 8
+"""Sines that are kept: they hold 97 % of a random walk's power."""
 _TESTS = 2
+"""Tests in whose captures wander must show: a machine that warms up does so in its own alone."""
 _WANDERS = ("v", "i", "torque")
+"""Beginnings of the names of signals that wander: voltages, currents and torque."""
 
 
 def wandering(
