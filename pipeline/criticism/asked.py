@@ -29,9 +29,9 @@ class Begun:
 def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     """Fits a model from orders of magnitude.
 
-    Effects that have a shape or a choice come in one by one, the most helpful first, each from the
-    best of its trial values: from any other, a bump of friction would look for its speed on the
-    wrong side.
+    Effects that have a shape or a choice come in one by one, the most helpful first. Each begins at
+    the best of its trial values: from another one, a bump of friction may move its speed the wrong
+    way.
     """
     shaped = {
         effect.name: effect

@@ -17,11 +17,11 @@ from pipeline.criticism.system import Fitted, System
 def reconsidered(
     segments: Sequence[Segment], fitted: Fitted, around: System
 ) -> tuple[Fitted, System]:
-    """The fit with whichever choices of its effects are best, where anything is left over the floor
-    and others are better by 12 of −2 log L.
+    """The fit with other choices of its effects, where anything is left over the floor and these
+    are better by 12 of −2 log L.
 
-    A choice may have been made for what was missing then: the torque's ripple that a lagging
-    transducer does not pass on seemed not to reach the shaft.
+    A choice may have been right only while another effect was missing: a lagging transducer does
+    not pass on the torque's ripple, which so seemed not to reach the shaft.
     """
     for effect in fitted.model.effects:
         if not told_groups(around, segments).any():

@@ -24,8 +24,8 @@ def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
     """Period [s] and sample numbers [n] of an even clock whose stamps [n, s] scatter by less than
     half the period; None where there is no such clock.
 
-    Where over half a period more than one has passed samples may be missing, and numbers left out:
-    whichever scatters less.
+    Two counts are tried: one in which a long step stands for missing samples, whose numbers are
+    left out, and one in which it does not. The one with less scatter counts.
     """
     since = time - time[0]
     steps = np.diff(since) / np.median(np.diff(since))

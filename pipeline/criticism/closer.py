@@ -60,7 +60,7 @@ def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
 
 
 def settled(effect: Effect, told: Told) -> Effect:
-    """The effect with what whole logs tell of its shape as known numbers, which no fit moves."""
+    """The effect with the shapes that whole logs tell: they are known, and no fit moves them."""
     return replace(effect, parameters=tuple(_known(p, told) for p in effect.parameters))
 
 
@@ -76,8 +76,8 @@ def renamed(
     name: str,
     library: Mapping[str, Effect],
 ) -> tuple[Fitted, System]:
-    """The fit with that one in an effect's place which whole logs tell, of those that share its
-    look, and with the numbers that these tell.
+    """The fit with the effect `name` exchanged for the one that whole logs tell, of those that
+    share its closer look, and with the numbers that these logs tell.
     """
     fitted, around = chosen
     effect = next(e for e in fitted.model.effects if e.name == name)

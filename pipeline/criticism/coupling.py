@@ -44,7 +44,7 @@ def passed_on(x: Operating, share: float) -> Array:
     """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
 
     `share` of the inertia is at the far end. Three running means keep the encoder's rounding out
-    of it; twiced [3], so that a ringing stays as it is, to one per cent at a seventh of 1/block.
+    of S. They are twiced [3], so that a ringing up to a seventh of 1/block passes to one per cent.
     """
     block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
     block -= 1 - block % 2
@@ -74,8 +74,8 @@ def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
 def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
     """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m].
 
-    `between`: the transducer stands between the two parts, and reads S whatever holds the far end.
-    The twist is differenced as it is: the windows of the weak form smooth it.
+    `between`: the transducer stands between the two parts, and reads S whether or not the far end
+    is held. The twist is not smoothed before it is differenced: the weak form's windows do that.
     """
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
@@ -89,8 +89,8 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
 def side_of(through_nm: Array, least_nm: float) -> Array:
     """Side of a gap [n], −1 to 1, that the torque passed on presses to.
 
-    Where it is less than `least_nm` the gap is crossed, if the torque comes back with the other
-    sign: slowly at first, at an even acceleration.
+    Below `least_nm` the gap is open. If the torque comes back with the other sign, the gap is
+    crossed in between: slowly at first, at an even acceleration.
     """
     closed = np.flatnonzero(np.abs(through_nm) > least_nm)
     if closed.size == 0:
@@ -108,8 +108,8 @@ def side_of(through_nm: Array, least_nm: float) -> Array:
 def closer(wholes: Sequence[Whole], q: Values) -> Told | None:
     """Backlash or compliance, from drive logs in which the torque changes its sign.
 
-    It is a gap where it is surely one, and more than what the spring gives at the torque that is
-    passed on; a spring where such a gap is surely not there.
+    It is a gap if the gap is surely there, and wider than the spring's twist at the torque passed
+    on. It is a spring if such a gap is surely not there. Else neither is told.
     """
     between, share = q["between"] > 0.0, q["share"]
     if share <= 0.0 or not wholes:
@@ -130,7 +130,7 @@ def closer(wholes: Sequence[Whole], q: Values) -> Told | None:
 
 
 def _shaft(one: Whole, between: bool, share: float) -> Shaft:
-    """What a log tells of the coupling: its torque itself, or the momentum of both parts."""
+    """A log as `law_of_twist` takes it: the coupling's torque, or the momentum of both parts."""
     x, inertia = one.x, one.x.base["j_kgm2"]
     driving = x.torque_nm - one.drag_nm
     u_both = math.hypot(one.u_shaft_nm, one.u_air_gap_nm)

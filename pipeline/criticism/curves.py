@@ -47,8 +47,10 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """Curves c(v) = Σ c_k mix_k(v) + Σ waves: `mix` [N, K] are curves on `nodes` [N], linear
-    between and constant beyond them; each of `orders` adds a sine and a cosine.
+    """Curves c(v) = Σ c_k mix_k(v) + Σ waves.
+
+    `mix` [N, K] holds the curves at `nodes` [N]; they are linear between nodes and constant beyond
+    them. Each of `orders` adds a sine and a cosine.
     """
 
     names: tuple[str, ...]

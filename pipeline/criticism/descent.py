@@ -98,8 +98,8 @@ def gauss_newton(
 def _tried(
     segments: Sequence[Segment], fitted: Fitted, around: System, step: Array, halvings: int
 ) -> tuple[Fitted, System, float]:
-    """The fit a step away, or as far as it goes without harm; the system there, with the columns
-    of the start, and the fall of misfit that these promised.
+    """The fit after a step, shortened until it does no harm; the system there, with the columns of
+    the start; and the fall of misfit that these columns promised.
     """
     for _ in range(halvings):
         moved = _moved(fitted, around.columns, step)
@@ -119,9 +119,11 @@ def _damped(fitted: Fitted, around: System) -> Best:
 
 
 def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:
-    """Inverse variance [P] of one step, not of where it ends: what the captures hardly know does
-    not leap out of the range in which the equations are near their tangent [1]. What a missing
-    effect has brought next to nothing, as an encoder off its centre does J, must not stay there.
+    """Inverse variance [P] of one step (a prior would be one of where it ends).
+
+    So a parameter that the captures hardly know does not leave the range in which the equations are
+    near their tangent [1]. A constant next to zero still has some reach: a missing effect may have
+    brought it there, as an encoder off its centre does J.
     """
     machine = fitted.model.machine
     scales = base_scales(machine)
@@ -142,11 +144,10 @@ def _moved(fitted: Fitted, columns: Sequence[Column], step: Array) -> Fitted:
 
 
 def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = None) -> Fitted:
-    """Fits a model from orders of magnitude, but for values that are `known`, every equation by the
-    machine's own scale.
+    """Fits a model from orders of magnitude, or from the values that are `known`.
 
-    By its noise floor, an equation that misses it by far would be given up before the constants
-    are near. A few windows of each segment are enough.
+    Every equation counts by the machine's own scale. By its noise floor, one that is far off would
+    be given up before the constants are near. A few windows of each segment are enough.
     """
     values = {**start_values(model, model.machine), **(known or {})}
     few = [sparse(segment) for segment in segments]
@@ -168,8 +169,8 @@ def first_fit(segments: Sequence[Segment], near: Fitted) -> tuple[Fitted, System
 def rough_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
     """A rough fit begun once more from orders of magnitude, shapes of effects as they are.
 
-    What was missing before an effect came in may have left constants, and floors that were made by
-    them, where no step leads back from: an encoder off its centre shakes a light rotor less.
+    Before an effect came in, its absence may have moved constants, and the floors made by them, to
+    where no step leads back from: an encoder off its centre shakes a light rotor less.
     """
     model = fitted.model
     shapes = [name for name, (_, p) in model.parameters().items() if not p.amplitude]
@@ -182,8 +183,8 @@ def _one_side_first(
 ) -> tuple[Fitted, System]:
     """A fit that begins with the equations of some signals alone.
 
-    A short programme holds its equations little together: which of them is given up, where they
-    contradict each other, must not hang on where the fit began.
+    In a short programme few captures hold the equations together. Where these contradict each
+    other, which of them is given up must not depend on where the fit began.
     """
     alone = tuple(
         np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, _SILENT * sigma)

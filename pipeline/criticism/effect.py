@@ -46,12 +46,11 @@ class Parameter:
     `typical` is a size seen on real benches, `negligible` one that nobody would act on; both are
     magnitudes; with a shape below its negligible one the effect is not there. `scan`: trial values
     of a shape parameter, which has no influence while the amplitudes of its effect are zero; empty
-    for an amplitude. A `choice` takes one of these values
-    and is never fitted. `optional`: the parameters of one number above 0 form a term that the
-    effect can do without; without it they are zero. `u`: standard uncertainty, in its own unit,
-    of a value that a closer look told. `at_least`: another amplitude of the effect that this one
-    comes to, as what a meter reads of a resistance that grows with the frequency; captures in which
-    it does not speak against the effect.
+    for an amplitude. A `choice` takes one of these values and is never fitted. `optional`: the
+    parameters of one number above 0 form a term that the effect can do without; without it they
+    are zero. `u`: standard uncertainty, in its own unit, of a value that a closer look told.
+    `at_least`: another amplitude of the effect; if this one stays below half of it, captures speak
+    against the effect.
     """
 
     name: str
@@ -80,10 +79,9 @@ class Machine:
 
     `scales` [unit of the name's suffix]: the largest current, speed, torque and voltage seen,
     the sample period, and what follows from them. `torque_orders` are the orders per turn that
-    stand out of a slow turn, `load_orders` others that a fit left in logs under load, of which some
-    may be no whole numbers, `slots` the
-    nameplate's. `stated_u`: the standard uncertainty of the
-    station's gains and thermometers by the name of the nuisance that stands for each;
+    stand out of a slow turn, `load_orders` others that a fit left in logs under load, whole
+    numbers or not, `slots` the nameplate's. `stated_u` is the standard uncertainty of the
+    station's gains and thermometers, by the name of the nuisance that stands for each;
     `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none.
     """
 

@@ -52,9 +52,9 @@ _CREEPS, _REST_S = 1e-3, 5e-3
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
     """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
 
-    White noise of each sensor's own level, and the rounding of an angle that is rounded and of
-    signals that are coarse, is added to the recording and the residual computed again; the variance
-    of the change is pooled over windows of one (channel, order).
+    Noise is added to the recording and the residual computed again; the variance of the change is
+    pooled over the windows of one (channel, order). The noise is white, of each sensor's own level;
+    an angle that is rounded, and signals that are coarse, are rounded anew besides.
     """
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
@@ -92,8 +92,8 @@ def _white(segment: Segment, name: str) -> float:
 def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
     """Parts of a step [count] by which coarse signals are moved to be rounded anew.
 
-    Evenly spread, since of a steady signal a shift is all that its error hangs on, and in an order
-    of each signal's own.
+    They are evenly spread, since the error of a steady signal depends on the shift alone, and every
+    signal has them in an order of its own.
     """
     even = (np.arange(count) + 0.5) / count - 0.5
     generator = np.random.default_rng([seed, count])
@@ -117,8 +117,8 @@ def form_tolerance(
 ) -> Array:
     """What the forms of the effects that were added may be wrong by [groups], as weak samples.
 
-    No formula of an effect is better than a fiftieth of what the effect does, or another `share`.
-    Error below that, where a found effect acts, tells of its form and names no further effect.
+    No formula of an effect is right to better than a fiftieth of what the effect does (`share`).
+    Where a found effect acts, an error below that is one of its form, and names no further effect.
     """
     group, _, valid, groups = row_index(segment)
     total = np.zeros(len(groups))
@@ -135,12 +135,12 @@ def form_tolerance(
 def reading_error(
     segment: Segment, model: Model, values: Values, state: Operating | None = None
 ) -> Array:
-    """What no model of a bench gets right to, as weak samples [C, W, M]; `state` is the segment's
-    true state [n], where it is known already.
+    """The error that any model of a bench is allowed, as weak samples [C, W, M]; `state` is the
+    segment's true state [n], where it is known already.
 
-    5e-5 of the reading in a window, since no sensor is more linear than that, and a part of the
-    machine's own scale for what happens between samples: 1e-4 under a drive, 2e-5 on a bench. An
-    effect that hides in this is nobody's concern, and structure that is smaller names nothing.
+    It is 5e-5 of the reading in a window, since no sensor is more linear, and for what happens
+    between samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. An
+    effect that hides in this is nobody's concern, and smaller structure names nothing.
     """
     weak = segment.weak
     if weak is None:
@@ -176,7 +176,7 @@ def reading_error(
 
 
 def _jumps(segment: Segment) -> Array:
-    """Voltage [W] that a jump may be out by, as weak samples: a quarter of it for one sample.
+    """Error [W] that a jump of the voltage may make, as weak samples: a quarter of it for a sample.
 
     A log says what the voltage was at its samples, not when within a period it changed.
     """
@@ -195,10 +195,10 @@ def _jumps(segment: Segment) -> Array:
 
 
 def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
-    """Torque [W] that friction may be out by where the shaft rests or creeps, as weak samples.
+    """Error [W] that friction may make where the shaft rests or creeps, as weak samples of torque.
 
-    A shaft that sticks is held by anything between plus and minus its friction [Armstrong-Hélouvry
-    (1991), ch. 4], whatever the log says of its speed: a rectangle's standard deviation.
+    Whatever the log says of its speed, a shaft that sticks is held by anything between plus and
+    minus its friction [Armstrong-Hélouvry (1991), ch. 4]: T/√3, a rectangle's standard deviation.
     """
     weak = segment.weak
     if weak is None:
@@ -233,8 +233,9 @@ def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
 def _encoder_lines(segment: Segment, values: Values) -> Array:
     """Torque [W, M] that a line of the encoder's own error makes on an order k, as weak samples.
 
-    Rounding at steady speed is periodic in the angle; of its harmonics, some beat with the sampling
-    on to any order. J (k ω)² times 0.03 steps is the 10th of them [Widrow & Kollar (2008), ch. 20].
+    Rounding at steady speed is periodic in the angle, and some of its harmonics beat with the
+    sampling on to any order k. The 10th has 0.03 steps [Widrow & Kollar (2008), ch. 20], and makes
+    a torque of J (k ω)² times that.
     """
     weak = segment.weak
     if weak is None:
@@ -264,8 +265,8 @@ def channel_scale(segment: Segment, channel: str, model: Model, values: Values) 
 
 
 def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
-    """Whitened weak samples of an offset of each channel's sensor, of its prior size, and of the
-    mains lines and the wander that it may have.
+    """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
+    offset of each channel's sensor, mains lines and wander.
     """
     made = [] if segment.lines is None else [line[valid] * whiten for line in segment.lines]
     if segment.offsets is not None:

@@ -108,10 +108,9 @@ class Grams:
     def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int = _ROUNDS) -> Descent:
         """The step of least misfit.
 
-        Weighted least squares, the weights renewed until the misfit stays. That has more than one
-        end: a group may be given up that another start would have saved, so it is begun with the
-        weights of the residual at hand, with their square roots and with equal ones, or with
-        the powers in `starts`.
+        Weighted least squares, the weights renewed until the misfit stays. There may be more than
+        one end: one start gives up a group that another would have saved. So it begins once for
+        each power in `starts`, with the weights of the residual at hand to that power.
         """
         now = np.maximum(self._spreads(self.power), 1.0)
         ends = [self._descended(now**power, rounds) for power in starts]

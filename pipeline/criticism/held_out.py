@@ -105,9 +105,9 @@ def traces(
 
 
 def _equations(segment: Segment, fitted: Fitted, one: Simulated) -> Iterator[Trace]:
-    """What the equations make of the recorded state, averaged over a millisecond.
+    """What the equations predict from the recorded state, averaged over a millisecond.
 
-    Sample by sample the second difference of the angle would drown the torque in noise.
+    Without the mean, the noise of the angle's second difference would cover the torque.
     """
     weak = segment.weak
     if weak is None:

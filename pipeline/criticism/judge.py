@@ -34,10 +34,11 @@ _VOLTS = ("vd_v", "vq_v")
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """Residual [R] of every row as predicted without its own capture; NaN where that capture
-    alone carries a constant and so is always in the fit. `total` is 1 at the noise floor, that of
-    the fit itself where no row could be predicted. `steps` [own columns] are how far the parameters
-    move without a capture, by its number.
+    """A fit's errors where each capture is predicted without itself.
+
+    `residual` [R] is NaN in a capture that alone carries a constant, and so is always in the fit.
+    `total` is the rms of the others over the noise floor; of the fit itself if there are none.
+    `steps` [own columns] are how far the parameters move without a capture, by its number.
     """
 
     residual: Array
@@ -55,8 +56,8 @@ class HeldOut:
 def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> HeldOut:
     """Predicts every capture from all the others, by one weighted step from the full fit.
 
-    Of `segments` that are parted in blocks, every block is predicted from all else. The fit is
-    left out of to first order: noise floors, weights and shapes stay those of the full fit.
+    Of `segments` that are parted in blocks, every block is predicted from all else. This is to
+    first order: noise floors, weights and shapes stay those of the full fit.
     """
     places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
     weight = around.weights(around.spreads(around.residual))
@@ -87,11 +88,11 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
 
 
 def uncertainties(around: System, held: HeldOut, own: int) -> Array:
-    """Standard uncertainty [own] of a fit's parameters: the larger of what the samples' noise makes
-    and what one capture less would change.
+    """Standard uncertainty [own] of a fit's parameters: from the samples' noise, or from leaving
+    out one capture at a time, whichever is larger.
 
-    Forms that are not quite right and noise that is not white disturb captures each in its own
-    way, of which a covariance from samples knows nothing. References: [1] Efron & Stein, Ann.
+    A form that is a little wrong, or noise that is not white, disturbs every capture in its own
+    way; a covariance from samples does not know that. References: [1] Efron & Stein, Ann.
     Stat. 9 (1981), jackknife variance (K − 1)/K Σ (θ_k − mean)².
     """
     noise = np.sqrt(np.maximum(np.diag(around.covariance(np.arange(own))), 0.0))
@@ -107,8 +108,8 @@ def uncertainties(around: System, held: HeldOut, own: int) -> Array:
 def in_common(fits: Sequence[System], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
     """The same rows held out of several fits to the same captures, so that their errors compare.
 
-    A parameter that one capture alone carries keeps that capture in the fit: to count it where it
-    is predicted, and not where it is fitted, would pass for a better prediction.
+    A parameter that one capture alone carries keeps that capture in the fit. If it counted in one
+    fit and not in the other, that would pass for a better prediction.
     """
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
     told = shared if shared.any() else np.ones(shared.size, dtype=bool)
@@ -149,7 +150,7 @@ def _unit(normal: Array) -> Array:
 
 
 def _lost(less: Array, normal: Array) -> bool:
-    """Whether some constant keeps less than a hundredth of a thousandth of its information."""
+    """Whether some constant keeps less than 1e-5 of its information."""
     return bool((np.diag(less) < 1e-5 * np.diag(normal)).any())
 
 
@@ -172,11 +173,11 @@ def signal_errors(segments: Sequence[Segment], around: System, residual: Array) 
 def remainder(
     around: System, segments: Sequence[Segment], residual: Array, large: bool = False
 ) -> tuple[Remainder, ...]:
-    """Groups over their floor, significantly and by a size that matters, the worst first; `large`:
-    that matters to the machine as a whole.
+    """Groups that are over their floor significantly and by a size that matters, the worst first.
 
-    A floor that comes from the recording itself is no better than a factor 2 in variance, and
-    error below a two-thousandth of the machine's voltage or torque is nobody's concern.
+    With `large`, the size must matter to the machine as a whole. A floor from the recording itself
+    is good to a factor of 2 in variance, and nobody acts on an error below 5e-4 of the machine's
+    voltage or torque.
     """
     return tuple(one for one in over_floor(around, segments, residual, large) if one.matters)
 
@@ -184,8 +185,9 @@ def remainder(
 def over_floor(
     around: System, segments: Sequence[Segment], residual: Array, large: bool = False
 ) -> tuple[Remainder, ...]:
-    """Groups significantly over their floor, whether their size matters or not, the worst first:
-    what explains a held-out error over the floor that `remainder` does not.
+    """Groups that are over their floor significantly, at any size, the worst first.
+
+    They say where a held-out error over the floor comes from when `remainder` is empty.
     """
     found = []
     for place, chi2_per_n, size, matters in _over(around, segments, residual, around.soft, large):
@@ -198,8 +200,8 @@ def over_floor(
 
 
 def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_]:
-    """Groups [G] that a fit leaves over their floor as `remainder` has it, but with what the forms
-    of effects found may be wrong by in that floor.
+    """Groups [G] that a fit leaves over their floor, judged as `remainder` does, but with the
+    tolerance of form of the effects found in that floor.
     """
     told = np.zeros(len(around.labels), dtype=bool)
     as_whitened = np.ones(around.size)
@@ -215,8 +217,8 @@ def _over(
     soft: Array,
     large: bool = False,
 ) -> Iterator[tuple[int, float, float, bool]]:
-    """Place, χ²/n and size of every group over a floor that is `soft` [R] of what rows are over,
-    and whether that size matters.
+    """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is
+    `soft` [R] of the scale that rows are divided by.
     """
     spreads, counts = around.spreads(residual / soft), around.counts
     for place, (number, channel, _) in enumerate(around.labels):
@@ -233,9 +235,9 @@ def _over(
 
 @cache
 def _highest_by_chance(n: float) -> float:
-    """χ²/n of n samples that chance is over as seldom as five standard deviations of a normal
-    variable: of few samples the tail of χ² is long, and 1 + 5 √(2/n) is passed by one in a thousand
-    of four.
+    """χ²/n of n samples that chance passes as seldom as five standard deviations.
+
+    The tail of χ² itself is used: of four samples, 1 + 5 √(2/n) is passed one time in a thousand.
     """
     return float(chdtri(n, _CHANCE)) / n
 

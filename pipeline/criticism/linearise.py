@@ -57,10 +57,10 @@ class Column:
 class Rows:
     """Weak samples of one segment: residual [R] and columns [R, P], both over the noise.
 
-    `group` [R] numbers (channel, order) pairs listed in `groups`; `window` [R] the window; `unit`
-    [R] is what a residual of one is as a window's mean, in the signal's own unit; `soft` [R] the
-    noise floor over what rows are divided by, below 1 where a tolerance of form is in it; `whiten`
-    [R] one over that.
+    `group` [R] numbers (channel, order) pairs listed in `groups`, `window` [R] the window. `unit`
+    [R] is a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by
+    `whiten` [R]; `soft` [R] is the noise floor over the scale that a row is divided by, below 1
+    where a tolerance of form was added.
     """
 
     residual: Array
@@ -117,9 +117,9 @@ def linearise(
 
 
 def absorb(rows: Array, unknown: Sequence[Array]) -> None:
-    """Whitens rows [R, P] in place for disturbances [R] of standard size that they may hold.
+    """Whitens rows [R, P] in place for the disturbances [R each, of standard size] in `unknown`.
 
-    (1 + N Nᵀ)^(−1/2) leaves all that is across the disturbances N as it is.
+    The factor is (1 + N Nᵀ)^(−1/2), N the disturbances: what is orthogonal to them stays as it is.
     """
     if unknown:
         axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
@@ -128,8 +128,9 @@ def absorb(rows: Array, unknown: Sequence[Array]) -> None:
 
 
 def whitened_anew(segment: Segment, rows: Array, before: Array, after: Array) -> Array:
-    """Rows [R, P] of one segment that were whitened by `before` [R], its disturbances absorbed, as
-    they are whitened by `after`: what a louder noise leaves of an offset is more.
+    """Rows [R, P] of one segment, whitened by `after` [R] instead of `before` [R].
+
+    Disturbances are absorbed anew as well: beside a louder noise an offset is absorbed less.
     """
     _, _, valid, _ = row_index(segment)
     bare = rows.copy()

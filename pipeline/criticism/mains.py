@@ -74,10 +74,9 @@ class Hum:
 def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Hum, ...]:
     """The mains lines of every signal, from the residuals around a rough fit.
 
-    The mains are there if the power of a line is 20 times that beside it in three captures, in
-    whatever signals. Then every signal has the line in which it stands out in half of the captures
-    that could show it: where an order of the turning shaft comes too near, or the rate of a map's
-    levels, none could.
+    A line is there if its power is 20 times that beside it in three captures, in whatever signals.
+    A signal then has the line if it stands out there in half of the captures that can show it. A
+    capture cannot if an order of its turning shaft, or the rate of a map's levels, is too near.
     """
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
     clear: dict[float, set[str]] = defaultdict(set)
@@ -115,8 +114,8 @@ def with_hum(
 ) -> tuple[Segment, ...]:
     """The segments, each knowing the lines that its channels may have.
 
-    Sensors of current pick up what those of voltage do, counted in their own noise; the model says
-    what becomes of that: its share of a torque grows with the current.
+    A sensor of current may pick up as much as one of voltage, both in multiples of their noise. The
+    model says what that does: its share of a torque grows with the current.
     """
     return tuple(_humming(segment, heard, model, values) for segment in segments)
 
@@ -216,8 +215,8 @@ class _Spectrum:
         return self.bins * self.ts_s
 
     def repeats_at(self, freq_hz: float) -> bool:
-        """Whether the runs come at a rate of which this is a multiple: what the first moments after
-        every step of a test are alike in is a line there.
+        """Whether this frequency is a multiple of the rate of the runs: whatever is alike after
+        every step of a test makes a line there.
         """
         starts = self.place[[run.start for run in self.runs]]
         if starts.size < _CAPTURES:
@@ -234,8 +233,8 @@ class _Spectrum:
     ) -> list[tuple[float, float]]:
         """Mean square of each line in a signal [n], and of what lies beside it.
 
-        What is not of one size and phase from beginning to end is no line, whatever its spectrum,
-        nor what is more than `most`, nor the skirt of a stronger one beside it.
+        A peak is no line if its size or phase changes on the way, if it is more than `most`, or if
+        it is the skirt of a stronger one beside it. Its mean square is then that beside it.
         """
         flat = self.weight * self._about_its_mean(signal)
         whole = np.zeros(_FINER * self.bins)
@@ -258,8 +257,8 @@ class _Spectrum:
         return told
 
     def _about_its_mean(self, signal: Array) -> Array:
-        """A signal [n] less the mean of each run that holds two cycles of any line: of what differs
-        from run to run the gaps between them would make lines.
+        """A signal [n] less the mean of each run that holds two cycles of any line. With the gaps
+        between them, runs of different means would make lines.
         """
         level = np.full_like(signal, float(np.average(signal, weights=self.weight)))
         for run in self.runs:

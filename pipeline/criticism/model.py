@@ -173,9 +173,9 @@ def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
 def mean_current(x: Operating, values: Values) -> Operating:
     """Where the drops of a sample period act: at its mean current, not at the sampled one.
 
-    A voltage that is held in the stationary frame while the rotor turns makes the flux follow
-    chords instead of arcs; the current ripples, and its mean lies a part of the period off. Both
-    parts are nuisances of the fit.
+    A voltage is held in the stationary frame while the rotor turns, so that the flux follows chords
+    instead of arcs. So the current ripples, and its mean is that of another instant and is below
+    its samples. Nuisances of the fit say by how much: `ripple_slope` and `ripple_mean`.
     """
     if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
         return x
@@ -197,8 +197,8 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
     """Flux linkage [n, Wb] and current [n, A] that a period's means are below the samples.
 
     A voltage v that is held while the rotor turns by ω_e T_s in a period makes the flux ripple by
-    v T_s ω_e T_s; `part` of that is the mean's distance from the sample: 1/12 where the voltage
-    changes, −1/24 half a period from there.
+    v T_s ω_e T_s. The mean is off the sample by `part` of that: 1/12 for samples where the voltage
+    changes, −1/24 for samples half a period from there.
     """
     turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
     flux = part * turn * (turn * base_flux(x, values) - 1j * x.ts_s * values["r_ohm"] * x.i_a)

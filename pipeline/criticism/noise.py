@@ -105,8 +105,10 @@ def coarse_step(signal: Array, sigma: float) -> float:
 
 
 def unrounded(signal: Array, step: float) -> Array:
-    """What a slow signal [n] may have been before it was rounded: straight from one change of a
-    single step to the next, where it stood half way between; as it is around larger changes.
+    """What a slow signal [n] may have been before it was rounded.
+
+    Where it changes by a single step it stood half way between the two; it is straight from one
+    such place to the next. Around larger changes it stays as it is.
     """
     change = np.diff(signal)
     at = np.flatnonzero(change)
@@ -123,8 +125,8 @@ def unrounded(signal: Array, step: float) -> Array:
 def rounding_error(signal: Array, step: float, shift: float) -> Array:
     """What rounding to multiples of `step` does to a signal [n] like this one [its unit].
 
-    The recorded signal, smoothed, is rounded anew, moved by `shift` steps. Of a steady motion that
-    is no white noise: it is a saw-tooth whose beat with the sampling may fall on any order.
+    The recorded signal is smoothed, moved by `shift` steps and rounded anew. Of a steady motion the
+    error is no white noise, but a saw-tooth whose beat with the sampling may fall on any order.
     """
     kernel = np.full(_SMOOTH, 1.0 / _SMOOTH)
     padded = np.pad(signal / step, _SMOOTH // 2, mode="reflect", reflect_type="odd")
@@ -171,11 +173,11 @@ def rounding_step(signal: Array) -> float:
 
 
 def _sharpened(signal: Array, step: float) -> tuple[float, Array]:
-    """The step near a rough one at which ever longer parts of the record are whole multiples of it,
-    and the longest parts [parts, samples] that are.
+    """The step near a rough one of which long parts of the record are whole multiples, and the
+    longest parts [parts, samples] that are.
 
-    A part that spans m steps tells the step to 1/m of itself, so that its phase is searched as far
-    as the part before left it open. Offsets of the parts are free.
+    A part that spans m steps tells the step to 1/m of itself. So the parts grow, and each is
+    searched only as far as the one before left the step open. Offsets of the parts are free.
     """
     known = step * math.log(8.0) / _STEPS
     parts = _parts(signal, _FIRST_WINDOW)
@@ -195,7 +197,7 @@ def _sharpened(signal: Array, step: float) -> tuple[float, Array]:
 
 
 def _best_step(parts: Array, step: float, reach: float, spacing: float) -> float:
-    """The most coherent of trial steps around one, no more than there are at first."""
+    """The most coherent of the trial steps around one, which are some `_STEPS` at most."""
     count = min(math.ceil(reach / spacing), _STEPS // 2)
     trials = step + spacing * np.arange(-count, count + 1, dtype=np.float64)
     # of equals, the nearest
@@ -204,7 +206,7 @@ def _best_step(parts: Array, step: float, reach: float, spacing: float) -> float
 
 
 def _parts(signal: Array, length: int) -> Array:
-    """Parts [parts, samples] of a signal, less their first sample: those of the larger spans."""
+    """Parts [parts, samples] of a signal less their first sample: the half that spans most."""
     length = min(length, signal.size)
     starts = np.unique(np.linspace(0, signal.size - length, _PLACES).round().astype(np.int64))
     inside = np.linspace(0, length - 1, min(length, _LOOKED_AT // starts.size))

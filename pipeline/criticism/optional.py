@@ -27,10 +27,9 @@ def trimmed(
 ) -> tuple[Fitted, System]:
     """The fit with the optional terms of the named effects that do not pay left out.
 
-    A term pays when −2 log L falls by more than ln n a parameter. What to first order does not pay
-    is left out in one refit; if that loses more than foreseen, one term after the other is, of
-    those as well that to first order pay less than twenty prices. One term with an amplitude always
-    stays.
+    A term pays when −2 log L falls by more than ln n a parameter. All terms that to first order do
+    not pay are left out in one refit. If that loses too much, they are tried one by one, and with
+    them the terms that to first order pay less than twenty prices. One amplitude always stays.
     """
     price = math.log(max(around.size, 2))
     for name in names:
@@ -50,8 +49,9 @@ def trimmed(
 
 
 def whole(fitted: Fitted) -> Fitted:
-    """Where a fit with the terms begins that the machine's own effects were without: what did not
-    pay while something else was missing may pay now.
+    """Where a fit begins in which the machine's own effects have all their terms again.
+
+    A term that did not pay while another effect was missing may pay now.
     """
     model = fitted.model
     own = [e if e.hook == "sensor" else replace(e, left_out=()) for e in model.effects]

@@ -26,11 +26,10 @@ def holding_orders(
 ) -> tuple[int, ...]:
     """Multiples of `bases` (pole pairs, slots) that a holding current repeats, in any order found.
 
-    Forward selection: the order that takes most of the square of what is left joins while the
-    sectors of the turn, each predicted from all others, gain by more than `_CLEAR` times the
-    scatter of their gains. With one parameter more a sector than there is evidence for, sectors
-    that were held out get worse at once, however well the rest is fitted. Of fewer than six sectors
-    the scatter is not known well enough to tell of any order.
+    Forward selection: the order that takes most of the square of what is left joins, as long as the
+    sectors of the turn, each predicted from all others, gain on average by more than `_CLEAR`
+    standard errors. An order too many makes held-out sectors worse at once, however well the rest
+    is fitted. With fewer than six sectors their scatter is not known, and no order is told.
 
     References: [1] Chen, Billings & Luo, Int. J. Control 50 (1989), forward selection; [2] Hastie,
     Tibshirani & Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 7.10.

@@ -31,9 +31,9 @@ def rivals_of(
     """Effects that explain the captures as well in an effect's place (misfit within 12, and so
     much of it that is over noise floors and priors).
 
-    Those are refitted in its place that to first order keep most of what the effect explains, or
-    that were `passed_over` for it; those that share its closer look are rivals where that does not
-    tell them apart.
+    Refitted in its place are those that to first order keep half of what it explains, and those
+    that were `passed_over` for it. Effects that share its closer look are rivals if that look does
+    not tell them apart.
     """
     effect = next(e for e in fitted.model.effects if e.name == name)
     alike = kin(effect, {one.effect.name: one.effect for one in offered})

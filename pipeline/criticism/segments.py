@@ -56,8 +56,8 @@ _WINDOWS, _WINDOWS_LOG = 48, 32
 """Windows of a map or open winding, and of a drive's log, at the most. By judgement: cost goes with
 them, and a programme has several logs."""
 _LEAD = 0.05
-"""Share of a coast for which a shaft must be held before it for the hold to count as driven. By
-judgement: the moment of letting go is shorter."""
+"""Share of a coast from which on the time before it counts as driven. By judgement: the moment of
+letting go is shorter."""
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
@@ -79,10 +79,10 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
 
 
 def _by_encoder(segment: Segment, step: float) -> Segment:
-    """The segment with the step of the encoder that drive logs show, where its angle is in such.
+    """The segment with the encoder step that drive logs show, if its angle is in such steps.
 
-    A shaft that turns by nearly whole steps a sample does not show them itself, and its rounding is
-    then periodic in the angle, as an electrical order is.
+    A shaft that turns by nearly whole steps a sample does not show the step itself, and its
+    rounding is then periodic in the angle, as an electrical order is.
     """
     theta = segment.recorded.get("theta_mech_rad")
     known = theta is not None and is_rounded(theta, step)
@@ -168,8 +168,10 @@ def _shaft(capture: Capture, machine: Machine) -> Segment | None:
 
 
 def _coasts(theta: Array, window: int) -> NDArray[np.bool_]:
-    """Samples [n] in which a shaft coasts: all of a record that begins at speed, and of others not
-    those in which it is brought to its speed, or held there for a twentieth of the coast or more.
+    """Samples [n] in which a shaft coasts.
+
+    These are all samples, unless the shaft is driven or held at its speed before some coast, for
+    more than a twentieth of that coast. Then they are those of the coasts alone.
     """
     speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
     runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
@@ -296,8 +298,8 @@ def _settled(weak: Projection, amps: Array, noise: float) -> Projection:
 
 
 def _lcr(capture: Capture, _: Machine) -> Segment | None:
-    """A table over the angle; a reading scatters about its mean and two waves a turn, but is known
-    no better than its last digit and a ten-thousandth of it.
+    """A table over the angle. Its noise is the scatter about a mean and two waves a turn, but never
+    less than the rounding of its last digit, or a ten-thousandth of the largest reading.
     """
     if not capture.has("theta_elec_deg", "lab_h"):
         return None

@@ -26,9 +26,9 @@ def q_log(capture: Capture, machine: Machine) -> tuple[Segment, ...] | None:
     """Segments of the q voltage and of the motion; None without q voltage, current and motion.
 
     The d current is taken as held at zero, which is what a drive that logs the q axis alone does.
-    Where the log holds the drive's own speed, the voltage is held against that one, since both
-    belong to one clock, and that one against the angle; how late it is is for `sample_delay` to
-    say. The motion is that of the angle. Without a torque sensor the shaft is free.
+    If the log holds the drive's own speed, the voltage is predicted from it, since both share one
+    clock, and the speed itself is compared with the angle; `sample_delay` says how late it is. The
+    motion is that of the angle. Without a torque sensor the shaft is free.
     """
     moving = [n for n in ("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad") if capture.has(n)]
     if not capture.has("t_s", "vq_v", "iq_a") or not moving:
@@ -74,7 +74,7 @@ def _motion(
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:
     """Samples [size] of the even clock that are not near a reading that came late.
 
-    A host that was held up reads again at once, and what it then reads is of before.
+    A host that was held up reads again at once, and then gets old values.
     """
     time = capture.arrays("t_s", masked=False)["t_s"]
     gaps = np.diff(time)

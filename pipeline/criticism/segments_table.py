@@ -62,7 +62,7 @@ def _axes_noise(found: Mapping[str, Array], names: tuple[str, ...]) -> dict[str,
 def _steady(capture: Capture) -> Segment | None:
     """Levels of d current, each run at several speeds: v_q, the drop of i_q taken off.
 
-    Each level has its own offset, which is free: what the inverter loses along q turns with the
+    Each level has a free offset of its own, since what the inverter drops along q depends on the
     current. The noise is the scatter of a level's voltages about a straight line over speed.
     """
     found = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
@@ -102,8 +102,8 @@ def _scatter(speed: Array, volts: Array) -> float:
 def set_levels(current: Array) -> NDArray[np.int64]:
     """Number of the level [n] that was set for each current, noise and all.
 
-    The finest parting whose levels hold three rows on the average and lie further from each other
-    than twice the widest of them; a single level where there is none, however its noise is spread.
+    The rows are parted as finely as leaves three rows a level on average, and levels further from
+    each other than twice the width of the widest. If there is no such parting, all are one level.
     """
     gaps = np.diff(np.sort(current))
     gaps = gaps[gaps > _apart(current, 0.0)]

@@ -111,12 +111,12 @@ def search(
 
 
 def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
-    """The fit by the noise floors that effects leave, as it is where these are not others by a half
-    and nothing is left over them. Where a rough fit finds another inertia, the better of that fit
-    and of one that is begun there.
+    """The fit by noise floors made anew, now that an effect of a sensor or a coupling is found.
 
-    To undo a sensor's lag brings noise with it, and so does a twist that is told by an angle. An
-    encoder off its centre leaves next to no inertia, and floors that it made.
+    If no floor changes by half and nothing is left over them, the fit stays as it is. If a rough
+    fit finds another inertia, a fit is begun there as well and the better one stays. Undoing a
+    sensor's lag adds noise, and so does a twist told by an angle. An encoder off its centre drives
+    J to next to nothing, and the floors were computed with that J.
     """
     floor = floors(segments, fitted.model, fitted.values)
     ratio = np.concatenate(floor) / np.concatenate(fitted.sigma)
@@ -141,10 +141,10 @@ def _chosen(
     wide: System,
     found: Sequence[Effect],
 ) -> tuple[Fitted, System] | None:
-    """The first few candidates refitted, the next few where none of these keeps its promise, or
-    is surely there.
+    """The fit with the best candidate of the first few; of the next few, if none of these keeps its
+    promise and is surely there.
 
-    The fit that stays is finished with columns of its own, and without terms that do not pay.
+    That fit is finished with columns of its own, and without terms that do not pay.
     """
     for first in range(0, min(len(passing), _ROUNDS * _REFITS), _REFITS):
         batch = list(passing[first : first + _REFITS])
@@ -167,9 +167,10 @@ def _refit_best(
     """Refits with the best candidates, those close to the best fall, and takes the best.
 
     A candidate must keep the promise of its score: the misfit falls by more than its price, and
-    with captures predicted from all the others by half of it at least, even where effects `found`
-    of its own kind have forms that are a little wrong; below the floor any of them, and beside one
-    of its own kind by three prices, since what a form leaves there is of that size.
+    with captures predicted from all the others by half of its price. That must hold even if the
+    effects `found` of its own kind have forms that are a little wrong. Evidence below the floor
+    must hold even if any effect found has such a form; beside one of its own kind it must be worth
+    three prices, since what a form leaves there is of that size.
     """
     own = len(own_columns(fitted.model))
     before, shrunk = leave_out(wide, own, segments), _shrunk(segments, wide)
@@ -200,8 +201,10 @@ def _refit_best(
 def _refitted(
     segments: Sequence[Segment], fitted: Fitted, score: Score, wide: System
 ) -> tuple[Fitted, System]:
-    """The fit with a candidate, from what its score foresees; where that leads to no better fit,
-    from where the others are. Along a bent valley the tangent goes astray.
+    """The fit with a candidate, begun from what its score foresees.
+
+    If that fit is no better than the one without it, a second one begins with all other parameters
+    where they are: along a bent valley the tangent goes astray.
     """
     tried = gauss_newton(segments, begun(fitted, score), before=wide)
     if tried[1].misfit + score.price < wide.misfit:
@@ -224,10 +227,10 @@ def _matters(fitted: Fitted, around: System, before: System, told: NDArray[np.bo
 
 def _sure(fitted: Fitted, around: System, held: HeldOut) -> bool:
     """Whether some amplitude of the newest effect is surely not zero: two standard uncertainties
-    from it, whichever capture is left out. Of a coupling, its twist or gap as well.
+    away, whichever capture is left out. Of a coupling, its twist or gap must be so as well.
 
-    A large drag below the lowest speed that anything turned at mends how friction changes its
-    sense at a reversal, and is known to no figure.
+    A counterexample: a drag below the lowest speed of any capture can mend how friction changes
+    sense at a reversal, while its own size is not known at all.
     """
     effect = fitted.model.effects[-1]
     spread = uncertainties(around, held, len(around.columns)).tolist()
@@ -251,10 +254,9 @@ def _kin(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
 def _doubt(
     segments: Sequence[Segment], fitted: Fitted, wide: System, found: Sequence[Effect]
 ) -> Array:
-    """What is left of χ²/n [G], as a factor, where these effects have forms that are wrong by a
-    twentieth.
+    """Factors [G] on χ²/n if the forms of these effects are wrong by a twentieth.
 
-    Windage that takes up what the formula of Stribeck friction leaves is not there.
+    Windage that only takes up what the formula of Stribeck friction leaves is not there.
     """
     if not found:
         return np.ones(len(wide.labels))
@@ -275,10 +277,12 @@ def _holds(
     least: tuple[float, float],
     doubts: tuple[Array, Array],
 ) -> bool:
-    """Whether the misfit of captures predicted from all the others falls by the first of `least`,
-    and with it a share of some signal's power, or by the second in signals that are below their
-    floor; `before` and `after` are their χ²/n [G] without and with the candidate, of which the
-    first of the `doubts` [G] counts, below the floor the second.
+    """Whether a candidate helps where captures are predicted from all the others.
+
+    Their misfit must fall by the first of `least`. Besides, a share of some signal's power must go,
+    or the misfit of signals below their floor must fall by the second of `least`. `before` and
+    `after` are χ²/n [G] without and with the candidate. They are multiplied by the first of the
+    `doubts` [G]; below the floor, the smaller fall with and without the second counts.
     """
     kin, below = doubts
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
@@ -292,8 +296,8 @@ def _holds(
 def _shrunk(segments: Sequence[Segment], tried: System) -> Array:
     """Factors [G] that turn χ²/n by the floors a fit was made with into χ²/n by those at its end.
 
-    Noise of a current is in the equations times R and L: what makes these smaller makes the
-    residual smaller as well. Reference: Fuller, Measurement Error Models (1987), section 1.3.
+    The equations hold the noise of a current times R and L: a fit that makes these smaller makes
+    the residual smaller as well. Reference: Fuller, Measurement Error Models (1987), section 1.3.
     """
     was = np.concatenate(tried.around.sigma)[tried.group]
     now = was * np.concatenate(floors_grown(segments, tried.around))[tried.group]

@@ -193,7 +193,7 @@ def _balanced(normal: Array) -> Array:
 
 
 def expression(pursuit: Pursuit) -> Expression:
-    """The expression that the Bayesian information criterion stops at, at most four steps."""
+    """The expression at which the Bayesian information criterion [2] stops; four steps at most."""
     chosen: list[Group] = []
     none = pursuit.curves([])
     best = pursuit.fitted(none)
@@ -344,11 +344,11 @@ def _inverse(normal: Array) -> Array:
 def curve_about(
     pursuit: Pursuit, found: Expression, coarse: NDArray[np.float64], at: Array, carrier: int
 ) -> tuple[Array, Array]:
-    """The curve and its standard uncertainty [n] at `at` [n]: the expression and, on top of it, a
-    smooth curve of what it leaves, so that the data speak where the expression is wrong.
+    """The curve and its standard uncertainty [n] at `at` [n].
 
-    `coarse` [K, k] are smooth curves in hats; the model's own constants stay where the expression
-    put them, since a curve and a constant of the same shape can't be told apart otherwise.
+    It is the expression and a smooth curve of what that leaves, so that the data speak where the
+    expression is wrong. `coarse` [K, k] are smooth curves in hats. The model's own constants stay
+    where the expression put them, since else a curve and a constant of one shape cannot be parted.
     """
     hats = pursuit.around.matrix[:, pursuit.own :] @ coarse
     weight = pursuit.around.weights(pursuit.around.spreads(found.left))

@@ -39,10 +39,9 @@ ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 class Fitted:
     """A model with the values that fit best.
 
-    `sigma` is each segment's noise floor by group, as it is at the values `near`; reading errors
-    count by these too, lest a fit should win by making J small and so all that a coasting shaft may
-    be out by large. `tolerance` is what the forms of effects found may be wrong by, none where it
-    is empty.
+    `sigma` is each segment's noise floor by group, computed at the values `near`. Reading errors
+    are computed there too: those of a coasting shaft go with 1/J, and a fit could win by making J
+    small. `tolerance` is what the forms of effects found may be wrong by; empty: nothing.
     """
 
     model: Model
@@ -56,14 +55,14 @@ class Fitted:
 class System:
     """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
 
-    `group` [R] numbers the groups of (segment, channel, order), `labels` names them; `unit` [R] is
-    what a residual of one is as a window's mean, in the signal's own unit, `soft` [R] the noise
-    floor over what rows are divided by (below 1 by a tolerance of form), `whiten` [R] one over
-    that. Rows of a
-    group that misses its noise floor, χ²/n = q > 1, count 1/q: the likelihood of a group whose
-    scatter is at least the floor but otherwise unknown. An equation with an effect missing so
-    keeps no hold on constants that sound equations know. `penalty` [P] is the inverse prior
-    variance of nuisances, `pull` [P] the penalty's slope, `tests` each segment's test.
+    `group` [R] numbers the groups of (segment, channel, order), `labels` names them. `unit` [R] is
+    a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by `whiten`
+    [R]; `soft` [R] is the noise floor over the scale that a row is divided by, below 1 where a
+    tolerance of form was added. Rows of a group that misses its noise floor, χ²/n = q > 1, count
+    1/q: the likelihood of a group whose scatter is at least the floor but otherwise unknown. So an
+    equation that lacks an effect does not move constants that sound equations know. `penalty` [P]
+    is the inverse prior variance of nuisances, `pull` [P] the penalty's slope, `tests` each
+    segment's test, `made_at` the values at which the oldest columns were computed.
     """
 
     columns: tuple[Column, ...]
@@ -188,8 +187,8 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
 
 
 def floors_grown(segments: Sequence[Segment], fitted: Fitted) -> tuple[Array, ...]:
-    """Factors by which the noise floor of every segment is another at a fit's values than at those
-    it was made at, by the same noise.
+    """Noise floor of every segment at a fit's values, over the one that the fit was made with; the
+    same noise is added in both.
     """
     what = fitted.model, fitted.values
     each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fitted.sigma)]
@@ -275,8 +274,8 @@ def system(
 def _over(
     segments: Sequence[Segment], kept: Array, before: Array, now: Array, counts: Sequence[int]
 ) -> Array:
-    """Columns [R, P] over the noise `before` [R] as they are over that of `now` [R], of segments
-    with so many rows each.
+    """Columns [R, P] that were whitened by `before` [R], whitened by `now` [R] instead; `counts`
+    are the rows of each segment.
     """
     if np.array_equal(before, now):
         return kept
@@ -289,9 +288,10 @@ def _over(
 def _kept(before: System | None, fitted: Fitted, chord: bool) -> dict[ColumnKey, Array]:
     """Columns of an earlier system that hold at a new fit too.
 
-    A stale column costs no accuracy: a fit ends where the residual, which is always computed anew,
-    has nothing left along the columns, and those of two near fits span nearly the same space. Not
-    so where an error of the angle was found: what others do to an angle is another thing then.
+    A stale column costs no accuracy. The residual is always computed anew, a fit ends where it has
+    nothing left along the columns, and the columns of two near fits span nearly the same space.
+    The exception: once an effect of the angle is found, the columns of other effects of the angle
+    have changed.
     """
     if before is None:
         return {}

@@ -180,8 +180,8 @@ def _defects(
     """What the equations miss by along a trajectory: voltage over the step from each sample [W, n]
     [V], and torque at each sample [W, n] [N·m].
 
-    The residual's central difference of the flux, which would let samples of even and odd number
-    drift apart, is exchanged for the step's own difference.
+    The residual has the central difference of the flux, under which samples of even and odd number
+    would drift apart. It is exchanged for the difference over the step.
     """
     segment, period = batch.segment, batch.segment.ts_s
     x = operate(segment, signals, model, values)
@@ -218,8 +218,8 @@ def settle(
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
     """Signals [n] whose currents and angle obey the equations under `given` voltage and load.
 
-    `extra` adds to each window's voltage [W] and torque [W]. Also tells which windows [W] settled:
-    their last correction was below a ten-thousandth of the machine's current.
+    `extra` adds to each window's voltage [W] and torque [W]. Also returns which windows [W]
+    settled: those whose last correction was below 1e-4 of the machine's current.
     """
     names = [name for name in _STATE if name in given]
     now = dict(given)

@@ -10,10 +10,10 @@ whatever happens in between: momentum does not care for impacts. Where the shaft
 twist(S) is S/k of a spring, and half the gap more to the side that S presses to, if there is one.
 So the angle is linear in 1/J, 1/k and the gap [1], without a model of flights and bounces.
 
-Noise of the angle, and of the torque twice integrated, is whitened [2]; what it does to the
-columns, where it would pass for a softness, is taken out of the normal matrix [3]. A window that
-misses it by far, as one in which an unrecorded load jumps, hardly counts [4]; uncertainties are
-from the scatter of windows [5].
+Noise of the angle, and of the torque twice integrated, is whitened [2]. Noise in the columns would
+pass for a softness, and is taken out of the normal matrix [3]. A window that misses the equation by
+far, as one in which an unrecorded load jumps, hardly counts [4]. Uncertainties are from the scatter
+of windows [5].
 
 References: [1] Nordin & Gutman, Automatica 38 (2002), dead zones; [2] Aitken, Proc. R. Soc.
 Edinb. 55 (1936), least squares; [3] Fuller, Measurement Error Models (1987), ch. 3;
@@ -94,9 +94,10 @@ class Law:
 
 @dataclass(frozen=True, slots=True)
 class _Window:
-    """Whitened columns [m, 3] of 1/J, 1/k and half the gap, and angle [m], less any parabola; what
-    noise adds to their products on the average [3, 4]; mean square torque [(N·m)²], and whether it
-    presses to both sides.
+    """Whitened `columns` [m, 3] of 1/J, 1/k and half the gap, and `angle` [m], all less a parabola.
+
+    `noise` [3, 4] is what noise adds on average to the columns' products with columns and angle;
+    `power` the mean square torque [(N·m)²]; `turns`: the torque presses to both sides.
     """
 
     columns: Array
@@ -159,11 +160,11 @@ def _windows(shaft: Shaft) -> Iterable[_Window]:
 
 def _smoothed(shaft: Shaft) -> tuple[int, Array, Array, Array, float]:
     """Samples a block; angle, torque passed on and momentum twice integrated, a block apart [n];
-    and the torque that is sure to be one.
+    and the size from which on a torque is no noise.
 
-    All are under the weights that means over a block have once they are differenced twice: a
-    ringing, however fast, is in each of them alike. The shortest block serves in which noise is
-    small against the torque, since what a gap does is short.
+    All three are smoothed by the same weights, those that block means have once they are
+    differenced twice. So a ringing, however fast, is in each of them alike. The block is the
+    shortest in which noise is small against the torque, since what a gap does is short.
     """
     whole = np.cumsum(np.cumsum(shaft.momentum_nm) - 0.5 * shaft.momentum_nm) * shaft.ts_s**2
     for length in _BLOCKS_S:
@@ -251,11 +252,10 @@ class _Noise:
 def _fitted(told: Sequence[_Window], inertia: float) -> tuple[Array, Array]:
     """Coefficients [3] of the columns, and their covariance [3, 3].
 
-    What noise explains is little beside what the coupling's damping does, which no column knows:
-    a window counts in full up to the lower quartile of χ²/n of those in which the torque turns.
-    Weights that
-    redescend have more than one end: a few gaps are begun with, and the end stays that leaves
-    most windows near their noise.
+    Noise is little beside what the coupling's damping does, for which there is no column. So a
+    window counts in full up to the lower quartile of χ²/n of those in which the torque turns.
+    Weights that redescend have more than one end: the fit begins with each of a few gaps, and the
+    end stays that leaves most windows near their noise.
     """
     normal = np.array([one.columns.T @ one.columns for one in told])
     size = np.sqrt(np.einsum("ijj->j", normal))

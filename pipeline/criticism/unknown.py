@@ -64,14 +64,14 @@ def unknown_structure(
 ) -> tuple[UnknownStructure | None, float]:
     """What the structure left in `signals` depends on, as curve, expression and effect file.
 
-    Ports are held against each other by the misfit they remove from whole captures that they
-    were not fitted to; of those that do as well the one of fewest variables is told, and the
-    others are named beside it. None is where the best takes less than a tenth of what is over the
-    floor: instruments that wander follow no state of the machine. Also returns the misfit
-    (−2 log likelihood) it removes.
+    Ports are compared by the misfit they remove from whole captures that they were not fitted to.
+    Of those that do as well, the one of fewest variables is told, and the others are named beside
+    it. The result is None if the best takes less than a tenth of what is over the floor:
+    instruments that wander follow no state of the machine. Also returns the misfit (−2 log
+    likelihood) that the port removes.
     `before`: a system around the same fit, whose columns are used again. `name`: of the effect.
     `in_parts`: captures that miss the floor are held out a twelfth at a time, for a heat run that
-    has no second; wander of an instrument would pass for a state of the machine there.
+    has no second. A wander of an instrument would then pass for a state of the machine.
     """
     found, wide = _ranked(segments, fitted, _hooks(signals), before, in_parts)
     if not found:
@@ -186,11 +186,11 @@ def _missed(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
 def _units(
     around: System, own: NDArray[np.int64], left: Array, missed: NDArray[np.int64] | None
 ) -> NDArray[np.int64]:
-    """Number of what is held out together, of every row [R]: a capture, or a part of one of the
-    segments in `missed`; -1 for what is always in the fit.
+    """For every row [R] the number of what is held out together: a capture, or a part of one of the
+    segments in `missed`; -1 for rows that are always in the fit.
 
-    That is what alone carries a constant, and with parts all the other captures, which have nothing
-    to predict, and the first and last part, since no curve is known beyond its ends.
+    Always in the fit is what alone carries a constant. With parts it is also every other capture,
+    which has nothing to predict, and the first and last part: no curve is known beyond its ends.
     """
     segment = np.array([number for number, _, _ in around.labels])[around.group]
     units = segment.astype(np.int64)
@@ -227,7 +227,7 @@ def _carrying(
 
 
 def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
-    """Step [k] of least misfit in which a curve and a constant of one shape do not run away."""
+    """Step [k] of least misfit; by `ridge`, a curve and a constant of one shape do not run away."""
     weight = around.weights(around.spreads(left))
     matrix = around.matrix[:, places]
     weighted = matrix * weight[:, None]
@@ -247,8 +247,8 @@ def _held_out(
 ) -> float:
     """Misfit of every unit as predicted without it, by the columns at `places`.
 
-    `left` [R] is the residual at their best fit, whose weights count; rows of unit -1 are left
-    where they are. A coefficient that no other unit tells of stays at zero by `ridge`.
+    `left` [R] is the residual at their best fit, and gives the weights; rows of unit -1 keep it. A
+    coefficient that no other unit tells of stays at zero, by `ridge`.
     """
     weight = around.weights(around.spreads(left))
     matrix = around.matrix[:, places]

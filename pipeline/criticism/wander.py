@@ -40,9 +40,11 @@ _WANDERS = ("v", "i", "torque")
 def wandering(
     segments: Sequence[Segment], fitted: Fitted, left: Sequence[Remainder]
 ) -> tuple[Segment, ...] | None:
-    """The segments, knowing the wander that their instruments may have; None where that, and the
-    fit made anew with it, leaves anything over the floor, or where what is `left` is in captures of
-    one test: instruments wander whatever is done, and a machine that warms up changes slowly too.
+    """The segments, knowing the wander that their instruments may have.
+
+    None if a fit with that wander leaves anything over the floor. None as well if what is `left` is
+    in captures of one test alone: instruments wander in every test, while a machine that warms up
+    changes slowly in one.
     """
     captures = {one.capture for one in left}
     if len({segment.test for segment in segments if segment.capture in captures}) < _TESTS:

@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 _NO_TAIL = 1e-6
+"""Tail below which there is none: log(1 + tail s)/tail is then s to 1e-6."""
 
 
 def _torque(x: Operating, q: Values) -> Array:
