@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 from pipeline.criticism.choices import reconsidered
 from pipeline.criticism.closer import renamed
-from pipeline.criticism.descent import first_fit, gauss_newton, initial, rough_fit
+from pipeline.criticism.descent import first_fit, gauss_newton, rough_fit
 from pipeline.criticism.mains import Hum, hum_of, with_hum
-from pipeline.criticism.model import Model
+from pipeline.criticism.model import Model, zero
 from pipeline.criticism.scores import candidates, score_all, widened
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import begun
@@ -56,6 +56,6 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
         fitted, around = renamed(heard, (fitted, around), effect.name, {effect.name: effect})
     settled = {effect.name: effect for effect in fitted.model.effects}
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
-    unheard = {k: v for effect in shaped.values() for k, v in initial(effect, model).items()}
+    unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
     whole = replace(fitted, model=model, values={**fitted.values, **unheard})
     return Begun(heard, *reconsidered(heard, *gauss_newton(heard, whole)), hum)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -78,65 +79,42 @@ class Basis:
 
 def variables(machine: Machine) -> Mapping[str, Variable]:
     """Every variable, by name, with its range on one machine."""
-    s = machine.scales
-    current, speed = s["current_a"], s["speed_rad_s"]
+    current, speed = machine.scales["current_a"], machine.scales["speed_rad_s"]
     listed = (
-        Variable(
-            "omega_mech_rad_s",
-            ("omega_mech_rad_s",),
-            "rad/s",
-            "signed",
-            speed,
-            "x.omega_rad_s",
-            lambda x: x.omega_rad_s,
-        ),
-        Variable(
-            "iq_a", ("iq_a",), "A", "signed", current, "np.real(x.iq_a)", lambda x: np.real(x.iq_a)
-        ),
-        Variable(
-            "id_a", ("id_a",), "A", "signed", current, "np.real(x.id_a)", lambda x: np.real(x.id_a)
-        ),
+        _speed(speed),
+        _axis("iq_a", current),
+        _axis("id_a", current),
         Variable(
             "i_a", ("id_a", "iq_a"), "A", "size", current, "np.abs(x.i_a)", lambda x: np.abs(x.i_a)
         ),
-        Variable(
-            "temp_winding_degc",
-            ("temp_winding_degc",),
-            "K",
-            "warm",
-            100.0,
-            "x.winding_k",
-            lambda x: x.winding_k,
-        ),
-        Variable(
-            "temp_magnet_degc",
-            ("temp_magnet_degc",),
-            "K",
-            "warm",
-            100.0,
-            "x.magnet_k",
-            lambda x: x.magnet_k,
-        ),
-        Variable(
-            "theta_mech_rad",
-            ("theta_mech_rad",),
-            "rad",
-            "turn",
-            TURN_RAD,
-            "x.theta_rad",
-            lambda x: x.theta_rad,
-        ),
-        Variable(
-            "theta_elec_rad",
-            ("theta_elec_rad",),
-            "rad",
-            "turn",
-            TURN_RAD,
-            "x.eps_rad",
-            lambda x: x.eps_rad,
-        ),
+        _warmth("temp_winding_degc", "winding_k"),
+        _warmth("temp_magnet_degc", "magnet_k"),
+        _turn("theta_mech_rad", "theta_rad"),
+        _turn("theta_elec_rad", "eps_rad"),
     )
     return {variable.name: variable for variable in listed}
+
+
+def _speed(top_rad_s: float) -> Variable:
+    name, code = "omega_mech_rad_s", "x.omega_rad_s"
+    return Variable(name, (name,), "rad/s", "signed", top_rad_s, code, attrgetter("omega_rad_s"))
+
+
+def _axis(name: str, top_a: float) -> Variable:
+    """The current of one axis, without the imaginary part of a complex step."""
+    read = attrgetter(name)
+    code = f"np.real(x.{name})"
+    return Variable(name, (name,), "A", "signed", top_a, code, lambda x: np.real(read(x)))
+
+
+def _warmth(column: str, field: str) -> Variable:
+    """A temperature above 25 °C, up to 100 K."""
+    return Variable(column, (column,), "K", "warm", 100.0, f"x.{field}", attrgetter(field))
+
+
+def _turn(column: str, field: str) -> Variable:
+    """An angle, of one turn."""
+    return Variable(column, (column,), "rad", "turn", TURN_RAD, f"x.{field}", attrgetter(field))
 
 
 def coarse(variable: Variable, machine: Machine) -> Basis:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.bounds import Best, bounded_step, limits_of
-from pipeline.criticism.effect import Array, Effect, Machine, Values
+from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.floors import rough_floor
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import BASE, PHYSICAL, Model, zero
@@ -49,13 +49,8 @@ def start_values(model: Model, machine: Machine) -> dict[str, float]:
     scales = base_scales(machine)
     values = {c.name: scales.get(c.name, c.center) for c in BASE}
     for effect in model.effects:
-        values.update(initial(effect, model))
+        values.update(zero(effect, model))
     return values
-
-
-def initial(effect: Effect, model: Model) -> dict[str, float]:
-    """An effect at zero amplitude, in its own units."""
-    return zero(effect, model)
 
 
 def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:

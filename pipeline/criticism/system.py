@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from pipeline.criticism.floors import form_tolerance, noise_floor
 from pipeline.criticism.grams import Grams, misfit_of, pseudo_inverse
 from pipeline.criticism.linearise import (
     Column,
+    Rows,
     base_columns,
     effect_columns,
     linearise,
@@ -230,45 +231,67 @@ def system(
     floor = zip(fitted.sigma, fitted.tolerance or none, strict=True)
     each = [(model, values, new, *both, fitted.near) for both in floor]
     rows = on_each(linearise, segments, each)
-    whiten = np.concatenate([r.whiten for r in rows])
-    fresh = {column.key: n for n, column in enumerate(new)}
-    made = np.concatenate([r.columns for r in rows])
-    matrix = np.empty((made.shape[0], len(columns)))
+    group, labels = _numbered(rows)
+    penalty, pull = _priors(model, columns, values)
+    made = System(
+        columns=tuple(columns),
+        residual=np.concatenate([r.residual for r in rows]),
+        matrix=_placed(columns, new, np.concatenate([r.columns for r in rows])),
+        group=group,
+        window=np.concatenate([r.window for r in rows]),
+        unit=np.concatenate([r.unit for r in rows]),
+        soft=np.concatenate([r.soft for r in rows]),
+        whiten=np.concatenate([r.whiten for r in rows]),
+        labels=labels,
+        penalty=penalty,
+        pull=pull,
+        around=fitted,
+        tests=tuple(segment.test for segment in segments),
+        made_at=values,
+    )
+    return made if before is None or not known else _with_known(made, before, known, segments)
+
+
+def _numbered(
+    rows: Sequence[Rows],
+) -> tuple[NDArray[np.int64], tuple[tuple[int, str, int], ...]]:
+    """Group [R] of every row of all segments, and the groups' labels."""
     first, labels, groups = 0, [], []
     for number, one in enumerate(rows):
         labels += [(number, channel, order) for channel, order in one.groups]
         groups.append(one.group + first)
         first += len(one.groups)
-    group = np.concatenate(groups)
-    if before is not None and known:
-        free = np.array([over_inertia(segments[n], channel) for n, channel, _ in labels])
-        inertia = before.around.values["j_kgm2"] / values["j_kgm2"]
-        lighter = np.where(free, inertia, 1.0)[group]
-        places = [n for n, column in enumerate(columns) if column.key in known]
-        kept = np.column_stack([known[columns[n].key] for n in places]) * lighter[:, None]
-        matrix[:, places] = _over(
-            segments, kept, before.whiten, whiten, [r.group.size for r in rows]
-        )
+    return np.concatenate(groups), tuple(labels)
+
+
+def _placed(columns: Sequence[Column], new: Sequence[Column], made: Array) -> Array:
+    """A matrix [R, P] of all columns with the `new` ones in it, as they were `made` [R, new]."""
+    matrix = np.empty((made.shape[0], len(columns)))
+    fresh = {column.key: n for n, column in enumerate(new)}
     for place, column in enumerate(columns):
         if column.key in fresh:
             matrix[:, place] = made[:, fresh[column.key]]
-    penalty, pull = _priors(model, columns, values)
-    return System(
-        columns=tuple(columns),
-        residual=np.concatenate([r.residual for r in rows]),
-        matrix=matrix,
-        group=group,
-        window=np.concatenate([r.window for r in rows]),
-        unit=np.concatenate([r.unit for r in rows]),
-        soft=np.concatenate([r.soft for r in rows]),
-        whiten=whiten,
-        labels=tuple(labels),
-        penalty=penalty,
-        pull=pull,
-        around=fitted,
-        tests=tuple(segment.test for segment in segments),
-        made_at=values if before is None or not known else before.made_at,
-    )
+    return matrix
+
+
+def _with_known(
+    now: System,
+    before: System,
+    known: Mapping[ColumnKey, Array],
+    segments: Sequence[Segment],
+) -> System:
+    """The system with the `known` columns of the one `before` put where its matrix is still open:
+    over the noise of now, and those of a free shaft by its inertia of now.
+    """
+    free = np.array([over_inertia(segments[n], channel) for n, channel, _ in now.labels])
+    inertia = before.around.values["j_kgm2"] / now.around.values["j_kgm2"]
+    lighter = np.where(free, inertia, 1.0)[now.group]
+    places = [n for n, column in enumerate(now.columns) if column.key in known]
+    kept = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
+    segment = np.array([number for number, _, _ in now.labels])[now.group]
+    counts = np.bincount(segment, minlength=len(segments)).tolist()
+    now.matrix[:, places] = _over(segments, kept, before.whiten, now.whiten, counts)
+    return replace(now, made_at=before.made_at)
 
 
 def _over(

@@ -9,33 +9,31 @@ import numpy as np
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
 
 
-def _coenergy(x: Operating, q: Values) -> Any:
-    cosine, sine = x.waves(6)
+def _stored(x: Operating) -> dict[str, Any]:
+    """Co-energies over 1.5 [n, Wb·A] of the two axes and of a mutual inductance of their size."""
     ld, lq = x.base["ld_h"], x.base["lq_h"]
-    products = {
+    return {
         "d6": 0.5 * ld * x.id_a**2,
         "q6": 0.5 * lq * x.iq_a**2,
         "cross6": (ld * lq) ** 0.5 * x.id_a * x.iq_a,
     }
+
+
+def _coenergy(x: Operating, q: Values) -> Any:
+    cosine, sine = x.waves(6)
     return sum(
         product * (q[f"{name}_cos"] * cosine + q[f"{name}_sin"] * sine)
-        for name, product in products.items()
+        for name, product in _stored(x).items()
     )
 
 
 def _torque(x: Operating, q: Values) -> Array:
     if q["ripple_share"] == 1.0:
         return np.zeros(x.omega_rad_s.shape)
-    ld, lq = x.base["ld_h"], x.base["lq_h"]
     cosine, sine = x.waves(6)
-    products = {
-        "d6": 0.5 * ld * x.id_a**2,
-        "q6": 0.5 * lq * x.iq_a**2,
-        "cross6": (ld * lq) ** 0.5 * x.id_a * x.iq_a,
-    }
     slope = sum(
         6.0 * product * (q[f"{name}_sin"] * cosine - q[f"{name}_cos"] * sine)
-        for name, product in products.items()
+        for name, product in _stored(x).items()
     )
     ripple: Array = 1.5 * x.machine.pole_pairs * slope
     return (1.0 - q["ripple_share"]) * ripple
