@@ -92,6 +92,7 @@ def segment_of(
     sensors: Sensors,
     channels: tuple[str, ...],
     weak: Projection | None,
+    *,
     blocks: NDArray[np.int64] | None = None,
     offsets: Array | None = None,
     **fixed: float,

@@ -143,7 +143,9 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     whole = {**found, "good": keep.astype(float)} if logged else None
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
-    made = segment_of(capture, "dq", "drive", period, found, told, channels, weak)
+    made = segment_of(
+        capture, "dq", "drive", period, found=found, sensors=told, channels=channels, weak=weak
+    )
     return replace(made, whole=whole)
 
 
@@ -164,7 +166,9 @@ def _shaft(capture: Capture, machine: Machine) -> Segment | None:
     keep = keep & _coasts(found["theta_mech_rad"], window)
     told = prepared(found, period)
     weak = projection(found["theta_mech_rad"], window_starts(keep, window), window, ())
-    return segment_of(capture, "shaft", "bench", period, found, told, (channel,), weak)
+    return segment_of(
+        capture, "shaft", "bench", period, found=found, sensors=told, channels=(channel,), weak=weak
+    )
 
 
 def _coasts(theta: Array, window: int) -> NDArray[np.bool_]:
@@ -214,7 +218,16 @@ def _slow_turn(
     # the first and the last sample have no neighbours
     starts = 1 + window_starts(keep[1:-1], window)
     weak = projection(found["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
-    return segment_of(capture, "shaft", "bench", period * factor, found, told, (channel,), weak)
+    return segment_of(
+        capture,
+        "shaft",
+        "bench",
+        period * factor,
+        found=found,
+        sensors=told,
+        channels=(channel,),
+        weak=weak,
+    )
 
 
 def _open(capture: Capture, machine: Machine) -> Segment | None:
@@ -233,7 +246,16 @@ def _open(capture: Capture, machine: Machine) -> Segment | None:
     found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, found["theta_mech_rad"]))
-    return segment_of(capture, "open", "bench", period, found, told, ("vd_v", "vq_v"), weak)
+    return segment_of(
+        capture,
+        "open",
+        "bench",
+        period,
+        found=found,
+        sensors=told,
+        channels=("vd_v", "vq_v"),
+        weak=weak,
+    )
 
 
 def _terminal(capture: Capture, _: Machine) -> Segment | None:
@@ -268,10 +290,10 @@ def _terminal(capture: Capture, _: Machine) -> Segment | None:
         "terminal",
         "bench",
         period,
-        found,
-        told,
-        ("v_pair_v",),
-        weak,
+        found=found,
+        sensors=told,
+        channels=("v_pair_v",),
+        weak=weak,
         blocks=None,
         offsets=None,
         **fixed,
@@ -316,7 +338,16 @@ def _lcr(capture: Capture, _: Machine) -> Segment | None:
         least = _LEAST_METER_NOISE * float(np.abs(found[name]).max())
         noise[name] = max(scatter, resolution(found[name]) / math.sqrt(12), least)
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
-    return segment_of(capture, "lcr", "lcr", 1.0, found, Sensors(noise), channels, None)
+    return segment_of(
+        capture,
+        "lcr",
+        "lcr",
+        1.0,
+        found=found,
+        sensors=Sensors(noise),
+        channels=channels,
+        weak=None,
+    )
 
 
 _MAKERS: Mapping[str, Callable[[Capture, Machine], Segment | tuple[Segment, ...] | None]] = {

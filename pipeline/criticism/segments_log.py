@@ -46,7 +46,19 @@ def q_log(capture: Capture, machine: Machine) -> tuple[Segment, ...] | None:
     weak = projection(found["theta_mech_rad"], starts, window, ())
     blocks = _in_time(weak.starts + window // 2, keep.size)
     channels = ("vq_v", "omega_mech_rad_s") if speed is not None and angle else ("vq_v",)
-    made = [segment_of(capture, "q", "drive", period, found, told, channels, weak, blocks)]
+    made = [
+        segment_of(
+            capture,
+            "q",
+            "drive",
+            period,
+            found=found,
+            sensors=told,
+            channels=channels,
+            weak=weak,
+            blocks=blocks,
+        )
+    ]
     if angle and not capture.has("torque_shaft_nm"):
         made.append(_motion(capture, period, found, told, keep))
     return tuple(made)
@@ -67,8 +79,17 @@ def _motion(
     shaft, starts = thinned(shaft, keep, window, _MOTION_WINDOWS, _PAD)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     blocks = _in_time(shaft.pop("row")[starts + window // 2], keep.size)
-    channels = ("torque_shaft_nm",)
-    return segment_of(capture, "motion", "drive", period, shaft, told, channels, weak, blocks)
+    return segment_of(
+        capture,
+        "motion",
+        "drive",
+        period,
+        found=shaft,
+        sensors=told,
+        channels=("torque_shaft_nm",),
+        weak=weak,
+        blocks=blocks,
+    )
 
 
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:

@@ -48,7 +48,15 @@ def _linkages(capture: Capture) -> Segment | None:
     blocks = levels if levels.max(initial=0) + 1 >= _FEW_LEVELS else None
     channels = ("psi_d_wb", "psi_q_wb")
     return segment_of(
-        capture, "flux_map", "drive", 1.0, found, Sensors(noise), channels, None, blocks=blocks
+        capture,
+        "flux_map",
+        "drive",
+        1.0,
+        found=found,
+        sensors=Sensors(noise),
+        channels=channels,
+        weak=None,
+        blocks=blocks,
     )
 
 
@@ -83,10 +91,10 @@ def _steady(capture: Capture) -> Segment | None:
         "steady",
         "drive",
         1.0,
-        found,
-        Sensors(noise),
-        ("vq_v",),
-        None,
+        found=found,
+        sensors=Sensors(noise),
+        channels=("vq_v",),
+        weak=None,
         blocks=levels,
         offsets=offsets.astype(float),
     )
