@@ -26,8 +26,8 @@ At zero a coasting shaft's equation divides by nothing."""
 def limits_of(model: Model) -> dict[str, tuple[float, float]]:
     """Lowest and highest value [unit of the name] of what has bounds.
 
-    A resistance or inductance below zero stands for an effect that is not in the model, and so does
-    an inertia next to nothing.
+    A resistance or inductance below zero, or an inertia next to nothing, would stand for an effect
+    that is not in the model.
     """
     limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
     limits["j_kgm2"] = (_LEAST_INERTIA * base_scales(model.machine)["j_kgm2"], np.inf)
@@ -50,10 +50,10 @@ Best = Callable[[NDArray[np.int64]], Step]
 
 
 def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Values) -> Array:
-    """Best step [P] along all columns in which nothing that is at a bound moves out of it.
+    """Best step [P] along all columns that moves no parameter beyond a bound it stands at.
 
-    `best` gives the best step along some of the columns. The others take up what a parameter at
-    its bound would have done.
+    `best` gives the best step along some of the columns. A parameter that would leave its bound is
+    taken out, and the others step anew without it.
     """
     limits = limits_of(model)
     live = np.arange(len(columns))

@@ -68,8 +68,8 @@ def separations(
     """What would part an effect of the model from each rival in `against`, the best first.
 
     Power is that of a test at the 1 % level, from the captures at hand and the experiment
-    together. `remedies` are what the effects themselves declare; where no experiment that can be
-    predicted helps, that is told without a power.
+    together. If no experiment that can be predicted helps, the one in `remedies`, which the effects
+    themselves declare, is told without a power.
     """
     told: list[Separation] = []
     for other in against:

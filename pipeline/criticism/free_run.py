@@ -83,8 +83,8 @@ class Run:
 def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     """The model on its own over the windows of one capture.
 
-    None where the test is none of `ELECTRICAL` and `MECHANICAL`, where the sample period is longer
-    than the electrical time constant, or where few trajectories settle.
+    None if the test is neither `ELECTRICAL` nor `MECHANICAL`, if the sample period is longer than
+    the electrical time constant, or if fewer than half of the trajectories settle.
     """
     if segment.test not in (ELECTRICAL if segment.kind == "dq" else MECHANICAL):
         return None
@@ -153,8 +153,8 @@ class _Response:
 def _floor(response: _Response) -> dict[str, float]:
     """Noise of the window means that the sensors alone make.
 
-    Noise of each sensor's level is added to the recording, and to the equations the reading error
-    that they are allowed.
+    Noise of each sensor's level is added to the recording, and the reading error that equations are
+    allowed is added to the equations.
     """
     batch = response.batch
     noise = batch.segment.noise

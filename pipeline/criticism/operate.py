@@ -66,8 +66,8 @@ def operate(
 def _motion(
     segment: Segment, signals: Mapping[str, Array], model: Model
 ) -> tuple[Array, Array, Array]:
-    """Angle, speed and electrical frequency [n·m]; m times finer where the shaft turns so far a
-    sample that a torque's order would be missed.
+    """Angle, speed and electrical frequency [n·m]; m points a sample where the shaft turns so far
+    in one that the samples alone would miss an order of the torque.
     """
     theta = signals["theta_mech_rad"]
     finer = finer_of(segment, model.machine)
@@ -242,8 +242,10 @@ def _operate_table(
 
 
 def current_slope(segment: Segment, model: Model, values: Values) -> float:
-    """True q ampere a recorded one: residuals of a current stay in the sensor's own units, or a
-    gain would win by shrinking what it is blamed for.
+    """True q ampere a recorded one.
+
+    By it residuals of a current are told in the sensor's own units; else a gain could win by
+    shrinking the residual that it is blamed for.
     """
     zero = np.zeros(4)
     nothing = Recorded(

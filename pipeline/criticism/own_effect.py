@@ -104,7 +104,8 @@ def _inputs(first: Any) -> list[NDArray[Any]]:
 def guarded(effect: Effect, path: Path, text: str) -> Effect:
     """A user's effect with its hooks behind `Hook`s; raises UsageError for what is wrong with it.
 
-    Scales are looked at, and for the names of parameters every hook is tried; `text` is the file's.
+    Its scales must be known, and every hook is called once, to see that it asks for no parameter
+    that is not there; `text` is the file's.
     """
     what = f"effect {effect.name}"
     for parameter in effect.parameters:
@@ -162,9 +163,9 @@ class _Named(dict[str, float]):
 
 
 def _try(effect: Effect, path: Path) -> None:
-    """Calls every hook once, for the names that it asks of its parameters.
+    """Calls every hook once; raises UsageError where it asks for a parameter that is not there.
 
-    Whatever else befalls it here is told where it befalls it on captures: this machine is no motor.
+    Other errors do not count here, since this machine is no motor: they are told on captures.
     """
     x, r = _operating(), _recorded()
     line: NDArray[Any] = np.ones(_TRIED)
