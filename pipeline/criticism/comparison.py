@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.asked import fit_of
+from pipeline.criticism.captured import at_ambient, unused
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
 from pipeline.criticism.judge import HeldOut, in_common, leave_out, uncertainties
@@ -68,7 +69,12 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         (*_errors(found, around, held), *run_errors(simulated)),
         total,
         tuple(_where(maps)),
-        (*told_hum(begun.hum), *held.notes),
+        (
+            *unused(campaign, found),
+            *at_ambient(found, fitted.model),
+            *told_hum(begun.hum),
+            *held.notes,
+        ),
         maps,
         moved,
         bare,

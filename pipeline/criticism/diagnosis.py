@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from scipy.special import gammaincc
 
 from pipeline.criticism.asked import Begun, fit_of
+from pipeline.criticism.captured import at_ambient, unexcited, unused
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
@@ -23,10 +24,10 @@ from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.order_scan import orders_left
 from pipeline.criticism.registry import effects
-from pipeline.criticism.rivals import detectable, experiment_for, remedies, rivals_of
+from pipeline.criticism.rivals import experiment_for, remedies, rivals_of
 from pipeline.criticism.scores import TIE, Candidate, Score, candidates
 from pipeline.criticism.segment import Segment, told_signal
-from pipeline.criticism.segments import TESTS, segments
+from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import Rung, loss_without, search
 from pipeline.criticism.size import PAIRLESS, machine_of
 from pipeline.criticism.specification import model_of
@@ -62,8 +63,6 @@ _WITHIN = (
 )
 _AGAINST = "captures speak against it: see the note"
 _GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
-_SEEN = 3.0
-"""Standard deviations of a typical size from which on captures would show an effect."""
 _AS_GOOD = 0.1
 """Share of the fall that a rival's promise may be short of."""
 
@@ -134,8 +133,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     offered = candidates(library, last.fitted)
     missing = last.added
     ranking = _ranking(rungs, held, offered, library, found, ladder.cut)
-    unexcited = _unexcited(campaign, library, last, offered)
-    verdict = _verdict(ladder, left, unexcited)
+    unseen = unexcited(campaign, library, last, offered)
+    verdict = _verdict(ladder, left, unseen)
     return Diagnosis(
         campaign.motor_id,
         model.name,
@@ -146,7 +145,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         sketch if verdict == "unknown" else None,
         _as_told(found, last.around, left),
         (
-            *_unused(campaign, found),
+            *unused(campaign, found),
+            *at_ambient(found, last.fitted.model),
             *told_hum(ladder.begun.hum),
             *(() if calm is None else (_WANDER,)),
             *(() if within is None else (_WITHIN,)),
@@ -154,7 +154,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
             *held[0].notes,
         ),
-        unexcited,
+        unseen,
         model.effects,
     )
 
@@ -182,14 +182,6 @@ def _as_told(
     small = [one for one in over_floor(around, found, around.residual) if one not in left]
     told = (*left, *(replace(one, matters=False) for one in small))
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
-
-
-def _unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
-    """A note of the captures that no equation could use, none where all are used."""
-    used = {segment.capture for segment in found}
-    idle = [c.path for c in campaign.captures if c.path not in used and c.meta.test in TESTS]
-    words = "without the signals of their test's equation, or an even stretch of samples"
-    return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
 
 
 def _climbed(start: Begun, library: dict[str, Effect]) -> _Ladder:
@@ -245,28 +237,12 @@ def _unknown(
     return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]
 
 
-def _verdict(ladder: _Ladder, left: Sequence[Remainder], unexcited: Sequence[Unexcited]) -> Verdict:
+def _verdict(ladder: _Ladder, left: Sequence[Remainder], unseen: Sequence[Unexcited]) -> Verdict:
     if left and not ladder.explains(left):
         return "unknown"
     if ladder.rungs[-1].added:
         return "missing"
-    return "insufficient" if unexcited else "adequate"
-
-
-def _unexcited(
-    campaign: Campaign, library: dict[str, Effect], last: Rung, offered: Sequence[Candidate]
-) -> tuple[Unexcited, ...]:
-    """Effects that no capture here would show at typical size, for want of their test."""
-    present = {capture.meta.test for capture in campaign.captures}
-    inside = {effect.name for effect in last.fitted.model.effects}
-    return tuple(
-        Unexcited(name, effect.tests, effect.experiment)
-        for name, effect in library.items()
-        if name not in inside
-        and effect.tests
-        and not present.issuperset(effect.tests[:1])
-        and detectable(effect, last.fitted, last.around, offered) < _SEEN
-    )
+    return "insufficient" if unseen else "adequate"
 
 
 def _ranking(

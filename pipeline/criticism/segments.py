@@ -23,6 +23,7 @@ from pipeline.criticism.segments_log import q_log
 from pipeline.criticism.segments_standing import standing
 from pipeline.criticism.segments_table import flux_table
 from pipeline.criticism.traces import (
+    ANGLES,
     LINES_V,
     PAD,
     SMOOTHED,
@@ -120,7 +121,8 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
         return None
     names = with_angle(capture, ["vd_v", "vq_v", "id_a", "iq_a", *_temperatures(capture)])
     turning = len(names) > 4 and any("theta" in n or "omega" in n for n in names)
-    torque = capture.has("torque_shaft_nm") and turning
+    angle = not ANGLES.isdisjoint(names)
+    torque = capture.has("torque_shaft_nm") and turning and angle
     names += ["torque_shaft_nm"] if torque else []
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)
@@ -130,7 +132,7 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
         channels += ("torque_shaft_nm",)
     size = found["vd_v"].size
     window = window_of(period, size)
-    orders = electrical_orders(machine) if turned > 0.1 else ()
+    orders = electrical_orders(machine) if angle and turned > 0.1 else ()
     told = prepared(found, period)
     if capture.meta.test == "torque_map":
         noise = dict(told.noise)
@@ -236,7 +238,8 @@ def _open(capture: Capture, machine: Machine) -> Segment | None:
         return None
     extra = ["temp_magnet_degc"] if capture.has("temp_magnet_degc") else []
     names = with_angle(capture, [*lines, *extra])
-    if len(names) == len(lines) + len(extra):
+    if not ANGLES.intersection(names):
+        # where the magnet stands at first is another in every spin, and no speed tells it
         return None
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)

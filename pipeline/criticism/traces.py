@@ -20,6 +20,7 @@ from pipeline.records.capture import Capture
 if TYPE_CHECKING:
     import polars as pl
 
+ANGLES = frozenset({"theta_mech_rad", "theta_elec_rad"})
 LINES_V = ("vab_v", "vbc_v", "vca_v")
 _WINDOW_S = 0.02
 _WINDOW_SAMPLES = 40

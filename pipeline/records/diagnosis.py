@@ -208,18 +208,20 @@ class UnknownStructure:
 
 @dataclass(frozen=True, slots=True)
 class Unexcited:
-    """An effect of which these captures can say nothing: the tests that would show it, by name, and
-    what to do in them.
+    """An effect of which these captures can say nothing: the tests that would show it, by name,
+    what to do in them, and the signals that the captures of these tests lack.
     """
 
     effect: str
     tests: tuple[str, ...]
     experiment: str
+    signals: tuple[str, ...] = ()
 
     @property
     def words(self) -> str:
         """What to record, in one line."""
         tests = " or ".join(self.tests)
+        tests += f" with {' and '.join(self.signals)}" if self.signals else ""
         return f"no test here excites {self.effect}: record {tests} ({self.experiment})"
 
     def document(self) -> dict[str, Any]:
@@ -228,6 +230,7 @@ class Unexcited:
             "effect": self.effect,
             "tests": list(self.tests),
             "experiment": self.experiment,
+            "signals": list(self.signals),
         }
 
 

@@ -21,11 +21,13 @@ def comparison_text(result: Comparison) -> str:
     effects = ", ".join(result.effects) or "no effects"
     if not result.errors:
         return f"{safe(result.motor_id)}: {'; '.join(result.notes)}"
+    out = any(error.split == "held_out" for error in result.errors)
+    what = "held-out error" if out else "error of the fit, none held out,"
     head = (
-        f"{safe(result.motor_id)}: model {result.name} with {effects}: held-out error "
+        f"{safe(result.motor_id)}: model {result.name} with {effects}: {what} "
         f"{result.held_out:.4g} (1 is the noise floor)"
     )
-    lines = [head]
+    lines = [head, *(f"  note: {note}" for note in result.notes)]
     if result.bare is not None:
         lines.append(f"  without what was added: {result.bare:.4g}")
     return "\n".join([*lines, *_errors(result), *_places(result), *_moves(result)])

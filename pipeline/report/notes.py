@@ -20,13 +20,18 @@ def told_and_folded(result: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]
         return (*result.notes, *single), ()
     head = f"no test here excites {len(single)} effects, of which nothing can be said:"
     lines = [
-        f"record {test} to excite {', '.join(effects)}"
-        for test, effects in _by_test(result.unexcited).items()
+        f"record {_with_signals(test, mine)} to excite {', '.join(one.effect for one in mine)}"
+        for test, mine in _by_test(result.unexcited).items()
     ]
     return (*result.notes, head, *lines), single
 
 
-def _by_test(unexcited: Sequence[Unexcited]) -> dict[str, list[str]]:
+def _with_signals(test: str, unexcited: Sequence[Unexcited]) -> str:
+    signals = dict.fromkeys(name for one in unexcited for name in one.signals)
+    return f"{test} with {' and '.join(signals)}" if signals else test
+
+
+def _by_test(unexcited: Sequence[Unexcited]) -> dict[str, list[Unexcited]]:
     """Effects by test, each once, by a greedy cover; ties go by name."""
     left, chosen = list(unexcited), {}
     while left:
@@ -35,6 +40,6 @@ def _by_test(unexcited: Sequence[Unexcited]) -> dict[str, list[str]]:
             for test in one.tests:
                 counts[test] = counts.get(test, 0) + 1
         best = min(counts, key=lambda test: (-counts[test], test))
-        chosen[best] = [one.effect for one in left if best in one.tests]
+        chosen[best] = [one for one in left if best in one.tests]
         left = [one for one in left if best not in one.tests]
     return chosen

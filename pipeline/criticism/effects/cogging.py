@@ -63,7 +63,7 @@ EFFECT = Effect(
     experiment="a slow turn without current, in both senses",
     reference="Zhu & Howe, IEEE Trans. Energy Convers. 15 (2000), cogging torque",
     expand=_expand,
-    signals=("theta_mech_rad", "torque_shaft_nm"),
+    signals=("theta_mech_rad",),
     rivals={"bemf_harmonics": "a slow turn without current", "unbalance": "order 1 is no cogging"},
     torque=_torque,
 )

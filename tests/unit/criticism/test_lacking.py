@@ -1,0 +1,113 @@
+"""Shipped captures with tests or columns taken away: what is said then, and what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from pipeline.criticism.comparison import compare
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.size import PAIRLESS, machine_of, pole_pairs_of
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.stages.campaigns import campaigns, start_constants
+
+DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
+STANDARD = ModelSpec("standard")
+ANGLES = ("theta_mech_rad", "theta_elec_rad")
+
+
+@cache
+def shipped() -> Campaign:
+    return campaigns(str(DEMO))[0][0]
+
+
+def only(*tests: str) -> Campaign:
+    return replace(shipped(), captures=shipped().of(*tests))
+
+
+def without(columns: Mapping[str, tuple[str, ...]]) -> Campaign:
+    """The campaign with columns taken from the captures whose test they are listed under."""
+
+    def less(capture: Capture) -> Capture:
+        gone = columns.get(capture.meta.test, ())
+        tables = [t.drop([n for n in gone if n in t.columns]) for t in capture.tables]
+        return replace(capture, tables=tuple(tables))
+
+    return replace(shipped(), captures=tuple(less(c) for c in shipped().captures))
+
+
+def unnamed(campaign: Campaign) -> Campaign:
+    """The campaign with no pole pairs on its captures."""
+
+    def bare(capture: Capture) -> Capture:
+        extra = {k: v for k, v in capture.meta.extra.items() if k != "pole_pairs"}
+        return replace(capture, meta=replace(capture.meta, pole_pairs=None, extra=extra))
+
+    return replace(campaign, captures=tuple(bare(c) for c in campaign.captures))
+
+
+def test_the_second_harmonic_of_cogging_is_no_back_emf():
+    """Nothing but a holding current shows it, and no spectrum of a torque says that it is there."""
+    few = only("holding_current", "flux_map", "current_step", "resistance")
+    found = diagnose(few, STANDARD, start_constants(few))
+    assert found.missing == ("cogging",)
+    assert found.ladder[-1].held_out < 1.0
+
+
+def test_an_open_circuit_without_an_angle_is_not_used_and_said_so():
+    campaign = without({"open_circuit": ANGLES})
+    found = diagnose(campaign, STANDARD, start_constants(campaign))
+    assert (found.verdict, found.missing) == ("missing", ("cogging",))
+    assert found.ladder[-1].held_out < 1.0
+    (note,) = (note for note in found.notes if note.startswith("not used"))
+    assert "open_circuit_forward.mcap" in note
+
+
+def test_a_torque_map_without_torque_excites_less_and_says_what_to_record():
+    """With the drives gone, nothing else shows what a load does to friction."""
+    campaign = without({"torque_map": ("torque_shaft_nm",), "drive": ("torque_shaft_nm",)})
+    found = diagnose(campaign, STANDARD, start_constants(campaign))
+    lacking = {one.effect: one for one in found.unexcited}
+    loaded = lacking["load_dependent_friction"]
+    assert (loaded.tests, loaded.signals) == (("torque_map",), ("torque_shaft_nm",))
+    assert "record torque_map with torque_shaft_nm" in loaded.words
+    assert not {"cogging", "saturation", "dead_time"} & set(lacking)
+
+
+def test_a_temperature_that_nobody_recorded_is_said_to_be_ambient():
+    campaign = without({"drive": ("temp_winding_degc",), "open_circuit": ("temp_magnet_degc",)})
+    notes = compare(campaign, STANDARD, start_constants(campaign)).notes
+    cold = {note.split(",")[0]: note for note in notes if "ambient" in note}
+    assert set(cold) == {"no temp_winding_degc", "no temp_magnet_degc"}
+    assert "drive_1_warm.mcap" in cold["no temp_winding_degc"]
+    assert "open_circuit_forward.mcap" in cold["no temp_magnet_degc"]
+
+
+def test_pole_pairs_are_counted_from_any_two_lines():
+    for gone in ("vab_v", "vbc_v", "vca_v"):
+        spun = unnamed(without({"open_circuit": (gone,)}))
+        assert pole_pairs_of(spun, Constants()) == 7
+
+
+def test_pole_pairs_that_nothing_tells_are_asked_for_and_not_guessed():
+    blind = unnamed(without({"open_circuit": ANGLES}))
+    assert pole_pairs_of(blind, Constants()) is None
+    assert machine_of(blind, Constants()) is None
+    found = diagnose(blind, STANDARD, Constants())
+    assert (found.verdict, found.notes) == ("insufficient", (PAIRLESS,))
+    assert compare(blind, STANDARD, Constants()).notes == (PAIRLESS,)
+    still = unnamed(only("resistance"))
+    assert machine_of(still, Constants()).pole_pairs == 1
+
+
+def test_pole_pairs_that_no_spin_tells_are_estimated_from_the_other_captures():
+    blind = unnamed(without({"open_circuit": ANGLES}))
+    known = start_constants(blind).best("pole_pairs")
+    assert known is not None
+    assert known.number == pytest.approx(7)
