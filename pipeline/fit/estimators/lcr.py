@@ -35,7 +35,9 @@ EXPERIMENT = (
     "electrical turn, or lab_h, lbc_h and lca_h at one angle"
 )
 TERMS = (
-    Term("r_lcr_ohm", "ohm", "series resistance a to b at the LCR meter's frequency", "constant"),
+    Term(
+        "r_lcr_ohm", "ohm", "series resistance a to b at the LCR meter's frequency", "constant", 0
+    ),
     Term(
         "lcr_angle_offset_deg",
         "deg",

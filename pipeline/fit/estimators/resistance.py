@@ -52,7 +52,13 @@ TERMS = (
         for p in PAIRS
     ),
     *(
-        Term(f"r_{p}_ohm", "ohm", f"wye-equivalent resistance of phase {p}, at 25 degC", "constant")
+        Term(
+            f"r_{p}_ohm",
+            "ohm",
+            f"wye-equivalent resistance of phase {p}, at 25 degC",
+            "constant",
+            0,
+        )
         for p in "abc"
     ),
     Term("voltage_offset_v", "V", "part of the terminal voltage that follows sign(I)", "constant"),
