@@ -157,6 +157,16 @@ def test_cold_heat_run(rng: np.random.Generator) -> None:
     assert warned(with_column(capture, "temp_winding_degc", cold))[1].code == "current_coverage"
 
 
+@pytest.mark.parametrize("noise_a", [0.0, 1e-3])
+def test_heat_run_without_current(rng: np.random.Generator, noise_a: float) -> None:
+    """Refused: a winding that the room warms tells nothing of current; the refusal says so."""
+    capture = heat_run(MOTOR, rng)
+    for name in ("id_a", "iq_a"):
+        capture = with_column(capture, name, rng.normal(0.0, noise_a, 9000))
+    error = refused(capture)
+    assert "no current leaves its noise" in error.message
+
+
 def test_flux_map_of_one_line(rng: np.random.Generator) -> None:
     """Refused: one level of i_d shows no d inductance."""
     capture = flux_map(MOTOR, rng)
