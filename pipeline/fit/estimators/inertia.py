@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -229,10 +229,7 @@ def _estimates(
 
     gains = instrument_uncertainties(rows.captures, ("current", "torque", "temperature"))
     type_b = contributions(values, gains)
-    per_kt = (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a)
-    step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
-    per_rel = (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step)
-    per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
+    per_kt, per_rel, per_alpha = _slopes(values, torque)
     constants, scatter = found.constants(found.coefficients), found.scatter()
     paths = tuple(sorted(c.path for c in rows.captures))
     note = "; ".join([*_words(rows, torque, found), *_load_words(rows, strange, left_out)])
@@ -264,6 +261,18 @@ def _estimates(
             Estimate(name, value, _unit(name), "measured", NAME, budget_of(budget), at, paths, note)
         )
     return tuple(estimates)
+
+
+def _slopes(
+    values: Callable[[Mapping[str, float]], Array], torque: Torque
+) -> tuple[Array, Array, Array]:
+    """What J, T_c and B [3] change by the torque constant, the reluctance and the magnet's law."""
+    step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
+    return (
+        (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a),
+        (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step),
+        (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4,
+    )
 
 
 def _words(rows: ShaftRows, torque: Torque, found: DragFit) -> list[str]:
