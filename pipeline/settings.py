@@ -125,6 +125,9 @@ class PlanSettings(ReadingSettings):
     )
     source: str = key("auto", "source map of conf/source/ for foreign files of input")
     motor: str | None = key(None, "motor_id; every motor without it")
+    limits: str = key(
+        "default", "limits file of conf/limits/: constants a release must hold", place=True
+    )
 
 
 @dataclass(kw_only=True)

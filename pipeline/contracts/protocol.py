@@ -29,13 +29,15 @@ class Gate:
 
     `tests`: the tests it looks at. `options`: its thresholds with defaults, each with its reason
     beside it; `gates.NAME.KEY=` in the configuration overrides them and `gates.NAME.enabled=0`
-    turns the gate off.
+    turns the gate off. `follows`: gates whose fault, where both find one, is the cause of this
+    one's, and is told first.
     """
 
     name: str
     tests: tuple[str, ...]
     check: GateFunction
     options: Mapping[str, float] = field(default_factory=dict)
+    follows: tuple[str, ...] = ()
 
     def settings(self) -> Mapping[str, float]:
         """Every key that the configuration may set, with its default."""

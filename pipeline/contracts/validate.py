@@ -35,7 +35,7 @@ def validate(
     check_tables(capture)
     masks: list[Mask] = []
     capture, findings = _without_blanks(capture)
-    refusals: list[CaptureError] = []
+    refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():
         chosen = {**gate.settings(), **options.get(gate.name, {})}
@@ -44,17 +44,23 @@ def validate(
         try:
             passed = gate.check(capture, chosen)
         except CaptureError as refusal:
-            refusals.append(refusal)
+            refusals[gate.name] = refusal
         except BROKEN as error:
             broken.append(_broken(gate.name, error))
         else:
             masks.extend(passed.masks)
             findings.extend(passed.findings)
     if refusals or broken:
-        raise merged(refusals or broken)
+        raise merged(_causes_first(refusals) or broken)
     settings = {**missing_values.GATE.settings(), **options.get(missing_values.NAME, {})}
     parted = _streams_apart(capture, settings["dense_share"])
     return parted.with_masks(*masks), tuple(findings)
+
+
+def _causes_first(refusals: Mapping[str, CaptureError]) -> list[CaptureError]:
+    """The refusals by gate's name, those that another one's fault brings about last."""
+    causes = {g.name: [n for n in g.follows if n in refusals] for g in gates()}
+    return [refusals[name] for name in sorted(refusals, key=lambda name: len(causes[name]))]
 
 
 def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:

@@ -72,7 +72,8 @@ def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
 def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, float] | None:
     """(2/3) cos² of the angle from each phase to the current, the mean over the capture.
 
-    Copper loss is the sum of R_k i_k², so a locked rotor sees its own mix of the phases.
+    Copper loss is the sum of R_k i_k², so a locked rotor sees its own mix of the phases. None
+    where the angle is not known or no current flows.
     """
     offset = known.best("angle_offset_elec_rad")
     zero = 0.0 if offset is None else offset.number
@@ -86,7 +87,9 @@ def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, flo
         return None
     angle = theta + np.arctan2(data["iq_a"], data["id_a"])
     weight = data["id_a"] ** 2 + data["iq_a"] ** 2
-    good = np.isfinite(angle) & np.isfinite(weight)
+    good = np.isfinite(angle) & (weight > 0.0)
+    if not good.any():
+        return None
     a, b, c = (
         2.0 / 3.0 * float(np.average(np.cos(angle[good] - place) ** 2, weights=weight[good]))
         for place in (0.0, 2.0 * math.pi / 3.0, -2.0 * math.pi / 3.0)

@@ -196,6 +196,19 @@ def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
     return held
 
 
+def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:
+    """Windows [w] in which the shaft may stand, or in which a coast-down is no coast yet."""
+    weak = part.weak
+    ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
+    least = np.array([np.min(np.abs(part.speed[a:b])) for a, b in ends])
+    slow: NDArray[np.bool_] = least < SLOWEST_SHARE * fastest
+    if part.kind == COAST:
+        gaining = weak.integral(part.theta, 2) * weak.integral(part.theta, 1) > 0.0
+        slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5
+        slow |= _held(weak, part.speed)
+    return slow
+
+
 def _rows(
     index: int,
     part: _Part,
@@ -204,29 +217,37 @@ def _rows(
     cogging_orders: Sequence[int],
     ripple_orders: Sequence[int],
 ) -> tuple[dict[str, Array], int]:
-    weak, theta, speed = part.weak, part.theta, part.speed
-    ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
-    slow = np.array([np.min(np.abs(speed[a:b])) < SLOWEST_SHARE * fastest for a, b in ends])
-    if part.kind == COAST:
-        gaining = weak.integral(theta, 2) * weak.integral(theta, 1) > 0.0
-        slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5
-        slow |= _held(weak, speed)
+    """Columns of one capture's windows, and how many of these were dropped."""
+    weak = part.weak
     clock = np.floor((weak.centres_s - weak.centres_s[0]) / CLUSTER_S)
-    turning = np.exp(1j * theta)
-    driven = float(part.kind == DRIVE)
-    torque = np.abs(part.current) * np.sign(speed)
     found = {
         "capture": np.full(weak.count, float(index)),
         "kind": np.full(weak.count, float(part.kind)),
         "cluster": clock + 1e6 * index,
         "time_s": weak.centres_s,
-        "acceleration_rad_s2": weak.integral(theta, 2),
+        "acceleration_rad_s2": weak.integral(part.theta, 2),
         "q_current_a": weak.integral(part.current),
         "warm_current_k_a": weak.integral(part.current * part.warm),
         "product_a2": weak.integral(part.current * part.direct),
         "load_nm": weak.integral(part.load),
-        "speed_rad_s": weak.integral(theta, 1),
-        "sense": weak.integral(np.sign(speed)),
+        "speed_rad_s": weak.integral(part.theta, 1),
+        "sense": weak.integral(np.sign(part.speed)),
+        **_nuisances(part),
+        **_ripples(part, cogging_orders, ripple_orders),
+    }
+    for name, function in speed_functions.items():
+        found[name] = weak.integral(function(part.speed / fastest))
+    slow = _undetermined(part, fastest)
+    return {name: column[~slow] for name, column in found.items()}, int(slow.sum())
+
+
+def _nuisances(part: _Part) -> dict[str, Array]:
+    """What a sensor's fault, saturation or an unbalance adds to the acceleration, per unit."""
+    weak = part.weak
+    turning = np.exp(1j * part.theta)
+    driven = float(part.kind == DRIVE)
+    torque = np.abs(part.current) * np.sign(part.speed)
+    return {
         "offset": np.full(weak.count, driven),
         "load friction": weak.integral(torque),
         "d current": weak.integral(part.direct),
@@ -242,14 +263,19 @@ def _rows(
         "unbalance cos": weak.integral(turning.real),
         "unbalance sin": weak.integral(turning.imag),
     }
+
+
+def _ripples(
+    part: _Part, cogging_orders: Sequence[int], ripple_orders: Sequence[int]
+) -> dict[str, Array]:
+    """Torque against angle of these orders a turn, the latter in proportion to q current."""
+    found = {}
     for order in cogging_orders:
-        ripple = np.exp(1j * order * theta)
-        found[f"order {order} cos"] = weak.integral(ripple.real)
-        found[f"order {order} sin"] = weak.integral(ripple.imag)
+        ripple = np.exp(1j * order * part.theta)
+        found[f"order {order} cos"] = part.weak.integral(ripple.real)
+        found[f"order {order} sin"] = part.weak.integral(ripple.imag)
     for order in ripple_orders:
-        ripple = part.current * np.exp(1j * order * theta)
-        found[f"order {order} q current cos"] = weak.integral(ripple.real)
-        found[f"order {order} q current sin"] = weak.integral(ripple.imag)
-    for name, function in speed_functions.items():
-        found[name] = weak.integral(function(speed / fastest))
-    return {name: column[~slow] for name, column in found.items()}, int(slow.sum())
+        ripple = part.current * np.exp(1j * order * part.theta)
+        found[f"order {order} q current cos"] = part.weak.integral(ripple.real)
+        found[f"order {order} q current sin"] = part.weak.integral(ripple.imag)
+    return found

@@ -59,8 +59,17 @@ class RecordingError(PipelineError):
 
 
 def merged(faults: Sequence[CaptureError]) -> CaptureError:
-    """One error that says every fault and every remedy; code and rows are the first one's."""
+    """One error that says every fault: code, rows and remedy are the first one's.
+
+    Each further fault stands in the message with its own code, rows and remedy; a remedy that is
+    the first one's is not repeated.
+    """
     first, rest = faults[0], faults[1:]
-    others = "".join(f"; also [{fault.code}] {fault.message}" for fault in rest)
-    remedies = "; ".join(dict.fromkeys(fault.remedy for fault in faults))
-    return CaptureError(first.code, first.message + others, remedies, first.rows)
+    others = "".join(f"; also {_beside(fault, first.remedy)}" for fault in rest)
+    return CaptureError(first.code, first.message + others, first.remedy, first.rows)
+
+
+def _beside(fault: CaptureError, said: str) -> str:
+    more = [] if fault.rows is None else [f"rows {fault.rows[0]}-{fault.rows[1]}"]
+    more += [fault.remedy] if fault.remedy != said else []
+    return f"[{fault.code}] {fault.message}" + (f" ({'; '.join(more)})" if more else "")

@@ -12,6 +12,7 @@ from pipeline.io.files import size_bytes
 from pipeline.io.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
 from pipeline.records.errors import CaptureError, MachineError, UsageError
+from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings, configuration_folder
@@ -43,7 +44,7 @@ class InspectTask:
 
 
 def main(settings: InspectSettings) -> Outcome:
-    """Prints what the file holds."""
+    """Prints what the file holds; exit code 3 and one line where `run` would refuse it."""
     if not settings.file or not Path(settings.file).exists():
         raise UsageError(f"file={settings.file or ''} is no file", "name the file to look into")
     if Path(settings.file).is_dir():
@@ -52,17 +53,21 @@ def main(settings: InspectSettings) -> Outcome:
     pool = open_pool("local", Cluster())
     with TemporaryDirectory() as crumbs, Crew(pool, 1, Path(crumbs) / "work") as crew:
         try:
-            (text,) = crew.work_through(look_into, [task])
+            (seen,) = crew.work_through(look_into, [task])
         except CaptureError as error:
             told = f"{printable(settings.file)}: {error.message}"
             raise CaptureError(error.code, told, error.remedy, error.rows) from error
-    if isinstance(text, MachineError):
-        raise text
-    return Outcome(text=text)
+    if isinstance(seen, MachineError):
+        raise seen
+    text, refusals = seen
+    return Outcome(CaptureError.exit_code if refusals else 0, text, refusals)
 
 
-def look_into(task: InspectTask) -> str:
-    """What a file holds, as text for people; in a worker, under its limits."""
+def look_into(task: InspectTask) -> tuple[str, tuple[str, ...]]:
+    """What a file holds, as text for people, and the lines by which `run` would refuse it.
+
+    In a worker, under its limits.
+    """
     from pipeline.io.inspect_file import describe
     from pipeline.io.source_map import load_source_maps
 
@@ -72,24 +77,26 @@ def look_into(task: InspectTask) -> str:
     sources = load_source_maps(configuration_folder() / "source")
     with reading(task.file, size_bytes(path), task.limits):
         report = describe(path, sources)
+        refusals = _refusals(path, sources)
         if not report.faults:
-            report = replace(report, faults=_refusal(path, sources))
-    return render(report)
+            told = tuple(f"{one.message}; {one.remedy}" for one in refusals)
+            report = replace(report, faults=told)
+    return render(report), tuple(finding.line() for finding in refusals)
 
 
-def _refusal(path: Path, sources: Mapping[str, SourceMap]) -> tuple[str, ...]:
-    """Why `run` would refuse a file by itself that can be looked into, or nothing."""
+def _refusals(path: Path, sources: Mapping[str, SourceMap]) -> tuple[Finding, ...]:
+    """Why `run` would refuse a file by itself; nothing of one that it leaves alone."""
     from pipeline.contracts.validate import validate
     from pipeline.io.ingest import read_capture
     from pipeline.io.survey import look, question_of
 
     answer = look(path.parent, question_of(path), sources)
     if answer.entry is None:
-        return tuple(f"{one.message}; {one.remedy}" for one in answer.findings)
+        return tuple(one for one in answer.findings if one.severity == "refused")
     try:
         validate(read_capture(path.parent, answer.entry), {})
     except CaptureError as fault:
-        return (str(fault),)
+        return (Finding.refusal(path.name, fault),)
     return ()
 
 

@@ -40,11 +40,10 @@ U_OF = {"resistance_imbalance": 0.005}
 def main(settings: PlanSettings) -> Outcome:
     """The plan of one motor, or of each, of an output folder or of a folder of captures.
 
-    Raises UsageError where there is no such motor.
+    Raises UsageError where there is no such motor or limits file.
     """
-    required = frozenset(
-        required_constants(limits_file(configuration_folder() / "limits", "default"))
-    )
+    limits = limits_file(configuration_folder() / "limits", settings.limits)
+    required = frozenset(required_constants(limits))
     if settings.input is not None:
         return _of_captures(settings, settings.input, required)
     sheets = read_datasheets(Path(settings.output))

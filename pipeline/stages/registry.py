@@ -56,13 +56,13 @@ def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
 
 
 def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
-    motor = _needed(settings, "motor")
+    motor, *revisions = _needed(settings, "motor", "from", "to")
     history = registry.history(motor)
     if not history:
         raise _unknown(registry, motor)
     pair = []
-    for name in ("from", "to"):
-        number = _whole(name, _needed(settings, name))
+    for name, revision in zip(("from", "to"), revisions, strict=True):
+        number = _whole(name, revision)
         wanted = Selection(motor_id=motor, revision=number)
         pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
     one, other = registry.datasheets(pair)
@@ -109,12 +109,9 @@ def _revoke(registry: Registry, settings: RegistrySettings) -> Outcome:
 def _decide(
     kind: Literal["approve", "revoke"], registry: Registry, settings: RegistrySettings
 ) -> Outcome:
-    by, why = _needed(settings, "by"), _needed(settings, "why")
+    which = "revision" if settings.version is None else "version"
+    _, _, by, why = _needed(settings, "motor", which, "by", "why")
     wanted = _wanted(settings)
-    if wanted.revision is None and wanted.version is None:
-        raise UsageError(
-            f"registry {kind}: which version is missing", "name it by revision= or version="
-        )
     version, new = registry.decide(kind, wanted, by, why, datetime.now(UTC))
     said = "" if new else " (already so)"
     text = f"{safe(version.motor_id)} revision {version.revision} is {version.status}{said}: "
@@ -131,7 +128,7 @@ def _untag(registry: Registry, settings: RegistrySettings) -> Outcome:
 
 def _name(registry: Registry, settings: RegistrySettings, kind: Literal["tag", "untag"]) -> Outcome:
     """Gives the newest version of each motor that `select` takes, or one motor's, a name."""
-    tag, by = _needed(settings, "tag"), _needed(settings, "by")
+    tag, by = _needed(settings, "tag", "by")
     if not TAG.fullmatch(tag):
         raise UsageError(f"tag={tag} is no name", "letters, digits and - _ . up to 64")
     if settings.select is not None:
@@ -193,7 +190,7 @@ def _version(registry: Registry, settings: RegistrySettings, *, newest: bool) ->
 
 
 def _wanted(settings: RegistrySettings) -> Selection:
-    motor = _needed(settings, "motor")
+    (motor,) = _needed(settings, "motor")
     revision, version = settings.revision, settings.version
     if version is not None and not PREFIX.fullmatch(version):
         raise UsageError(f"version={version} is no digest", "at least its first 4 hex digits")
@@ -201,12 +198,18 @@ def _wanted(settings: RegistrySettings) -> Selection:
     return Selection(motor_id=motor, revision=number, version=version)
 
 
-def _needed(settings: RegistrySettings, name: str) -> str:
-    """The text of a key that the action needs; raises UsageError where it is missing or blank."""
-    value = getattr(settings, f"{name}_" if name == "from" else name)
-    if value is None or not value.strip():
-        raise UsageError(f"registry {settings.action}: {name}= is missing", f"add {name}=...")
-    return str(value)
+def _needed(settings: RegistrySettings, *names: str) -> tuple[str, ...]:
+    """The texts of keys that the action needs.
+
+    Raises UsageError that names all of them that are missing or blank.
+    """
+    given = {name: getattr(settings, f"{name}_" if name == "from" else name) for name in names}
+    missing = [name for name, value in given.items() if value is None or not value.strip()]
+    if missing:
+        keys, verb = ", ".join(f"{name}=" for name in missing), "is" if missing[1:] == [] else "are"
+        add = " ".join(f"{name}=..." for name in missing)
+        raise UsageError(f"registry {settings.action}: {keys} {verb} missing", f"add {add}")
+    return tuple(str(value) for value in given.values())
 
 
 def _whole(name: str, text: str) -> int:

@@ -52,6 +52,8 @@ def main(settings: SimulateSettings) -> Outcome:
         raise UsageError(
             f"no encoding {settings.encoding!r}", f"known are mixed, {', '.join(FORMATS)}"
         )
+    if settings.seed < 0:
+        raise UsageError(f"simulate: seed={settings.seed}", "it must be 0 or more")
     watch, output = Stopwatch(), Path(settings.output)
     try:
         jobs = list(_fleet(settings) if settings.fleet else _single(settings))

@@ -108,8 +108,9 @@ def test_every_bad_key_is_named_in_one_line(batch: Batch) -> None:
     assert (code, only["code"]) == (3, "bad_metadata")
     for said in ("pole_pairs is 'seven'", "slots is '-3'", "winding is 'star'"):
         assert said in only["message"]
-    for remedy in ("from 1 to 200", "from 1 to 1000", "wye, delta"):
-        assert remedy in only["remedy"]
+    assert "from 1 to 200" in only["remedy"]
+    for key, remedy in (("slots is '-3'", "from 1 to 1000"), ("winding is 'star'", "wye, delta")):
+        assert remedy in only["message"].partition(key)[2].partition("; also")[0]
     assert "vdc_v" not in only["message"]
 
 

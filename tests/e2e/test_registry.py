@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -130,3 +132,18 @@ def test_a_place_where_no_registry_can_be_is_said_before_any_work(
 ) -> None:
     assert bench.run(f"registry={tmp_path / 'a%41'}") == 2
     assert not bench.output.exists()
+
+
+def test_the_readme_releases_and_exports_a_motor_of_the_demo(tmp_path: Path) -> None:
+    """Its lines as they stand, in their order, on what a run of the demo's captures published."""
+    root = Path(__file__).parents[2]
+    readme = (root / "README.md").read_text(encoding="utf-8").split("## Releasing")[1]
+    lines = re.findall(r"^ {4}\.venv/bin/python -m pipeline (.*)$", readme, flags=re.MULTILINE)
+    approve, export = (shlex.split(line) for line in lines[:2])
+    assert (approve[:2], export[0]) == (["registry", "approve"], "export")
+    output, registry = f"output={tmp_path}", f"registry={tmp_path / 'registry'}"
+    demo = root / "data" / "demo" / "G52-0601"
+    assert main(["run", f"input={demo}", output, "report=false", "recordings=false"]) == 0
+    assert main([*export, output]) == 2
+    assert main([*approve, registry]) == 0
+    assert main([*export, output]) == 0

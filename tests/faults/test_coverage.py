@@ -41,6 +41,22 @@ def test_slow_sampling_of_a_step(rng: np.random.Generator) -> None:
     assert refused(with_rows(capture, rows % 150 == 0)).code == "sampling_rate"
 
 
+def test_a_step_without_a_sample_on_its_way(rng: np.random.Generator) -> None:
+    """Refused: a row before and a row after the step, and the words count no samples."""
+    capture = current_step(MOTOR, rng)
+    current = np.abs(column(capture, "ia_a"))
+    ends = np.isin(np.arange(current.size), [current.argmin(), current.argmax()])
+    error = refused(with_rows(capture, ends))
+    assert error.code == "sampling_rate"
+    assert error.message.startswith("no sample falls on the way of the current")
+
+
+def test_a_single_row(rng: np.random.Generator) -> None:
+    """Refused: one value makes no fit."""
+    error = refused(with_rows(spin_down(MOTOR, rng), np.arange(2000) == 0))
+    assert "has 1 value; spin_down needs 2 at least" in error.message
+
+
 def test_aliased_back_emf(rng: np.random.Generator) -> None:
     """Refused: two samples in the shortest electrical period, by the nameplate's count."""
     capture = open_circuit(MOTOR, rng)
@@ -155,6 +171,16 @@ def test_cold_heat_run(rng: np.random.Generator) -> None:
     capture = heat_run(MOTOR, rng)
     cold = 25.0 + 0.005 * (column(capture, "temp_winding_degc") - 25.0)
     assert warned(with_column(capture, "temp_winding_degc", cold))[1].code == "current_coverage"
+
+
+@pytest.mark.parametrize("noise_a", [0.0, 1e-3])
+def test_heat_run_without_current(rng: np.random.Generator, noise_a: float) -> None:
+    """Refused: a winding that the room warms tells nothing of current; the refusal says so."""
+    capture = heat_run(MOTOR, rng)
+    for name in ("id_a", "iq_a"):
+        capture = with_column(capture, name, rng.normal(0.0, noise_a, 9000))
+    error = refused(capture)
+    assert "no current leaves its noise" in error.message
 
 
 def test_flux_map_of_one_line(rng: np.random.Generator) -> None:

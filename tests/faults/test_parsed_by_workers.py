@@ -92,10 +92,36 @@ def test_inspect_says_what_a_gate_of_run_would(
     (folder / "half.csv").write_text(text)
     main(["run", f"input={folder}", f"output={folder.parent / 'out'}", "report=false"])
     refused = [line for line in capsys.readouterr().err.splitlines() if "half.csv" in line]
-    assert main(["inspect", str(folder / "half.csv")]) == 0
-    told = [x for x in capsys.readouterr().out.splitlines() if x.startswith("fault: ")]
+    assert main(["inspect", str(folder / "half.csv")]) == 3
+    said = capsys.readouterr()
+    told = [x for x in said.out.splitlines() if x.startswith("fault: ")]
     assert len(told) == 1
     assert told[0].removeprefix("fault: ").partition(";")[0] in refused[0]
+    assert said.err.splitlines() == refused
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code"),
+    [
+        ("empty.csv", b"", 3),
+        ("empty.mcap", b"", 3),
+        (
+            "cut.csv",
+            b"# contract: 1\n# motor_id: m\n# test: spin_down\nt_s,iq_a,id_a\n0,1,2\n1,2",
+            3,
+        ),
+        ("notes.txt", b"hello\n", 0),
+        ("strange.csv", b"Time;RPM\n0;1\n1;2\n2;3\n", 0),
+    ],
+)
+def test_inspect_ends_as_a_run_of_the_file_would(
+    tmp_path: Path, name: str, content: bytes, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Expected: exit 3 and one line for what `run` refuses, 0 for what it leaves alone."""
+    (tmp_path / name).write_bytes(content)
+    assert main(["inspect", str(tmp_path / name)]) == code
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.startswith(f"refused: {name}") for line in lines] == [True] * (code == 3)
 
 
 def test_the_least_memory_reads_a_small_file(

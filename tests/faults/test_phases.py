@@ -223,6 +223,21 @@ def test_speed_against_angle(
     assert words in error.message
 
 
+@pytest.mark.parametrize(
+    ("still", "moving"),
+    [("theta_mech_rad", "omega_mech_rad_s"), ("omega_mech_rad_s", "theta_mech_rad")],
+)
+def test_a_sensor_that_stands_while_the_shaft_turns(
+    still: str, moving: str, rng: np.random.Generator
+) -> None:
+    """Refused: the sensor that stands still is named, and no unit is blamed for it."""
+    capture = drive(MOTOR, rng)
+    error = refused(with_column(capture, still, np.zeros(column(capture, still).size)))
+    assert f"{still} says that the shaft stands while {moving}" in error.message
+    assert "inf" not in error.message.split()
+    assert "sensor" in error.remedy
+
+
 def test_a_clock_in_milliseconds(rng: np.random.Generator) -> None:
     """Refused: the speed is 1000 times the angle's rate, and the clock is what is suspected."""
     capture = spin_down(MOTOR, rng)

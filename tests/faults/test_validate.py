@@ -15,7 +15,7 @@ from pipeline.contracts.requirements import requirements
 from pipeline.contracts.validate import validate
 from pipeline.physics.glossary import TESTS as TEST_NAMES
 from pipeline.records.capture import Capture
-from pipeline.records.errors import CaptureError
+from pipeline.records.errors import CaptureError, merged
 from tests.faults.healthy import (
     TESTS,
     Motor,
@@ -316,3 +316,27 @@ def test_refusals_are_merged(rng: np.random.Generator) -> None:
     error = refused(with_column(capture, "omega_mech_rad_s", speed))
     codes = {error.code} | {word.strip("[]") for word in error.message.split() if word[0] == "["}
     assert codes == {"speed_against_angle", "speed_coverage"}
+
+
+def test_each_fault_stands_with_its_rows_and_its_remedy() -> None:
+    """Refused once: code, rows and remedy are the first one's, the others keep theirs."""
+    first = CaptureError("cause", "A is so", "mend A", (3, 5))
+    others = [CaptureError("other", "B is so", "mend B", (7, 9)), CaptureError("c", "C", "mend A")]
+    error = merged([first, *others])
+    assert (error.code, error.rows, error.remedy) == ("cause", (3, 5), "mend A")
+    assert error.message == "A is so; also [other] B is so (rows 7-9; mend B); also [c] C"
+
+
+def test_a_cause_is_told_before_what_it_brings_about(rng: np.random.Generator) -> None:
+    """Refused: a wrapped and a stuck angle make a wrong rate of the angle as well."""
+    capture = spin_down(MOTOR, rng)
+    angle = column(capture, "theta_mech_rad")
+    wrapped = refused(with_column(capture, "theta_mech_rad", angle % (2.0 * np.pi)))
+    assert wrapped.code == "wrapped_angle"
+    assert "; also [speed_against_angle]" in wrapped.message
+    assert "unwrap" in wrapped.remedy
+    assert "leave it out" not in wrapped.remedy
+    stuck = refused(with_column(capture, "theta_mech_rad", np.full(2000, 0.3)))
+    assert stuck.code == "stuck_channel"
+    assert stuck.rows == (0, 1999)
+    assert "; also [speed_against_angle]" in stuck.message

@@ -105,4 +105,5 @@ GATE = Gate(
         # Way back over way there.
         "return_share": 0.5,
     },
+    follows=("stuck_channel", "wrapped_angle"),
 )

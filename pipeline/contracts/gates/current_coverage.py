@@ -71,6 +71,14 @@ def _torque_map(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _heat_run(capture: Capture, options: Mapping[str, float]) -> Passed:
+    currents = _finite(capture, "id_a", "iq_a", *LINE_CURRENTS)
+    times = options["noise_multiple"]
+    if not any(_clear_of_noise(v, np.abs(v).max(), times) for v in currents.values()):
+        raise CaptureError(
+            CODE,
+            "no current leaves its noise: nothing is recorded that could warm the winding",
+            "drive current through the winding, and record it, until the winding warms",
+        )
     temperature = _finite(capture, "temp_winding_degc")["temp_winding_degc"]
     rise = float(np.ptp(temperature)) - 2.0 * noise_of(temperature)
     if rise >= options["rise_k"]:

@@ -12,6 +12,7 @@ from pipeline.physics.glossary import TESTS
 from pipeline.records.capture import Capture, Mask
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
+from pipeline.records.naming import counted
 
 NAME = "missing_values"
 REMEDY = "find out why the channel dropped out, and record again if those rows matter"
@@ -36,8 +37,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             if np.count_nonzero(good[name]) < options["fewest"]:
                 raise CaptureError(
                     NAME,
-                    f"{name} has {np.count_nonzero(good[name])} values; {meta.test} needs "
-                    f"{options['fewest']:.0f}",
+                    f"{name} has {counted(int(np.count_nonzero(good[name])), 'value')}; "
+                    f"{meta.test} needs {options['fewest']:.0f} at least",
                     "record for longer, or faster",
                 )
         if keep.all():

@@ -146,4 +146,5 @@ GATE = Gate(
         # A load that pulses turns the currents' vector a little; aliasing hits this by chance only.
         "off_count": 0.1,
     },
+    follows=("stuck_channel", "wrapped_angle"),
 )

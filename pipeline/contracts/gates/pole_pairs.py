@@ -65,4 +65,5 @@ GATE = Gate(
         # Physics: p = f_elec / f_mech within 0.02 of a whole number.
         "from_whole": 0.02,
     },
+    follows=("stuck_channel", "wrapped_angle"),
 )

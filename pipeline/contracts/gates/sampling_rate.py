@@ -42,6 +42,11 @@ def _step(capture: Capture, options: Mapping[str, float]) -> Passed:
         if current.size and np.ptp(current) > 20.0 * noise_of(current):
             found = min(found, samples_per_time_constant(current))
     least, good = options["step_refuse"], options["step_warn"]
+    if found == 0.0:
+        words = "no sample falls on the way of the current from one level to the next, where"
+        raise CaptureError(
+            CODE, f"{words} {least:g} in an electrical time constant are the least", REMEDY
+        )
     return _judge(capture, found, least, good, "in an electrical time constant")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -31,6 +32,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     ratio = speed_over_angle(capture, options["turns"])
     if ratio is None or abs(ratio - 1.0) <= options["warn"]:
         return Passed()
+    if ratio == 0.0 or math.isinf(ratio):
+        raise CaptureError(CODE, *_standing(ratio))
     words = f"omega_mech_rad_s is {ratio:.4g} times the rate of theta_mech_rad"
     suspect = _suspect(ratio, capture.meta.pole_pairs)
     words += f": {suspect}" if suspect else ""
@@ -38,6 +41,15 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     if abs(ratio - 1.0) > options["refuse"]:
         raise CaptureError(CODE, words, remedy)
     return Passed(findings=(warning(capture, CODE, words, "the angle is used; " + remedy),))
+
+
+def _standing(ratio: float) -> tuple[str, str]:
+    """What is wrong and what to do where one of the two stands still."""
+    still, moving = ("omega_mech_rad_s", "theta_mech_rad")
+    if ratio != 0.0:
+        still, moving = moving, still
+    words = f"{still} says that the shaft stands while {moving} says that it turns"
+    return words, "check the sensor that stands still and its lead, and record again"
 
 
 def speed_over_angle(capture: Capture, turns: float) -> float | None:
@@ -58,7 +70,7 @@ def speed_over_angle(capture: Capture, turns: float) -> float | None:
         if max(np.abs(by_angle).sum(), np.abs(by_speed).sum()) < turns * TURN_RAD:
             continue
         if not np.any(by_angle):
-            return float("inf")
+            return math.inf
         return float(by_angle @ by_speed / (by_angle @ by_angle))
     return None
 
@@ -84,4 +96,5 @@ GATE = Gate(
         # Nearer to 1 than this lies no unit, gear or pole count.
         "refuse": 0.2,
     },
+    follows=("clock_jump", "stuck_channel", "wrapped_angle"),
 )

@@ -11,10 +11,15 @@ from pipeline.contracts.protocol import Gate, Passed, span_of
 from pipeline.physics.glossary import TESTS
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
+from pipeline.records.naming import counted
 
 ANGLES = ("theta_mech_rad", "theta_elec_rad")
 TURN_RAD = 2.0 * np.pi
 GAP = 2.0
+REMEDY = (
+    "count the turns on, as numpy.unwrap does, before the file is written, or log the angle "
+    "unwrapped; keep the column, for much is told by the angle alone"
+)
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -33,8 +38,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
             first, last = span_of(turns)
             raise CaptureError(
                 "wrapped_angle",
-                f"{name} jumps by a whole turn {int(np.count_nonzero(turns))} times",
-                "record it unwrapped, or leave it out where the speed is there",
+                f"{name} jumps by a whole turn {counted(int(np.count_nonzero(turns)), 'time')}",
+                REMEDY,
                 rows=(first + 1, last + 1),
             )
     return Passed()

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.fit.instruments import budget_of, instrument_uncertainties, unstated_note
+from pipeline.fit.instruments import instrument_uncertainties, unstated_note
+from pipeline.fit.measured import measured
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.numerics.orders import (
     TURN_RAD,
@@ -31,7 +32,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, Order, not_identifiable, not_there
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Budget, Contribution
+from pipeline.records.uncertainty import Contribution
 
 NAME = "cogging"
 COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
@@ -167,7 +168,6 @@ def _cogging(
     if sides:
         note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
     peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
-    gain = instrument_uncertainties(captures, ("torque",))
     note += "; " * bool(unstated_note(captures, ("torque",))) + unstated_note(captures, ("torque",))
     paths = tuple(c.path for c in captures)
     dof = min(line.dof for line in lines)
@@ -175,10 +175,10 @@ def _cogging(
         Estimate("cogging_order", leading.order, "1", "measured", NAME, captures=paths, note=note,
                  bounds=(1.0, float(spec.orders[-1]))),
         replace(
-            _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, gain, paths, note),
+            _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, captures, note),
             orders=_published(lines),
         ),
-        _torque("cogging_peak_nm", peak, u_peak, dof, gain, paths, note),
+        _torque("cogging_peak_nm", peak, u_peak, dof, captures, note),
     )  # fmt: skip
 
 
@@ -195,16 +195,15 @@ def _torque(
     value: float,
     u: float,
     dof: float,
-    gains: Mapping[str, float],
-    paths: tuple[str, ...],
+    captures: Sequence[Capture],
     note: str,
     speed_rad_s: float | None = None,
 ) -> Estimate:
     parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof)]
+    gains = instrument_uncertainties(captures, ("torque",))
     parts += [Contribution(source, value * gain, "B") for source, gain in gains.items()]
     at = {} if speed_rad_s is None else {"omega_mech_rad_s": speed_rad_s}
-    budget: Budget = budget_of(parts)
-    return Estimate(name, value, _unit(name), "measured", NAME, budget, at, paths, note)
+    return measured(NAME, name, _unit(name), value, parts, captures, at, [note])
 
 
 def _friction(
@@ -229,8 +228,7 @@ def _friction(
         f"drag at creep speed, with Stribeck's excess in it{words}; transducer zero {zero:.2g} N·m "
         f"parted by direction; {len(turns)} turns"
     )
-    gains = instrument_uncertainties(captures, ("torque",))
-    return _torque(name, value, u, dof, gains, tuple(c.path for c in captures), note, speed)
+    return _torque(name, value, u, dof, captures, note, speed)
 
 
 def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, str]:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from pipeline.fit.flux_pairs import SAME, Flux, flux_pairs, frame_of, instant_voltage
 from pipeline.fit.instruments import (
-    budget_of,
     contributions,
     instrument_uncertainties,
     unstated_note,
 )
 from pipeline.fit.magnet_coefficient import magnet_coefficient
+from pipeline.fit.measured import measured
 from pipeline.fit.operating_points import Point, operating_points, pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign, Capture
@@ -70,45 +70,68 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         note = f"{why}; {EXPERIMENT}"
         return Fit(tuple(not_identifiable(n, "H", NAME, note) for n in GIVES))
     magnet = magnet_coefficient(known)[0]
-    words = f"{table.note()}; {_timing_words(captures)}"
     points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
+    look = _Look(points, pairs, magnet, captures, *frame_of(points, pairs))
     fluxes = flux_pairs(points, pairs)
-    angle, behind_s = frame_of(points, pairs)
-    words += f"; frame turned by {angle:.3f} rad, currents {1e6 * behind_s:.3g} µs late, taken out"
-    behind = behind_s * pairs * max(abs(p.omega_mech_rad_s) for p in points)
     own = _direct(fluxes, magnet), _quadrature(fluxes, magnet)
-    estimates = []
-    for name, find, found, other in (
-        ("ld_rated_h", _direct, *own),
-        ("lq_rated_h", _quadrature, *own[::-1]),
-    ):
-        if found is None:
-            why = "no settled pair of plus and minus q current at the currents needed"
-            estimates.append(not_identifiable(name, "H", NAME, f"{why}; {EXPERIMENT}"))
-            continue
+    words = (
+        f"{table.note()}; {_timing_words(captures)}; frame turned by {look.angle_rad:.3f} rad, "
+        f"currents {1e6 * look.behind_s:.3g} µs late, taken out"
+    )
+    estimates = (
+        _estimate("ld_rated_h", _direct, *own, look, words),
+        _estimate("lq_rated_h", _quadrature, *own[::-1], look, words),
+    )
+    return Fit(estimates, _evidence(fluxes, *own))
 
-        def value(shift: Mapping[str, float], find: _Find = find, nominal: Result = found) -> Array:
-            shifted = find(flux_pairs([p.shifted(shift) for p in points], pairs), magnet)
-            return np.array([(shifted or nominal).value_h])
 
-        gains = instrument_uncertainties(captures, ("voltage", "current"))
-        parts = contributions(value, gains)[0]
-        parts.append(Contribution(HOLD, found.value_h * _hold_doubt(points, pairs), "B"))
-        across = found.value_h if other is None else other.value_h
-        inductance = found.value_h - across * float(np.tan(angle)) ** 2
-        doubt = 2.0 * abs(angle * behind) + behind**2 + (other is None) * angle**2
-        parts.append(Contribution(FRAME, across * doubt, "B"))
-        parts.append(Contribution(f"scatter:{NAME}:{name}", found.u_h, "A"))
-        paths = tuple(sorted({p.capture.path for p in points}))
-        at = {"id_a": found.id_a, "iq_a": found.iq_a}
-        unstated = unstated_note(captures, ("voltage", "current"))
-        note = f"{words}; {unstated}" if unstated else words
-        if name == "ld_rated_h":
-            note += _other_side(fluxes, magnet, found)
-        estimates.append(
-            Estimate(name, inductance, "H", "measured", NAME, budget_of(parts), at, paths, note)
-        )
-    return Fit(tuple(estimates), _evidence(fluxes, *own))
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What both axes are judged on: points, and how far the frame is turned and currents late."""
+
+    points: Sequence[Point]
+    pole_pairs: int
+    magnet_1_k: float
+    captures: Sequence[Capture]
+    angle_rad: float
+    behind_s: float
+
+    @property
+    def behind_rad(self) -> float:
+        """What the fastest point turns while the currents are late."""
+        return self.behind_s * self.pole_pairs * max(abs(p.omega_mech_rad_s) for p in self.points)
+
+
+def _estimate(
+    name: str, find: _Find, found: Result | None, other: Result | None, look: _Look, words: str
+) -> Estimate:
+    """The inductance of one axis, less what the `other` leaves on it in a turned frame."""
+    if found is None:
+        why = "no settled pair of plus and minus q current at the currents needed"
+        return not_identifiable(name, "H", NAME, f"{why}; {EXPERIMENT}")
+
+    def value(shift: Mapping[str, float]) -> Array:
+        moved = flux_pairs([p.shifted(shift) for p in look.points], look.pole_pairs)
+        return np.array([(find(moved, look.magnet_1_k) or found).value_h])
+
+    parts = contributions(value, instrument_uncertainties(look.captures, ("voltage", "current")))[0]
+    hold = _hold_doubt(look.points, look.pole_pairs)
+    across = found.value_h if other is None else other.value_h
+    angle, behind = look.angle_rad, look.behind_rad
+    doubt = 2.0 * abs(angle * behind) + behind**2 + (other is None) * angle**2
+    parts += [
+        Contribution(HOLD, found.value_h * hold, "B"),
+        Contribution(FRAME, across * doubt, "B"),
+        Contribution(f"scatter:{NAME}:{name}", found.u_h, "A"),
+    ]
+    inductance = found.value_h - across * float(np.tan(angle)) ** 2
+    used = {p.capture.path: p.capture for p in look.points}
+    notes = [words, unstated_note(look.captures, ("voltage", "current"))]
+    if name == "ld_rated_h":
+        fluxes = flux_pairs(look.points, look.pole_pairs)
+        notes.append(_other_side(fluxes, look.magnet_1_k, found))
+    at = {"id_a": found.id_a, "iq_a": found.iq_a}
+    return measured(NAME, name, "H", inductance, parts, [used[k] for k in sorted(used)], at, notes)
 
 
 def _without_ripple(
@@ -201,7 +224,7 @@ def _other_side(fluxes: Sequence[Flux], magnet: float, found: Result) -> str:
     other = _direct([*across, *near], magnet)
     if other is None:
         return ""
-    return f"; {1e6 * other.value_h:.4g} µH at {other.id_a:.3g} A of d current"
+    return f"{1e6 * other.value_h:.4g} µH at {other.id_a:.3g} A of d current"
 
 
 def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,9 +30,10 @@ from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.fit.torque_constant import USES, torque_constant
+from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.glossary import CONSTANTS
-from pipeline.records.capture import Campaign
+from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
@@ -50,6 +51,11 @@ LONGER = (
     "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
     "with iq_a and theta_mech_rad"
 )
+LOAD = "log torque_shaft_nm in the drives, or record them with nothing coupled to the shaft"
+# J may be too large by this share, twice what a torque transducer of unstated gain leaves open.
+# Loads of a third of rated torque left 38 to 60 % in drives of three motors; none, on a real
+# bench, 0.6 %.
+MATERIAL = 0.02
 AIDS = (
     "kt_reluctance_nm_a2",
     "temp_coeff_magnet_1_k",
@@ -87,9 +93,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     4.4 (retardation); Messenger and Bortz 2021 (weak form).
     """
     torque = _torque(known)
-    captures = campaign.of("drive", "spin_down")
-    orders, ripple = _orders(known, campaign)
-    rows = shaft_rows(captures, DRAG_FORMS, orders, ripple) if torque is not None else None
+    rows = _rows(known, campaign) if torque is not None else None
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
         note = f"{missing}; {EXPERIMENT}"
@@ -105,7 +109,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     found = drag_of(rows, driving, nuisances, options["level"])
     if not torque_is_parted(found.design, found.sigma):
         return _refused(f"the drive's torque cannot be told from its friction; {EXPERIMENT}")
-    estimates = _estimates(rows, torque, found)
+    strange = 0.0 if _load_logged(rows) else _share_of_no_torque(rows, found)
+    if strange > MATERIAL:
+        return _refused(f"{_of_no_torque(strange)}; {LOAD}")
+    estimates = _estimates(rows, torque, found, strange, _left_out(rows, campaign))
     inertia = estimates[0]
     if inertia.known and inertia.u >= abs(inertia.number):
         estimates = _refused(
@@ -114,6 +121,52 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
             f"torque_shaft_nm, else {EXPERIMENT}"
         ).estimates
     return Fit(estimates, _evidence(rows, y, found))
+
+
+def _rows(known: Constants, campaign: Campaign) -> ShaftRows | None:
+    """Rows of the drives that log their load, of all drives where none does; and of coast-downs."""
+    orders, ripple = _orders(known, campaign)
+    logged = [c for c in campaign.of("drive", "spin_down") if not _loadless(c)]
+    rows = shaft_rows(logged, DRAG_FORMS, orders, ripple)
+    if rows is not None and np.any(rows.kind == DRIVE):
+        return rows
+    return shaft_rows(campaign.of("drive", "spin_down"), DRAG_FORMS, orders, ripple)
+
+
+def _loadless(capture: Capture) -> bool:
+    """Whether this is a drive that does not say what loads the shaft."""
+    return capture.meta.test == "drive" and not capture.has("torque_shaft_nm")
+
+
+def _load_logged(rows: ShaftRows) -> bool:
+    return not any(_loadless(capture) for capture in rows.captures)
+
+
+def _share_of_no_torque(rows: ShaftRows, found: DragFit) -> float:
+    """Share of the drives' acceleration, squared, that follows the current in no way.
+
+    A load that is not logged and goes its own way is an error of the driving torque: it makes g
+    too small, and J too large, by this share at most. Reference: Fuller, Measurement Error Models,
+    1987, 1.1 (attenuation).
+    """
+    drives = rows.kind == DRIVE
+    without = linear_fit(np.delete(found.design[drives], 0, axis=1), found.target[drives])
+    costs = [float(np.sum(r**2)) for r in (found.residuals[drives], without.residuals)]
+    return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
+
+
+def _of_no_torque(share: float) -> str:
+    return (
+        f"no drive logs its load, and {100.0 * share:.2g} % of the square of the acceleration "
+        "does not follow the current, as with a load"
+    )
+
+
+def _left_out(rows: ShaftRows, campaign: Campaign) -> tuple[str, ...]:
+    """Paths of drives that do not log their load, beside ones that do."""
+    if not _load_logged(rows):
+        return ()
+    return tuple(capture.path for capture in campaign.of("drive") if _loadless(capture))
 
 
 def _refused(note: str) -> Fit:
@@ -166,19 +219,20 @@ def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> 
     return driven
 
 
-def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimate, ...]:
+def _estimates(
+    rows: ShaftRows, torque: Torque, found: DragFit, strange: float, left_out: Sequence[str]
+) -> tuple[Estimate, ...]:
+    """J, T_c and B with their budgets; `strange` as by `_share_of_no_torque`, 0 with the load."""
+
     def values(shift: Mapping[str, float]) -> Array:
         return found.constants(found.refit(_driving_nm(rows, torque, shift)))
 
     gains = instrument_uncertainties(rows.captures, ("current", "torque", "temperature"))
     type_b = contributions(values, gains)
-    per_kt = (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a)
-    step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
-    per_rel = (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step)
-    per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
+    per_kt, per_rel, per_alpha = _slopes(values, torque)
     constants, scatter = found.constants(found.coefficients), found.scatter()
     paths = tuple(sorted(c.path for c in rows.captures))
-    note = _note(rows, torque, found)
+    note = "; ".join([*_words(rows, torque, found), *_load_words(rows, strange, left_out)])
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
     estimates = []
     for i, name in enumerate(GIVES):
@@ -190,7 +244,10 @@ def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimat
             Contribution(f"scatter:{NAME}:{k}", float(scatter[i, k]), "A", found.dof)
             for k in range(scatter.shape[1])
         ]
-        parts += [Contribution("assumed:drag_form", float(found.u_form[i]), "B")]
+        parts += [
+            Contribution("assumed:drag_form", float(found.u_form[i]), "B"),
+            Contribution("assumed:free_shaft", strange * float(constants[i]), "B"),
+        ]
         budget = propagate(
             [
                 (1.0, (*parts, *type_b[i])),
@@ -206,17 +263,39 @@ def _estimates(rows: ShaftRows, torque: Torque, found: DragFit) -> tuple[Estimat
     return tuple(estimates)
 
 
-def _note(rows: ShaftRows, torque: Torque, found: DragFit) -> str:
+def _slopes(
+    values: Callable[[Mapping[str, float]], Array], torque: Torque
+) -> tuple[Array, Array, Array]:
+    """What J, T_c and B [3] change by the torque constant, the reluctance and the magnet's law."""
+    step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
+    return (
+        (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a),
+        (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step),
+        (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4,
+    )
+
+
+def _words(rows: ShaftRows, torque: Torque, found: DragFit) -> list[str]:
     words = [torque.words, drag_words(found)]
     words.append("what iron loss there is under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")
-    drives = [c for c in rows.captures if c.meta.test == "drive"]
-    if not any(c.has("torque_shaft_nm") for c in drives):
-        words.append("no load torque logged: what is coupled counts to the inertia")
     unstated = unstated_note(rows.captures, ("current", "torque"))
-    return "; ".join([*words, *([unstated] if unstated else [])])
+    return [*words, *([unstated] if unstated else [])]
+
+
+def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> list[str]:
+    """What is not known of the load, in words."""
+    if left_out:
+        return [f"without {', '.join(left_out)}, whose load is not logged (torque_shaft_nm)"]
+    if _load_logged(rows):
+        return []
+    return [
+        f"no drive logs its load: all but {100.0 * strange:.2g} % of the square of the "
+        "acceleration follows the current, so the shaft is taken as free",
+        "what turns with it counts to the inertia, and what brakes it to friction",
+    ]
 
 
 def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidence, ...]:

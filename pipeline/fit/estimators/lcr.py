@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.instruments import (
-    budget_of,
     instrument_uncertainties,
     station,
     unstated_note,
 )
+from pipeline.fit.measured import measured
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.terminals import PAIRS
 from pipeline.numerics.least_squares import linear_fit
@@ -35,7 +35,9 @@ EXPERIMENT = (
     "electrical turn, or lab_h, lbc_h and lca_h at one angle"
 )
 TERMS = (
-    Term("r_lcr_ohm", "ohm", "series resistance a to b at the LCR meter's frequency", "constant"),
+    Term(
+        "r_lcr_ohm", "ohm", "series resistance a to b at the LCR meter's frequency", "constant", 0
+    ),
     Term(
         "lcr_angle_offset_deg",
         "deg",
@@ -248,18 +250,7 @@ def _estimate(
     at: dict[str, float | int | str] = {"current_a": 0.0}
     if frequencies:
         at["freq_hz"] = float(np.mean(frequencies))
-    paths = tuple(c.path for c in used)
-    return Estimate(
-        name,
-        value,
-        UNITS[name],
-        "measured",
-        NAME,
-        budget_of(parts),
-        at,
-        paths,
-        "; ".join(w for w in words if w),
-    )
+    return measured(NAME, name, UNITS[name], value, parts, used, at, words)
 
 
 def _gain(used: Sequence[Capture], options: Mapping[str, float]) -> tuple[float, str]:

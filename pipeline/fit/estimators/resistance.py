@@ -22,12 +22,12 @@ from pipeline.fit.direct_current import (
 )
 from pipeline.fit.instruments import (
     Shift,
-    budget_of,
     contributions,
     instrument_uncertainties,
     unstated_note,
     voltage_source,
 )
+from pipeline.fit.measured import measured
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.terminals import PAIRS
 from pipeline.physics.conventions import phase_from_line, phase_resistances_ohm
@@ -52,7 +52,13 @@ TERMS = (
         for p in PAIRS
     ),
     *(
-        Term(f"r_{p}_ohm", "ohm", f"wye-equivalent resistance of phase {p}, at 25 degC", "constant")
+        Term(
+            f"r_{p}_ohm",
+            "ohm",
+            f"wye-equivalent resistance of phase {p}, at 25 degC",
+            "constant",
+            0,
+        )
         for p in "abc"
     ),
     Term("voltage_offset_v", "V", "part of the terminal voltage that follows sign(I)", "constant"),
@@ -184,17 +190,7 @@ def _estimate(
         "current_a": max(abs(p.i_a) for p in points),
         "temp_measured_degc": round(float(np.mean([p.temp_degc for p in points])), 3),
     }
-    return Estimate(
-        name,
-        value,
-        UNITS.get(name, "ohm"),
-        "measured",
-        NAME,
-        budget_of(parts),
-        at,
-        tuple(c.path for c in captures),
-        "; ".join(n for n in notes if n),
-    )
+    return measured(NAME, name, UNITS.get(name, "ohm"), value, parts, captures, at, notes)
 
 
 def _imbalance(

@@ -177,9 +177,8 @@ def _value(kind: str, key: Key, text: str) -> float:
     if not math.isfinite(value):
         raise UsageError(f"calc {kind}: {key.name}={text}", "it is too large for a number")
     if value <= key.low:
-        raise UsageError(
-            f"calc {kind}: {key.name}={text}", f"it must be above {key.low:g} {key.unit}"
-        )
+        least = f"{key.low:g} {_unit(key.unit)}".rstrip()
+        raise UsageError(f"calc {kind}: {key.name}={text}", f"it must be above {least}")
     return value
 
 

@@ -13,7 +13,9 @@ from pipeline.fit.estimators import (
     resistance,
     soak,
 )
+from pipeline.fit.registry import fit_all
 from pipeline.fit.terminals import PAIRS
+from pipeline.records.capture import Campaign
 from tests.unit.fit.signals import capture, estimates, near
 
 
@@ -45,6 +47,21 @@ def test_unbalanced_phases_and_the_drop_at_the_zero_crossing():
     assert near(found["voltage_offset_v"], 0.05)
     assert near(found["resistance_imbalance"], 0.05 * 6.0 / 3.14)
     assert found["r_ll_ohm"].number == pytest.approx(2.0 * found["r_phase_ohm"].number)
+
+
+def test_no_resistance_below_nought_is_published():
+    """Pairs of 1, 1 and 3 ohm make R_b (1 + 1 - 3)/2 = -0.5 ohm; a meter reads -2 mohm."""
+    pairs = {"ab": 1.0, "bc": 1.0, "ca": 3.0}
+    direct = (dc_capture(pair, r, seed=k) for k, (pair, r) in enumerate(pairs.items()))
+    angles = np.arange(0.0, 360.0, 15.0)
+    table = {"lab_h": np.full(angles.size, 4e-4), "rab_ohm": np.full(angles.size, -2e-3)}
+    meter = capture("lcr", "lcr", theta_elec_deg=angles, **table)
+    known = fit_all(Campaign("m", (*direct, meter)), {})[0]
+    for name in ("r_b_ohm", "r_lcr_ohm"):
+        (found,) = known.all_of(name)
+        assert found.status == "not_identifiable", name
+        assert "ohm, outside 0 to any" in found.note
+    assert known.all_of("r_a_ohm")[0].number == pytest.approx(1.5, rel=1e-3)
 
 
 def test_resistance_is_brought_to_25_degc():

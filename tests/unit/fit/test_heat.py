@@ -93,6 +93,15 @@ def test_a_current_that_is_exactly_constant_is_steady():
     assert "no steady current found" in lost.note
 
 
+@pytest.mark.parametrize("estimator", [heat_run.ESTIMATOR, thermal.ESTIMATOR])
+def test_a_run_without_current_tells_nothing(estimator):
+    """No share of the phases in a current of 0: not identifiable, and no estimator breaks."""
+    still = with_current(heat_capture(kind="measured"), np.zeros(4000))
+    table = still.tables[0].with_columns(pl.lit(0.0).alias("theta_elec_rad"))
+    for one in estimates(estimator, replace(still, tables=(table,))).values():
+        assert one.status == "not_identifiable"
+
+
 def test_a_turning_rotor_without_its_flux_is_refused():
     found = estimates(heat_run.ESTIMATOR, heat_capture(speed=5.0))
     assert found["temp_coeff_copper_1_k"].status == "not_identifiable"

@@ -14,6 +14,7 @@ from pipeline.fit.estimators import (
     current_step,
     lcr,
 )
+from pipeline.fit.terminals import PAIRS
 from pipeline.records.capture import Capture, CaptureMeta
 from tests.unit.fit.signals import capture, estimates, near
 
@@ -222,3 +223,27 @@ def test_three_pairs_at_a_stated_angle_tell_the_axes():
     found = estimates(lcr.ESTIMATOR, one)
     assert found["ld_h"].number == pytest.approx(3e-4)
     assert found["lq_h"].number == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize("inductances_h", [(3e-4, 2e-4), (2e-4, 3e-4)])
+def test_one_position_at_a_stated_angle_tells_the_axes(inductances_h):
+    """Three readings: too few for a fit over the angle, and 20 degrees off either axis."""
+    columns = {f"l{p}_h": np.array([terminal(p, 20.0, *inductances_h)]) for p in PAIRS}
+    found = estimates(lcr.ESTIMATOR, capture("lcr", theta_elec_deg=np.array([20.0]), **columns))
+    assert (found["ld_h"].number, found["lq_h"].number) == pytest.approx(inductances_h)
+    assert found["lcr_angle_offset_deg"].status == "not_identifiable"
+    assert "rotor angle unknown" not in found["ld_h"].note
+
+
+def test_the_scatter_of_a_rotor_zero_is_that_of_its_noise():
+    """24 angles, s = 0.4 uH, Lq - Ld = 100 uH: each part of the swing is known to s sqrt(2/24), the
+    angle to half of that share of it. 60 tables tell their mean to 15 %/sqrt(60).
+    """
+    angles = np.arange(0.0, 360.0, 15.0)
+    u = []
+    for seed in range(60):
+        columns, _ = lcr_capture(12.0, seed=seed)
+        found = estimates(lcr.ESTIMATOR, capture("lcr", theta_elec_deg=angles, **columns))
+        u.append(found["lcr_angle_offset_deg"].u_a)
+    expected = 0.5 * math.degrees(4e-7 * math.sqrt(2.0 / 24.0) / 1e-4)
+    assert np.sqrt(np.mean(np.square(u))) == pytest.approx(expected, rel=0.06)

@@ -17,6 +17,7 @@ from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from tests.simulated import campaign_of, design
 from tests.unit.fit.mechanical import EXACT_BENCH, MECHANICAL, chain, fitted, number, recorded
+from tests.unit.fit.signals import known_value
 
 
 @pytest.mark.parametrize("name", ["gimbal-5208", "drone-2306", "servo-15kw"])
@@ -58,6 +59,52 @@ def test_inertia_carries_the_torque_gain_and_not_the_current_gain() -> None:
     shares = {part.source: part.u / inertia.number for part in inertia.budget}
     assert shares["torque@sim-1"] == pytest.approx(0.002, rel=0.01)
     assert abs(shares.get("current@sim-1", 0.0)) < 2e-5
+
+
+def with_currents(captures: Campaign, gain: float) -> Campaign:
+    """The same campaign with the currents of its drives read high by a factor."""
+    read = [pl.col("id_a") * gain, pl.col("iq_a") * gain]
+    return Campaign(
+        captures.motor_id,
+        tuple(
+            replace(c, tables=tuple(table.with_columns(read) for table in c.tables))
+            if c.meta.test == "drive"
+            else c
+            for c in captures.captures
+        ),
+    )
+
+
+def test_a_current_gain_enters_once_by_the_magnet_and_squared_by_reluctance() -> None:
+    """Lq twice Ld, torque constants from elsewhere, a free shaft: u is half of what J moves between
+    currents read high and low by their u, with the same columns; more than the gain by itself.
+    """
+    motor = design("servo-ipm")
+    plan = tuple(
+        (stem, test, {**protocol, "id_level": 1.0, "load": 0.0} if test == "drive" else protocol)
+        for stem, test, protocol in CAMPAIGN
+        if test in ("drive", "spin_down")
+    )
+    captures = campaign_of(campaign(replace(motor, effects={}), EXACT_BENCH, 11, plan))
+    kt = 1.5 * motor.pole_pairs * motor.psi_pm_wb
+    reluctance = 1.5 * motor.pole_pairs * (motor.ld_h - motor.lq_h)
+    known = Constants(
+        (
+            known_value("kt_peak_nm_a", kt, unit="N·m/A"),
+            known_value("kt_reluctance_nm_a2", reluctance, unit="N·m/A²"),
+        )
+    )
+    meta = captures.of("drive")[0].meta
+    u_rel = meta.instrument_u("u_rel_current")
+    alone = {"level": 0.0}
+    inertia = INERTIA.fit(captures, known, alone).estimates[0]
+    (part,) = (p for p in inertia.budget if p.source == f"current@{meta.station}")
+    high, low = (
+        INERTIA.fit(with_currents(captures, gain), known, alone).estimates[0].number
+        for gain in (1.0 + u_rel, 1.0 - u_rel)
+    )
+    assert part.u == pytest.approx((high - low) / 2.0, rel=0.02)
+    assert part.u > 1.05 * u_rel * inertia.number
 
 
 def with_short_drives(captures: Campaign, start_s: float, length_s: float) -> Campaign:

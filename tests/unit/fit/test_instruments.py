@@ -35,8 +35,9 @@ def test_both_rooms_take_the_same_for_an_instrument_that_states_nothing() -> Non
 def test_what_one_capture_of_a_station_states_holds_for_all() -> None:
     """The largest stated; the default only where none states it; told in both cases."""
     both = (capture(), capture(u_rel_voltage=0.001), capture(u_rel_voltage=0.02))
-    found = instrument_uncertainties(both)
-    assert found == {"current@s": 0.01, "temperature@s": 2.0, "voltage@s": 0.02}
+    for order in (both, both[::-1]):
+        found = instrument_uncertainties(order)
+        assert found == {"current@s": 0.01, "temperature@s": 2.0, "voltage@s": 0.02}
     assert unstated_note(both) == (
         "u_rel_current not stated, taken as 0.01, u_temp_degc not stated, taken as 2 K"
     )

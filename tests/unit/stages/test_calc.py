@@ -99,6 +99,14 @@ def test_other_directions(line: str, name: str, value: float) -> None:
     assert answers(line)[name] == pytest.approx(value, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("line", "least"), [("kv kv=304 pole_pairs=0", "above 0"), ("kv kv=-1", "above 0 rpm/V")]
+)
+def test_the_least_value_is_named_with_its_unit(line: str, least: str) -> None:
+    """A count has no unit: `1` is none, and read as part of the number."""
+    assert refusal(line).endswith(f"it must be {least}")
+
+
 @pytest.mark.parametrize("line", ["lab=2mH lbc=2mH lca=2mH", "lab=2mH lbc=2.001mH lca=2mH"])
 def test_equal_inductances_have_no_low_axis(line: str) -> None:
     """Neither exactly equal ones nor those that a bridge reads as equal."""

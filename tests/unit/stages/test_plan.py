@@ -20,7 +20,7 @@ from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.uncertainty import type_a, type_b
 from pipeline.settings import PlanSettings
-from pipeline.stages.plan import main, ways_of
+from pipeline.stages.plan import main, plan_of, ways_of
 
 DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
 
@@ -122,6 +122,20 @@ def test_plan_of_a_motor_with_one_test(tmp_path: Path, resistance_alone: Datashe
     assert {"open_circuit", "torque_map"} <= set(tests[:3])
     assert "psi_pm_wb" in reasons(outcome.text)
     assert "r_phase_ohm" not in reasons(outcome.text)
+
+
+def test_plan_keeps_to_the_limits_that_are_named(
+    tmp_path: Path, resistance_alone: Datasheet
+) -> None:
+    """What a file of limits asks for comes first; without one, what the default asks for."""
+    write(tmp_path, resistance_alone)
+    limits = tmp_path / "warm.yaml"
+    limits.write_text("required: [rth_winding_k_w]\n")
+    planned = main(PlanSettings(output=str(tmp_path), limits=str(limits))).text
+    assert planned == plan_of(resistance_alone, frozenset({"rth_winding_k_w"})).text()
+    assert planned != main(PlanSettings(output=str(tmp_path))).text
+    with pytest.raises(UsageError, match="no limits file 'none'"):
+        main(PlanSettings(output=str(tmp_path), limits="none"))
 
 
 def test_plan_from_captures_is_that_of_a_run_of_them(

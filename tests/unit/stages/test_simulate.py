@@ -64,6 +64,12 @@ def test_an_earlier_motor_leaves_no_captures_behind(tmp_path):
     assert (tmp_path / "notes.txt").is_file()
 
 
+def test_a_seed_below_0_is_named(tmp_path):
+    with pytest.raises(UsageError, match=r"seed=-1; it must be 0 or more"):
+        simulate.main(SimulateSettings(output=str(tmp_path), seed=-1))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_captures_that_were_not_simulated_are_not_written_over(tmp_path):
     (tmp_path / "lcr.csv").write_text("mine")
     with pytest.raises(UsageError, match=r"holds lcr\.csv, and no truth\.json"):
