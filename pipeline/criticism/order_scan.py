@@ -51,7 +51,9 @@ _AS_GOOD = 0.9
 _APART = 0.1
 """How far apart two captures may find one order."""
 _TRIED = 25
+"""Orders tried on either side of a line within a step: every hundredth."""
 _OVERSAMPLED = 8.0
+"""Orders tried for every one that the angles of several logs together tell apart."""
 
 
 def orders_left(segments: Sequence[Segment], around: System) -> tuple[float, ...]:

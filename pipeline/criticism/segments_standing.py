@@ -14,7 +14,10 @@ from pipeline.numerics.orders import TURN_RAD, passes
 from pipeline.records.capture import Capture
 
 _CELLS = 1024
+"""Cells a turn: twelve a wave of the highest cogging orders of small machines (84), and still a few
+rows each of a log of some thousand holds."""
 _SECTORS = 24
+"""Parts of a turn that are held out one by one, and the fewest cells that a table may have."""
 _FEW = 4
 """Rows that a cell must have for their scatter about a line to be told."""
 _ENOUGH = 0.5
@@ -46,7 +49,15 @@ def standing(capture: Capture, _: Machine) -> Segment | None:
     noise = {"iq_a": _noise(spread, [cells[:, 1] for cells in rows])}
     sectors = sectors_of(table[:, 0])
     return segment_of(
-        capture, "standing", "drive", 1.0, recorded, Sensors(noise), ("iq_a",), None, blocks=sectors
+        capture,
+        "standing",
+        "drive",
+        1.0,
+        found=recorded,
+        sensors=Sensors(noise),
+        channels=("iq_a",),
+        weak=None,
+        blocks=sectors,
     )
 
 

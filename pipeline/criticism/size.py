@@ -25,6 +25,8 @@ _LINES_A = ("ia_a", "ib_a", "ic_a")
 _HIGHEST = 400
 _HARMONICS = 3
 _SAME_STEP = 0.02
+"""Share by which two logs may differ on the encoder's step, by judgement: the next encoder has half
+of it or twice."""
 
 
 PAIRLESS = (

@@ -24,13 +24,22 @@ ANGLES = frozenset({"theta_mech_rad", "theta_elec_rad"})
 LINES_V = ("vab_v", "vbc_v", "vca_v")
 _WINDOW_S = 0.02
 _WINDOW_SAMPLES = 40
+"""Length of a weak window [s], and its fewest samples: 5 ms bias J, 80 ms and more blur what moves,
+and a bump of fewer samples is none."""
 _SMOOTHING_S = 0.05
+"""Half of the time [s] that a temperature is averaged over: windings warm in seconds."""
 SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
 PAD = 24
+"""Samples kept on either side of a window that is cut out: what differences and smoothing of a
+speed reach over."""
 _SHORTEST = 24
+"""Fewest rows of a capture with a clock: three windows of eight, by judgement."""
 _WITHOUT_CLOCK = frozenset({"lcr", "flux_map"})
 _SLACK = 6.0
+"""Standard deviations of the angle's noise that a shaft must turn back for a reversal."""
 _RIPPLE = 1.5
+"""Scatter of an angle about its local parabola, over its noise, from which on the shaft itself
+moves, by judgement: too high a limit would take a ripple of the speed away."""
 
 
 def tellable(capture: Capture) -> Capture | None:

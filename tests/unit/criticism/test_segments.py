@@ -45,7 +45,8 @@ def at_speed(test, omega, step, n=8000, eccentric=0.0):
     theta = np.round(np.round(turned / step) * step * 2**18) / 2**18
     torque = random.normal(0.0, 1e-3, n)
     table = pl.DataFrame({"t_s": t, **columns, "theta_mech_rad": theta, "torque_shaft_nm": torque})
-    return Capture(f"{test}.mcap", "0", "verified", CaptureMeta("m", test), (table,))
+    meta = CaptureMeta("m", test, pole_pairs=4)
+    return Capture(f"{test}.mcap", "0", "verified", meta, (table,))
 
 
 def test_the_angle_of_a_map_is_even_but_for_the_step_that_the_drive_s_encoder_shows():
