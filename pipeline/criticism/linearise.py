@@ -291,7 +291,7 @@ class _Sampler:
         if effect.hook == "torque" and self.segment.kind == "dq":
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
-            drag[-1] = change.drag_nm / column.step
+            drag[-1] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
             return drag if np.any(drag) else None
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
         if self.segment.kind in ("q", "shaft", "motion", "standing"):

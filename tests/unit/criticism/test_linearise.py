@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.floors import offsets
-from pipeline.criticism.linearise import absorb, effect_columns, whitened_anew
+from pipeline.criticism.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
+from pipeline.criticism.residuals import residual
 from pipeline.criticism.segment import row_index
 from pipeline.criticism.system import Fitted, _kept, floors, own_columns, system
 from tests.unit.criticism.machines import BASE, log, machine
@@ -78,3 +79,17 @@ def test_what_turns_the_angle_is_made_anew_where_another_error_of_it_was_found()
     assert drag[0].key in kept
     assert not any(name.startswith("angle_offset.") for name, _ in kept)
     assert any(name.startswith("angle_offset.") for name, _ in _kept(before, start, chord=False))
+
+
+def test_a_drag_s_column_has_the_gain_of_the_transducer_in_it():
+    """As that of the viscous friction has: else a curve and a friction that grow against each other
+    would leave a torque that no shaft feels.
+    """
+    segment, values = log(), {**BASE, "gain_torque": 0.01}
+    (column,) = effect_columns(LIBRARY["windage"], PLAIN)
+    with_it = PLAIN.with_effects(LIBRARY["windage"])
+    still = {**values, **zero(LIBRARY["windage"], PLAIN)}
+    moved = {**still, column.name: column.step}
+    expected = residual(segment, with_it, moved) - residual(segment, with_it, still)
+    found = _Sampler(segment, PLAIN, values).change(column)
+    assert found * column.step == pytest.approx(expected, rel=1e-9, abs=1e-12)
