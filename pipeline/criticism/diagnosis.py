@@ -4,37 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from scipy.special import gammaincc
 
-from pipeline.criticism.asked import Begun, fit_of
 from pipeline.criticism.captured import at_ambient, unexcited, unused
+from pipeline.criticism.climb import Ladder, ended
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import (
     HeldOut,
-    in_common,
-    leave_out,
     over_floor,
-    remainder,
 )
 from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.mains import told_hum
-from pipeline.criticism.order_scan import orders_left
 from pipeline.criticism.registry import effects
 from pipeline.criticism.rivals import experiment_for, remedies, rivals_of
 from pipeline.criticism.scores import TIE, Candidate, Score, candidates
 from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import segments
-from pipeline.criticism.selection import Rung, loss_without, search
+from pipeline.criticism.selection import Rung, loss_without
 from pipeline.criticism.size import PAIRLESS, machine_of
-from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import System, own_columns
-from pipeline.criticism.trust import denied, explained, trusted
-from pipeline.criticism.unknown import unknown_structure
-from pipeline.criticism.wander import SIZE, wandering
+from pipeline.criticism.system import System
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -43,46 +35,21 @@ from pipeline.records.diagnosis import (
     RankedEffect,
     Remainder,
     Unexcited,
-    UnknownStructure,
     Verdict,
 )
-from pipeline.records.naming import file_stem
 
 _TOO_LITTLE = (
     "the captures cannot fit the base model: record a torque map or drive log with dq voltages, "
     "currents and angle"
 )
-_WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
 _STATELESS = (
     "no state of the machine predicts what is left in captures it was not fitted to: see the "
     "remainder, and whether anything was changed between the captures"
-)
-_WITHIN = (
-    "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
-    "capture shows it: whatever changes as slowly looks the same; record that test once more"
 )
 _AGAINST = "captures speak against it: see the note"
 _GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
 _AS_GOOD = 0.1
 """Share of the fall that a rival's promise may be short of."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Ladder:
-    """The rungs as far as they are trusted and where they began, their held-out errors, what is
-    `left` at their end, and every effect that would take some of that and was `cut`: with a note
-    where captures speak against it, with none where it would be a guess.
-    """
-
-    begun: Begun
-    rungs: tuple[Rung, ...]
-    held: list[HeldOut]
-    left: tuple[Remainder, ...]
-    cut: dict[str, str]
-
-    def explains(self, left: Sequence[Remainder]) -> bool:
-        """Whether its names explain what the captures show, but for what is `left`."""
-        return explained(self.rungs, self.held, left)
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -94,82 +61,37 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     library = effects(model.effects_path)
     if machine is None:
         return _insufficient(campaign, model, library, PAIRLESS)
-
     found = segments(campaign, machine)
     if not _enough(found):
         return _insufficient(campaign, model, library, _TOO_LITTLE)
-
-    def climb(*orders: float) -> _Ladder:
-        """The ladder where equations look at these orders a turn besides those of the design."""
-        wider = replace(machine, load_orders=orders)
-        return _climbed(fit_of(segments(campaign, wider), model_of(model, wider)), library)
-
-    ladder = _climbed(fit_of(found, model_of(model, machine)), library)
-    unlooked = orders_left(ladder.begun.segments, ladder.rungs[-1].around)
-    whole = tuple(order for order in unlooked if isinstance(order, int))
-    if whole:
-        ladder = climb(*whole)
-    stem = f"{file_stem(campaign.motor_id)}_unknown"
-    sketch = _unknown(ladder, ladder.left, stem)
-    if sketch is None and len(unlooked) > len(whole) and not ladder.explains(ladder.left):
-        # steps of a programme make lines of any order too, and these predict no other capture
-        between = climb(*unlooked)
-        sketch = _unknown(between, between.left, stem)
-        ladder = between if sketch is not None else ladder
-    found, left, calm = ladder.begun.segments, ladder.left, None
-    large = _large(found, ladder.rungs, left)
-    if sketch is None and not ladder.explains(large):
-        calm = wandering(found, ladder.rungs[-1].fitted, large)
-    if calm is not None:
-        found = calm
-        calmed = gauss_newton(found, ladder.begun.fitted)
-        ladder = _climbed(Begun(calm, *calmed, ladder.begun.hum), library)
-        left = _large(found, ladder.rungs, ladder.left)
-        sketch = _unknown(ladder, left, stem)
-    within = None if sketch else _unknown(ladder, left, stem, in_parts=True)
-    sketch = sketch or within
-    left = left if sketch else _large(found, ladder.rungs, left)
-    rungs, held, last = ladder.rungs, ladder.held, ladder.rungs[-1]
+    end = ended(campaign, model, machine, found, library)
+    ladder, found, last = end.ladder, end.ladder.begun.segments, end.ladder.rungs[-1]
     offered = candidates(library, last.fitted)
-    missing = last.added
-    ranking = _ranking(rungs, held, offered, library, found, ladder.cut)
+    ranking = _ranking(ladder.rungs, ladder.held, offered, library, found, ladder.cut)
     unseen = unexcited(campaign, library, last, offered)
-    verdict = _verdict(ladder, left, unseen)
+    verdict = _verdict(ladder, end.left, unseen)
+    stateless = verdict == "unknown" and end.sketch is None
     return Diagnosis(
         campaign.motor_id,
         model.name,
         verdict,
-        missing,
+        last.added,
         ranking,
-        tuple(rung_record(found, r, h) for r, h in zip(rungs, held, strict=True)),
-        sketch if verdict == "unknown" else None,
-        _as_told(found, last.around, left),
+        tuple(rung_record(found, r, h) for r, h in zip(ladder.rungs, ladder.held, strict=True)),
+        end.sketch if verdict == "unknown" else None,
+        _as_told(found, last.around, end.left),
         (
             *unused(campaign, found),
             *at_ambient(found, last.fitted.model),
             *told_hum(ladder.begun.hum),
-            *(() if calm is None else (_WANDER,)),
-            *(() if within is None else (_WITHIN,)),
+            *end.notes,
             *(note for note in ladder.cut.values() if note),
-            *((_STATELESS,) if verdict == "unknown" and sketch is None else ()),
-            *held[0].notes,
+            *((_STATELESS,) if stateless else ()),
+            *ladder.held[0].notes,
         ),
         unseen,
         model.effects,
     )
-
-
-def _large(
-    found: Sequence[Segment], rungs: Sequence[Rung], left: Sequence[Remainder]
-) -> tuple[Remainder, ...]:
-    """What is left and large for the machine as a whole.
-
-    What matters only beside the little voltage that there is at standstill may be an instrument's
-    wander as well as the machine: it is told where some state of the machine predicts it.
-    """
-    around = rungs[-1].around
-    large = remainder(around, found, around.residual, large=True)
-    return tuple(one for one in left if one in large)
 
 
 def _as_told(
@@ -182,16 +104,6 @@ def _as_told(
     small = [one for one in over_floor(around, found, around.residual) if one not in left]
     told = (*left, *(replace(one, matters=False) for one in small))
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
-
-
-def _climbed(start: Begun, library: dict[str, Effect]) -> _Ladder:
-    found = start.segments
-    rungs = search(found, start.fitted, library)
-    alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
-    kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
-    held = in_common([r.around for r in kept], alone[: len(kept)])
-    cut = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
-    return _Ladder(start, kept, list(held), left, cut)
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -223,21 +135,7 @@ def _insufficient(
     )
 
 
-def _unknown(
-    ladder: _Ladder, left: Sequence[Remainder], name: str, in_parts: bool = False
-) -> UnknownStructure | None:
-    """What the structure depends on that no effect explains; None where there is none, or where
-    nothing that the machine does predicts it.
-    """
-    if ladder.explains(left):
-        return None
-    last = ladder.rungs[-1]
-    signals = list(dict.fromkeys(r.signal for r in left))
-    found = ladder.begun.segments
-    return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]
-
-
-def _verdict(ladder: _Ladder, left: Sequence[Remainder], unseen: Sequence[Unexcited]) -> Verdict:
+def _verdict(ladder: Ladder, left: Sequence[Remainder], unseen: Sequence[Unexcited]) -> Verdict:
     if left and not ladder.explains(left):
         return "unknown"
     if ladder.rungs[-1].added:

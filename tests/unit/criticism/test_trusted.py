@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.asked import Begun
-from pipeline.criticism.diagnosis import _climbed, _drop, _ranking
+from pipeline.criticism.climb import climbed
+from pipeline.criticism.diagnosis import _drop, _ranking
 from pipeline.criticism.judge import HeldOut
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
@@ -81,10 +82,10 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     assert len(trusted((log(),), (first, second), held)[0]) == kept
     assert ("meter_rise of 0" in denied(second)) is (kept == 1)
     found, totals = (first, second), iter(held)
-    monkeypatch.setattr("pipeline.criticism.diagnosis.search", lambda *_: found)
-    monkeypatch.setattr("pipeline.criticism.diagnosis.leave_out", lambda *_: next(totals))
-    monkeypatch.setattr("pipeline.criticism.diagnosis.in_common", lambda _, alone: list(alone))
-    cut = _climbed(Begun((log(),), first.fitted, first.around, ()), {}).cut
+    monkeypatch.setattr("pipeline.criticism.climb.search", lambda *_: found)
+    monkeypatch.setattr("pipeline.criticism.climb.leave_out", lambda *_: next(totals))
+    monkeypatch.setattr("pipeline.criticism.climb.in_common", lambda _, alone: list(alone))
+    cut = climbed(Begun((log(),), first.fitted, first.around, ()), {}).cut
     assert list(cut) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0)
     (ranked,) = _ranking((replace(first, scores=(score,)),), held[:1], (), {}, (), cut)
