@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pipeline.physics.notation import quantity, reading, significant
 from pipeline.records.comparison import Comparison, Dependence, SignalError
 from pipeline.records.error_map import ErrorMap
+from pipeline.records.naming import counted
 from pipeline.report.registry_text import safe, table
 
 _SURE = 1e-3
@@ -118,5 +119,6 @@ def _moves(result: Comparison) -> list[str]:
         )
         for m in sorted(moved, key=lambda m: -abs(m.in_u))
     ]
-    stayed = f"  {len(result.moved) - len(moved)} parameters stayed within {_MOVED:.0f} u"
+    still = counted(len(result.moved) - len(moved), "parameter")
+    stayed = f"  {still} stayed within {_MOVED:.0f} u"
     return [*(table(rows, right=(1, 2, 3)).splitlines() if moved else []), stayed]

@@ -11,6 +11,7 @@ import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.segments import segments
 from pipeline.criticism.size import PAIRLESS, machine_of, pole_pairs_of
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
@@ -67,6 +68,17 @@ def test_an_open_circuit_without_an_angle_is_not_used_and_said_so():
     assert found.ladder[-1].held_out < 1.0
     (note,) = (note for note in found.notes if note.startswith("not used"))
     assert "open_circuit_forward.mcap" in note
+
+
+def test_a_log_without_an_angle_tells_of_its_voltages_alone():
+    """Where its waves stand at first is not known, nor what a speed that lags makes of J."""
+    campaign = without({"drive": ANGLES})
+    found = segments(campaign, machine_of(campaign, Constants()))
+    logs = [segment for segment in found if segment.test == "drive"]
+    assert len(logs) == 2
+    for segment in logs:
+        assert segment.channels == ("vd_v", "vq_v")
+        assert set(segment.weak.orders.tolist()) == {0}
 
 
 def test_a_torque_map_without_torque_excites_less_and_says_what_to_record():

@@ -65,6 +65,19 @@ def test_a_wave_that_changes_its_sense_with_the_current_has_a_whole_order():
     assert left(*waved) == (16,)
 
 
+def test_orders_that_are_apart_are_not_one():
+    assert left(spinning(1, ((23.37, 6e-3),)), spinning(2, ((24.4, 6e-3),))) == ()
+
+
+def test_a_wave_that_grows_with_the_size_of_the_current_is_one_order():
+    waved = []
+    for one in (spinning(seed) for seed in (1, 2)):
+        theta, current, torque = (one.recorded[n] for n in ("theta_mech_rad", "iq_a", TORQUE))
+        torque = torque + 0.01 * np.abs(current) * np.cos(23.37 * theta)
+        waved.append(replace(one, recorded={**one.recorded, TORQUE: torque}))
+    assert left(*waved) == pytest.approx((23.37,), abs=2e-3)
+
+
 def test_what_the_equations_look_at_is_theirs():
     """Order 42 is 6ε of seven pole pairs: its group of rows tells of it."""
     assert left(*[spinning(seed, ((42, 3e-3),)) for seed in (1, 2)]) == ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -244,7 +245,21 @@ def test_the_comparison_in_words_names_errors_places_and_moves() -> None:
     assert "vq_v depends on iq_a (80 %); worst at 100 to 200 rad/s, -15 to -5 A: −210 mV" in text
     assert "vd_v depends" not in text, "it is below its floor"
     assert re.search(r"r_ohm +320.0 ± 2.0 mΩ +310.0 ± 2.0 mΩ +-10.0", text)
-    assert "1 parameters stayed within 3 u" in text
+    assert "1 parameter stayed within 3 u" in text
+
+
+@pytest.mark.parametrize(
+    ("split", "said"),
+    [("held_out", "held-out error 0.4 (1"), ("fit", "error of the fit, none held")],
+)
+def test_a_comparison_tells_its_notes_and_whether_anything_was_held_out(
+    split: Literal["held_out", "fit"], said: str
+) -> None:
+    error = SignalError("psi_d_wb", "map.csv", split, 0.004, 0.01, 10, 9.0, "Wb")
+    found = Comparison("m", "ideal", (), {}, (error,), 0.4, (), ("not used: a.mcap",))
+    rows = comparison_text(found).splitlines()
+    assert said in rows[0]
+    assert rows[1] == "  note: not used: a.mcap"
 
 
 def test_a_curve_has_its_band_around_it() -> None:
@@ -262,3 +277,10 @@ def test_a_curve_has_its_band_around_it() -> None:
     texts = [t.text for t in root.iter("text")]
     assert "i_q [A]" in texts
     assert "[mV]" in texts
+
+
+def test_a_test_that_lacks_a_signal_is_told_with_it() -> None:
+    lacking = [replace(one, signals=("torque_shaft_nm",)) for one in UNEXCITED[-1:]]
+    result = replace(make_diagnosis(), unexcited=(*UNEXCITED[:3], *lacking))
+    told, _ = told_and_folded(result)
+    assert told[-1] == "record torque_map with torque_shaft_nm to excite torque_lag"
