@@ -340,11 +340,11 @@ class Effect:
 
     @property
     def hook(self) -> str:
-        """Where it enters: flux, drop, torque or sensor."""
-        if self.coenergy is not None:
-            return "flux"
+        """Where it enters: flux, drop, torque or sensor; the drop of one that has a flux too."""
         if self.drop is not None:
             return "drop"
+        if self.coenergy is not None:
+            return "flux"
         return "torque" if self.torque is not None else "sensor"
 
     def parameters_of(self, machine: Machine) -> tuple[Parameter, ...]:

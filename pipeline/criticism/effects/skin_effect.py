@@ -24,9 +24,19 @@ def _square(x: Operating) -> Array:
     return square
 
 
+def _late_s(x: Operating, q: Values) -> float:
+    """Time that the field needs to move into the conductors [s]: √bend/ω_max."""
+    return math.sqrt(q["bend"]) / (2.0 * math.pi * x.machine.scales["freq_hz"])
+
+
 def _inner_h(x: Operating, q: Values) -> float:
-    """Inductance of the field inside the conductors [H], the same for both axes."""
-    return q["inner"] * 0.5 * (x.base["ld_h"] + x.base["lq_h"])
+    """Inductance of the field inside the conductors [H]: the resistance that stands beside it,
+    R rise (1 + bend)/bend, times the time that it is late by. Nothing without a bend.
+    """
+    if not (q["inner"] and q["bend"]):
+        return 0.0
+    beside = x.base["r_ohm"] * q["rise"] * (1.0 + q["bend"]) / q["bend"]
+    return q["inner"] * beside * _late_s(x, q)
 
 
 def _coenergy(x: Operating, q: Values) -> Any:
@@ -40,7 +50,7 @@ def _drop(x: Operating, q: Values) -> Complex:
     turning = q["rise"] * square * (1.0 + q["bend"]) / (1.0 + q["bend"] * square)
     rise = np.where(bench, q["meter_rise"] * (x.freq_hz > 0.0), turning)
     drop: Complex = x.base["r_ohm"] * rise * x.i_a
-    if q["inner"] and q["bend"] and bench.all() and not x.freq_hz.any():
+    if _inner_h(x, q) and bench.all() and not x.freq_hz.any():
         drop = drop + _in_a_step(x, q)
     return drop
 
@@ -49,7 +59,7 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
     """Voltage [n, V] while the field moves into the conductors: L_i di/dt, late by τ = √bend/ω_max
     as the current in a resistance beside L_i is, straight lines from sample to sample.
     """
-    late = math.sqrt(q["bend"]) / (2.0 * math.pi * x.machine.scales["freq_hz"])
+    late = _late_s(x, q)
     kept = math.exp(-x.ts_s / late)
     new = 1.0 - (1.0 - kept) * late / x.ts_s
     current = np.asarray(x.i_a)
@@ -62,9 +72,10 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
 EFFECT = Effect(
     name="skin_effect",
     words="resistance R (1 + rise s² (1 + bend)/(1 + bend s²)), s = f/f_max of the electrical "
-    "frequency, and inductance L (1 - inner bend s²/(1 + bend s²)); in a step the field inside the "
-    "conductors comes late by √bend/(2π f_max); an LCR meter at its own, higher frequency reads "
-    "R (1 + meter_rise) and L (1 - inner)",
+    "frequency; where inner, inductance L - L_i bend s²/(1 + bend s²) with L_i = "
+    "R rise (1 + bend)/(√bend 2π f_max), and in a step the field inside the conductors comes late "
+    "by √bend/(2π f_max); an LCR meter at its own, higher frequency reads R (1 + meter_rise) and "
+    "L - L_i",
     signature="resistance that grows with electrical speed, whatever the temperature",
     tests=("torque_map", "drive", "lcr"),
     experiment="current steps at the highest speed and at a tenth of it",
@@ -73,7 +84,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("rise", "1", 0.2, 0.01, low=0.0, high=5.0),
         Parameter("meter_rise", "1", 0.2, 0.02, low=0.0, high=50.0, at_least="rise"),
-        Parameter("inner", "1", 0.03, 0.002, low=0.0, high=0.9, optional=1),
+        Parameter("inner", "1", 1.0, 0.0, low=0.0, high=1.0, scan=(0.0, 1.0), choice=True),
         Parameter("bend", "1", 0.3, 0.0, low=0.0, high=11.0, scan=(0.0, 1.0)),
     ),
     signals=("vd_v", "vq_v"),
