@@ -25,7 +25,6 @@ from pipeline.criticism.wander import SIZE, wandering
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
-from pipeline.records.naming import file_stem
 
 _WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
 _WITHIN = (
@@ -79,11 +78,12 @@ def ended(
     machine: Machine,
     found: Sequence[Segment],
     library: Mapping[str, Effect],
+    name: str,
 ) -> End:
     """Climbs, once more with instruments that wander where no state of the machine predicts what is
-    left, and sketches what nothing explains; `found` are the campaign's segments.
+    left, and sketches what nothing explains as an effect of some `name`; `found` are the campaign's
+    segments.
     """
-    name = f"{file_stem(campaign.motor_id)}_unknown"
     ladder, sketch = _by_orders(campaign, model, machine, found, library, name)
     left, notes = ladder.left, []
     if sketch is None:

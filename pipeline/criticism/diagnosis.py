@@ -37,6 +37,7 @@ from pipeline.records.diagnosis import (
     Unexcited,
     Verdict,
 )
+from pipeline.records.naming import file_stem
 
 _TOO_LITTLE = (
     "the captures cannot fit the base model: record a torque map or drive log with dq voltages, "
@@ -64,7 +65,8 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     found = segments(campaign, machine)
     if not _enough(found):
         return _insufficient(campaign, model, library, _TOO_LITTLE)
-    end = ended(campaign, model, machine, found, library)
+    name = f"{file_stem(campaign.motor_id)}_unknown"
+    end = ended(campaign, model, machine, found, library, name)
     ladder, found, last = end.ladder, end.ladder.begun.segments, end.ladder.rungs[-1]
     offered = candidates(library, last.fitted)
     ranking = _ranking(ladder.rungs, ladder.held, offered, library, found, ladder.cut)

@@ -48,7 +48,7 @@ def climbs(monkeypatch):
 
 
 def end():
-    return ended(SimpleNamespace(motor_id="m"), ModelSpec("standard"), machine(), (), {})
+    return ended(SimpleNamespace(), ModelSpec("standard"), machine(), (), {}, "m_unknown")
 
 
 def test_orders_that_are_whole_join_at_once(climbs):
