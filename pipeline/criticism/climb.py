@@ -6,7 +6,7 @@ so the ladder is climbed once more where either is found, and the end that is to
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.criticism.asked import Begun, fit_of
@@ -84,7 +84,13 @@ def ended(
     left, and sketches what nothing explains as an effect of some `name`; `found` are the campaign's
     segments.
     """
-    ladder, sketch = _by_orders(campaign, model, machine, found, library, name)
+
+    def climb(*orders: float) -> Ladder:
+        wider = replace(machine, load_orders=orders)
+        seen = segments(campaign, wider) if orders else found
+        return climbed(fit_of(seen, model_of(model, wider)), library)
+
+    ladder, sketch = _by_orders(climb, name)
     left, notes = ladder.left, []
     if sketch is None:
         calm = _calmed(ladder, library)
@@ -99,26 +105,14 @@ def ended(
     return End(ladder, left, sketch, tuple(notes))
 
 
-def _by_orders(
-    campaign: Campaign,
-    model: ModelSpec,
-    machine: Machine,
-    found: Sequence[Segment],
-    library: Mapping[str, Effect],
-    name: str,
-) -> tuple[Ladder, UnknownStructure | None]:
+def _by_orders(climb: Callable[..., Ladder], name: str) -> tuple[Ladder, UnknownStructure | None]:
     """The ladder, and a sketch of what it leaves, with rows for the orders a turn that a first one
     leaves unseen.
 
     Steps of a programme make lines of any order too, and these predict no other capture: orders
     that are no whole numbers join where they alone give a sketch.
     """
-
-    def climb(*orders: float) -> Ladder:
-        wider = replace(machine, load_orders=orders)
-        return climbed(fit_of(segments(campaign, wider), model_of(model, wider)), library)
-
-    ladder = climbed(fit_of(found, model_of(model, machine)), library)
+    ladder = climb()
     unlooked = orders_left(ladder.begun.segments, ladder.rungs[-1].around)
     whole = tuple(order for order in unlooked if isinstance(order, int))
     if whole:
