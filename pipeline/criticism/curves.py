@@ -9,7 +9,6 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from pipeline.criticism.effect import Array, Machine, Operating
 
@@ -177,6 +176,8 @@ def _nodes(variable: Variable) -> Array:
 
 def _cardinal(knots: Array, at: Array) -> Array:
     """Natural cubic splines [N, K] that are one at a knot and zero at the others."""
+    from scipy.interpolate import CubicSpline  # dear to import, and seldom asked for
+
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
     found: Array = spline(np.clip(at, knots[0], knots[-1]))
     return found

@@ -17,7 +17,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from pipeline.criticism.curves import Variable
 from pipeline.criticism.effect import Array
@@ -265,6 +264,8 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
     def loss(z: Array) -> float:
         curves = pursuit.curves([t for group in moved(z) for t in group])
         return -pursuit._fall(curves) / size
+
+    from scipy.optimize import minimize  # dear to import, and seldom asked for
 
     size = max(abs(pursuit._fall(pursuit.curves([t for g in groups for t in g]))), 1e-300)
     found = minimize(

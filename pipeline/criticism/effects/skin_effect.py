@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
 
@@ -59,6 +58,8 @@ def _in_a_step(x: Operating, q: Values) -> Complex:
     """Voltage [n, V] while the field moves into the conductors: L_i di/dt, late by τ = √bend/ω_max
     as the current in a resistance beside L_i is, straight lines from sample to sample.
     """
+    from scipy.signal import lfilter  # dear to import, and seldom asked for
+
     late = _late_s(x, q)
     kept = math.exp(-x.ts_s / late)
     new = 1.0 - (1.0 - kept) * late / x.ts_s
