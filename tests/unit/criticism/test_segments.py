@@ -8,6 +8,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.criticism.floors import window_gain
+from pipeline.criticism.model import Model
+from pipeline.criticism.residuals import residual
+from pipeline.criticism.segment import clock, projected
 from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
@@ -123,3 +127,24 @@ def test_a_shaft_that_is_held_at_its_speed_does_not_coast(lead_s, left):
     (found,) = segments(Campaign("m", (capture,)), machine())
     assert found.ts_s * float(found.weak.starts[0]) >= left
     assert found.ts_s * float(found.weak.starts[0]) < left + 0.1
+
+
+@pytest.mark.parametrize(("seconds", "windows"), [(3, 147), (20, 64)])
+def test_of_a_long_coast_an_even_selection_of_windows_is_kept(seconds, windows):
+    """With what the equations make of each window as it was, and its place in time."""
+    t = 1e-3 * np.arange(1000 * seconds)
+    theta = 60.0 * seconds * -np.expm1(-t / seconds)
+    noisy = theta + np.random.default_rng(3).normal(0.0, 2e-6, t.size)
+    table = pl.DataFrame({"t_s": t, "theta_mech_rad": noisy})
+    meta = CaptureMeta("m", "spin_down", pole_pairs=7)
+    capture = Capture("coast.mcap", "0", "verified", meta, (table,))
+    (found,) = segments(Campaign("m", (capture,)), machine())
+    assert found.weak.starts.size == windows
+    middle = clock(found)[found.weak.starts + found.weak.length // 2]
+    assert np.ptp(middle) > 0.95 * t[-1]
+    assert np.diff(middle) == pytest.approx(np.diff(middle).mean(), abs=0.04)
+    # of a machine without drags dω/dt is left over
+    free = {**BASE, "b_nm_s_rad": 0.0}
+    left = projected(found, residual(found, Model(machine(), ()), free))[0, :, 0]
+    expected = -60.0 / seconds * np.exp(-middle / seconds)
+    assert left / window_gain(found) == pytest.approx(expected, rel=0.05)
