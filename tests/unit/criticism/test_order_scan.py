@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.model import Model
-from pipeline.criticism.order_scan import orders_left
+from pipeline.criticism.order_scan import Part, orders_left
 from pipeline.criticism.segment import electrical_orders, row_index
 from pipeline.criticism.system import Fitted, floors, system
 from pipeline.numerics.projection import projection
@@ -114,3 +114,15 @@ def test_groups_of_whole_orders_are_named_by_whole_numbers():
     named = {order for _, order in row_index(mixed)[3]}
     assert named == {0, 4.83, 42}
     assert {type(order) for order in named if order != 4.83} == {int}
+
+
+@pytest.mark.parametrize("size", [np.ones_like, np.asarray, np.abs])
+def test_a_part_is_rid_of_a_wave_of_one_size_or_as_the_current_or_its_size_goes(size):
+    """Else what is left of it hides the orders beside it."""
+    theta = np.linspace(0.0, 40.0, 4000)
+    current = 3.0 * np.sin(0.37 * theta + 0.2)
+    wave, other = size(current) * np.cos(16 * theta + 0.4), 0.01 * np.cos(17 * theta)
+    part = Part(wave + other, theta, np.ones(theta.size), current)
+    rid = part.without(16.0)
+    assert np.abs(rid.left - other).max() < 0.005
+    assert np.abs(part.left - other).max() > 0.9
