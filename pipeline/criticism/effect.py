@@ -147,12 +147,12 @@ class Operating:
     runs_rad: Array | None = None
     kept: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
 
-    def once(self, angle: Any, name: Hashable, make: Callable[[], Any]) -> Any:
-        """What depends on an angle array alone, made once for all copies that share the array."""
-        known = self.kept.get((id(angle), name))
+    def once(self, column: Any, name: Hashable, make: Callable[[], Any]) -> Any:
+        """What depends on a column alone, made once for all copies that share the array."""
+        known = self.kept.get((id(column), name))
         if known is None:
-            # the angle is kept with it, so that nothing else takes its identity
-            known = self.kept[id(angle), name] = angle, make()
+            # the column is kept with it, so that nothing else takes its identity
+            known = self.kept[id(column), name] = column, make()
         return known[1]
 
     def waves(self, order: int) -> tuple[Any, Any]:
@@ -193,8 +193,10 @@ class Operating:
     @property
     def i_a(self) -> Complex:
         """Complex rotor-frame current d + jq [A]."""
-        current: Complex = self.id_a + 1j * self.iq_a
-        return current
+        name = ("current", id(self.iq_a))
+        _, current = self.once(self.id_a, name, lambda: (self.iq_a, self.id_a + 1j * self.iq_a))
+        whole: Complex = current
+        return whole
 
     @property
     def flux_wb(self) -> Complex:

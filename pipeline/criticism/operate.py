@@ -58,8 +58,15 @@ def operate(
     turned = error / model.machine.pole_pairs
     true = theta - turned
     omega = omega - _speed(turned, segment.ts_s, theta.size // segment.size)
-    return _operating(
-        segment, signals, model, values, current * np.exp(1j * error), true, omega, freq
+    current = current * np.exp(1j * error)
+    return replace(
+        x,
+        id_a=current.real,
+        iq_a=current.imag,
+        eps_rad=x.eps_rad - error,
+        theta_rad=true,
+        omega_rad_s=omega,
+        kept={},
     )
 
 

@@ -150,7 +150,8 @@ def _chosen(
         batch = list(passing[first : first + _REFITS])
         while (best := _refit_best(segments, fitted, batch, wide, found)) is not None:
             named = [effect.name for effect in best[0].model.effects]
-            finished = trimmed(segments, *gauss_newton(segments, whole(best[0])), named)
+            near = gauss_newton(segments, whole(best[0]), before=best[1])
+            finished = trimmed(segments, *near, named)
             if _sure(*finished, leave_out(finished[1], len(finished[1].columns), segments)):
                 return finished
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]

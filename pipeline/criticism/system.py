@@ -27,10 +27,11 @@ from pipeline.criticism.size import base_scales
 
 _SEED = 20260302
 _STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
-_HEAVIER = 0.05
-"""Share of itself that a constant may move by before columns are computed anew, and J before its
-own is, since a coasting shaft goes by 1/J. By judgement: a stale column costs steps and no
-accuracy (`_kept`)."""
+_HEAVIER, _OTHER = 0.05, 0.05
+"""Share of itself that a constant may move by before columns are computed anew, J before its own
+is, since a coasting shaft goes by 1/J, and an effect's parameter (or of its typical size, if that
+is larger) before columns of sensors and shapes are. By judgement: a stale column costs steps and
+no accuracy (`_kept`)."""
 _CURRENTS = frozenset({"id_a", "iq_a", "i_pair_a"})
 """Signals whose noise is in the equations times a constant of the fit."""
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
@@ -63,7 +64,7 @@ class System:
     1/q: the likelihood of a group whose scatter is at least the floor but otherwise unknown. So an
     equation that lacks an effect does not move constants that sound equations know. `penalty` [P]
     is the inverse prior variance of nuisances, `pull` [P] the penalty's slope, `tests` each
-    segment's test, `made_at` the values at which the oldest columns were computed.
+    segment's test, `made_at` the values at which each column was computed.
     """
 
     columns: tuple[Column, ...]
@@ -79,7 +80,7 @@ class System:
     pull: Array
     around: Fitted
     tests: tuple[str, ...]
-    made_at: Values
+    made_at: Mapping[ColumnKey, Values]
 
     @property
     def size(self) -> int:
@@ -225,7 +226,7 @@ def system(
     """
     model, values = fitted.model, fitted.values
     columns = [*own_columns(model), *candidates]
-    known = _kept(before, fitted, chord)
+    known = _kept(before, fitted, columns, chord)
     new = [column for column in columns if column.key not in known]
     none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
     floor = zip(fitted.sigma, fitted.tolerance or none, strict=True)
@@ -247,7 +248,7 @@ def system(
         pull=pull,
         around=fitted,
         tests=tuple(segment.test for segment in segments),
-        made_at=values,
+        made_at={column.key: values for column in new},
     )
     return made if before is None or not known else _with_known(made, before, known, segments)
 
@@ -291,7 +292,8 @@ def _with_known(
     segment = np.array([number for number, _, _ in now.labels])[now.group]
     counts = np.bincount(segment, minlength=len(segments)).tolist()
     now.matrix[:, places] = _over(segments, kept, before.whiten, now.whiten, counts)
-    return replace(now, made_at=before.made_at)
+    made_at = {**now.made_at, **{key: before.made_at[key] for key in known}}
+    return replace(now, made_at=made_at)
 
 
 def _over(
@@ -308,8 +310,10 @@ def _over(
     return whole
 
 
-def _kept(before: System | None, fitted: Fitted, chord: bool) -> dict[ColumnKey, Array]:
-    """Columns of an earlier system that hold at a new fit too.
+def _kept(
+    before: System | None, fitted: Fitted, columns: Sequence[Column], chord: bool
+) -> dict[ColumnKey, Array]:
+    """Those of the columns that an earlier system has and that hold at a new fit too.
 
     A stale column costs no accuracy. The residual is always computed anew, a fit ends where it has
     nothing left along the columns, and the columns of two near fits span nearly the same space.
@@ -318,25 +322,35 @@ def _kept(before: System | None, fitted: Fitted, chord: bool) -> dict[ColumnKey,
     """
     if before is None:
         return {}
-    if chord:
-        return {c.key: before.matrix[:, place] for place, c in enumerate(before.columns)}
-    if _moved_base(before.made_at, fitted.values):
-        return {}
-    heavier = abs(fitted.values["j_kgm2"] / before.made_at["j_kgm2"] - 1.0)
     known = before.around.model.effects
     turned = any(e.angle is not None and e not in known for e in fitted.model.effects)
-    return {
-        column.key: before.matrix[:, place]
-        for place, column in enumerate(before.columns)
-        if _linear(column, fitted.model)
-        and (column.name != "j_kgm2" or heavier < _HEAVIER)
-        and not (turned and column.effect is not None and column.effect.angle is not None)
-    }
+
+    def stays(column: Column) -> bool:
+        of_angle = column.effect is not None and column.effect.angle is not None
+        return not (turned and of_angle) and _holds(column, before.made_at[column.key], fitted)
+
+    places = {column.key: place for place, column in enumerate(before.columns)}
+    there = [column for column in columns if column.key in places]
+    kept = [column.key for column in there if chord or stays(column)]
+    return {key: before.matrix[:, places[key]] for key in kept}
 
 
-def _moved_base(before: Values, now: Values) -> bool:
-    """Whether a physical constant moved too far since for columns to be kept."""
-    return any(abs(now[n] - before[n]) > far * abs(before[n]) for n, far in _STEADY.items())
+def _holds(column: Column, made_at: Values, fitted: Fitted) -> bool:
+    """Whether a column is near what it would be at a fit."""
+    model, now = fitted.model, fitted.values
+    if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n, far in _STEADY.items()):
+        return False
+    if column.name == "j_kgm2":
+        return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < _HEAVIER
+    if _linear(column, model):
+        return True
+    parameters = model.parameters()
+    gone = any(value and "." in name and name not in parameters for name, value in made_at.items())
+    return not gone and all(
+        abs(now[name] - made_at.get(name, 0.0))
+        <= _OTHER * max(abs(now[name]), p.typical * model.machine.scale(p))
+        for name, (_, p) in parameters.items()
+    )
 
 
 def _linear(column: Column, model: Model) -> bool:

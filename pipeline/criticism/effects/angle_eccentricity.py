@@ -8,7 +8,8 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 
 def _angle(x: Operating, q: Values) -> Array:
-    sine, cosine = np.sin(x.theta_rad), np.cos(x.theta_rad)
+    theta = x.theta_rad
+    sine, cosine = x.once(theta, "mounting", lambda: (np.sin(theta), np.cos(theta)))
     error: Array = q["sine_rad"] * sine + q["cosine_rad"] * cosine
     if q["sine2_rad"] or q["cosine2_rad"]:
         # of twice the angle: sin 2θ = 2 sin θ cos θ, cos 2θ = 1 - 2 sin² θ

@@ -63,7 +63,7 @@ def test_candidates_columns_survive_other_floors():
     louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma), values={**BASE})
     kept, made = (system(segments, louder, offered, b) for b in (before, None))
     assert kept.matrix == pytest.approx(made.matrix, rel=1e-6, abs=1e-9 * np.abs(made.matrix).max())
-    assert kept.made_at is before.made_at
+    assert all(kept.made_at[c.key] is before.made_at[c.key] for c in offered)
 
 
 def test_what_turns_the_angle_is_made_anew_where_another_error_of_it_was_found():
@@ -75,10 +75,54 @@ def test_what_turns_the_angle_is_made_anew_where_another_error_of_it_was_found()
     model = PLAIN.with_effects(off)
     found = {**BASE, **zero(off, model), "angle_eccentricity.sine_rad": 0.1}
     turned = Fitted(model, found, start.sigma, found)
-    kept = _kept(before, turned, chord=False)
+    kept = _kept(before, turned, before.columns, chord=False)
     assert drag[0].key in kept
     assert not any(name.startswith("angle_offset.") for name, _ in kept)
-    assert any(name.startswith("angle_offset.") for name, _ in _kept(before, start, chord=False))
+    again = _kept(before, start, before.columns, chord=False)
+    assert any(name.startswith("angle_offset.") for name, _ in again)
+
+
+def test_a_sensor_s_column_holds_until_a_parameter_of_the_model_moves():
+    """Of a shape or a sensor the residual is bent: near by its column stays, further off not."""
+    off = LIBRARY["angle_eccentricity"]
+    model = PLAIN.with_effects(off)
+    segments, name = (log(noise=1.0),), "angle_eccentricity.sine_rad"
+    values = {**BASE, **zero(off, model), name: 0.01}
+    here = Fitted(model, values, floors(segments, PLAIN, BASE), values)
+    before = system(segments, here)
+    near, far = (replace(here, values={**values, name: size}) for size in (0.0103, 0.012))
+    keys = {column.key for column in effect_columns(off, model)}
+    assert keys <= set(_kept(before, near, before.columns, chord=False))
+    assert keys.isdisjoint(_kept(before, far, before.columns, chord=False))
+    assert ("lq_h", ()) in _kept(before, far, before.columns, chord=False)
+    without = Fitted(PLAIN, {**BASE}, here.sigma, BASE)
+    heat = [c for c in before.columns if c.name == "offset_temp_k"]
+    assert _kept(before, without, heat, chord=False) == {}
+    # what is made anew is of the new place, and what stays of the old one
+    after = system(segments, far, before=before)
+    assert all(after.made_at[key][name] == 0.012 for key in keys)
+    assert after.made_at["lq_h", ()][name] == 0.01
+    fresh = system(segments, far)
+    place = [n for n, c in enumerate(fresh.columns) if c.key in keys]
+    assert after.matrix[:, place] == pytest.approx(fresh.matrix[:, place])
+
+
+@pytest.mark.parametrize("name", ["voltage_scale", "sample_delay", "torque_scale", "torque_lag"])
+def test_the_column_of_a_voltage_s_or_a_torque_s_sensor_is_the_residual_s(name):
+    """The machine's state is not computed anew for it, and the column is the same."""
+    segment, values = log(), {**BASE, "gain_torque": 0.01}
+    with_it = PLAIN.with_effects(LIBRARY[name])
+    still = {**values, **zero(LIBRARY[name], PLAIN)}
+    sampler = _Sampler(segment, PLAIN, values)
+    heard = 0
+    for column in effect_columns(LIBRARY[name], PLAIN):
+        moved = {**still, column.name: column.step}
+        expected = residual(segment, with_it, moved) - residual(segment, with_it, still)
+        found = sampler.change(column)
+        if found is not None:
+            heard += 1
+            assert found * column.step == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert heard
 
 
 def test_a_drag_s_column_has_the_gain_of_the_transducer_in_it():

@@ -123,7 +123,7 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
         pull=np.zeros(1 + len(own_columns(model))),
         around=Fitted(model, dict(BASE), (), BASE),
         tests=("drive", "drive"),
-        made_at=BASE,
+        made_at={},
     )
     (score,) = score_all(around, around.around, [Candidate(effect, (column,))])
     assert score.fall > score.price

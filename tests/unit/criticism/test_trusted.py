@@ -41,7 +41,7 @@ def missing_by(**spreads):
         pull=none,
         around=Fitted(model, dict(BASE), (), BASE),
         tests=("drive",),
-        made_at=BASE,
+        made_at={},
     )
     return Rung((), around.around, around, ())
 
