@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
 from pipeline.criticism.floors import offsets, reading_error, told_unit, window_gain
+from pipeline.criticism.hearing import HEARS, hears, hears_sensor
 from pipeline.criticism.model import (
     BASE,
     GAINS,
@@ -86,35 +87,34 @@ def linearise(
     """Whitened residual and columns of one segment at `values`, reading errors as at `near`."""
     group, window, valid, groups = row_index(segment)
     sampler = _Sampler(segment, model, dict(values))
-    here = sampler.here
     floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near, sampler.x)[valid])
     whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
-    kept = np.zeros((int(valid.sum()), len(columns)))
-    pending: list[tuple[int, Array]] = []
-
-    def flush() -> None:
-        if pending:
-            stacked = np.concatenate([change for _, change in pending])
-            moving = stacked.any(axis=1)
-            weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
-            weak[moving] = projected(segment, stacked[moving])
-            weak = weak.reshape(len(pending), *valid.shape)
-            for (place, _), projection in zip(pending, weak, strict=True):
-                kept[:, place] = projection[valid] * whiten
-            pending.clear()
-
-    for place, column in enumerate(columns):
-        change = sampler.change(column)
-        if change is not None:
-            pending.append((place, change))
-        if len(pending) >= _CHUNK:
-            flush()
-    flush()
-    both = np.column_stack([projected(segment, here)[valid] * whiten, kept])
+    kept = _weak_columns(segment, sampler, columns, valid)
+    both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * whiten[:, None]
     absorb(both, offsets(segment, valid, whiten))
     unit = told_unit(segment, values) / (whiten * window_gain(segment))
     soft = floor * whiten
     return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
+
+
+def _weak_columns(
+    segment: Segment, sampler: _Sampler, columns: Sequence[Column], valid: NDArray[np.bool_]
+) -> Array:
+    """Weak samples [R, P] of every column, zero where the segment does not hear it."""
+    kept = np.zeros((int(valid.sum()), len(columns)))
+    for first in range(0, len(columns), _CHUNK):
+        some = enumerate(columns[first : first + _CHUNK], first)
+        changes = {place: sampler.change(column) for place, column in some}
+        heard = {place: change for place, change in changes.items() if change is not None}
+        if not heard:
+            continue
+        stacked = np.concatenate(list(heard.values()))
+        moving = stacked.any(axis=1)
+        weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
+        weak[moving] = projected(segment, stacked[moving])
+        for place, one in zip(heard, weak.reshape(len(heard), *valid.shape), strict=True):
+            kept[:, place] = one[valid]
+    return kept
 
 
 def absorb(rows: Array, unknown: Sequence[Array]) -> None:
@@ -148,32 +148,6 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
         rows += (axes * (np.sqrt(1.0 + sizes**2) - 1.0)) @ (axes.T @ rows)
 
 
-_VOLTAGE_BASE = (
-    "r_ohm",
-    "ld_h",
-    "lq_h",
-    "ripple_slope",
-    "ripple_mean",
-    "ripple_edge",
-    "ripple_shift",
-    "ripple_torque",
-    "ripple_held",
-)
-_NEEDS: dict[str, tuple[str, ...]] = {
-    "dq": (*_VOLTAGE_BASE, "psi_wb", "j_kgm2", "b_nm_s_rad"),
-    "shaft": ("j_kgm2", "b_nm_s_rad"),
-    "open": ("psi_wb", "bench_angle_rad"),
-    "terminal": ("r_ohm", "ld_h", "lq_h"),
-    "lcr": ("r_ohm", "ld_h", "lq_h"),
-    "flux_map": ("ld_h", "lq_h", "psi_wb"),
-    "q": ("r_ohm", "lq_h", "psi_wb"),
-    "motion": ("psi_wb", "j_kgm2", "b_nm_s_rad"),
-    "steady": ("r_ohm", "ld_h", "psi_wb"),
-    "standing": ("psi_wb",),
-}
-"""Constants of the base that the equations of each kind of segment hold."""
-
-
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
@@ -198,14 +172,18 @@ class _Sampler:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
         if column.effect is None:
             return self._base(column)
-        if self.segment.kind == "lcr" or column.effect.hook == "sensor":
-            return self._anew(column)
+        if self.segment.kind == "lcr":
+            return self._anew(column, column.effect)
+        if not hears(self.segment, column.effect):
+            return None
+        if column.effect.hook == "sensor":
+            return self._anew(column, column.effect)
         return self._hook(column, column.effect)
 
     def _base(self, column: Column) -> Array | None:
         if column.name in GAINS:
             return self._gain(column)
-        if column.name not in _NEEDS[self.segment.kind]:
+        if column.name not in HEARS[self.segment.kind].constants:
             return None
         step = column.step
         if column.name == "j_kgm2":
@@ -223,60 +201,35 @@ class _Sampler:
 
     def _gain(self, column: Column) -> Array | None:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
-        kind, moved = self.segment.kind, dict(self.values)
         heard = {
-            "gain_torque": "torque_shaft_nm" in self.segment.channels and kind != "motion",
-            "gain_lcr": kind == "lcr",
-            "gain_current": kind not in ("shaft", "open", "lcr"),
+            "gain_torque": hears_sensor(self.segment, "load"),
+            "gain_lcr": self.segment.kind == "lcr",
+            "gain_current": hears_sensor(self.segment, "current"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            self.segment.meter: kind in ("dq", "q", "open", "terminal", "flux_map", "steady"),
+            self.segment.meter: hears_sensor(self.segment, "voltage"),
         }
         if not heard.get(column.name, False):
             return None
-        moved[column.name] += column.step
+        moved = {**self.values, column.name: self.values[column.name] + column.step}
         if column.name in ("gain_current", "offset_temp_k"):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
         there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step
 
-    def _anew(self, column: Column) -> Array | None:
+    def _anew(self, column: Column, effect: Effect) -> Array | None:
         model, start = self._with(column)
         moved = {**start, column.name: start[column.name] + column.step}
-        if not self._concerns(column.effect):
-            return None
-        change: Array = (self._there(column, model, moved) - self.here) / column.step
+        change: Array = (self._there(effect, model, moved) - self.here) / column.step
         return change if np.any(change) else None
 
-    def _there(self, column: Column, model: Model, moved: dict[str, float]) -> Array:
+    def _there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
         machine's state, and what its hooks gave, as they are.
         """
-        effect = column.effect
-        if (
-            effect is None
-            or effect.hook != "sensor"
-            or effect.angle is not None
-            or effect.current is not None
-        ):
+        if effect.hook != "sensor" or effect.angle is not None or effect.current is not None:
             return residual(self.segment, model, moved)
         there = predicted(self.segment, self.x, self.pieces, model, moved)
         return measured(self.segment, self.segment.recorded, model, moved) - there
-
-    def _concerns(self, effect: Effect | None) -> bool:
-        """Whether a segment's residual can hear a sensor effect at all."""
-        if effect is None or self.segment.kind == "lcr":
-            return True
-        kinds: tuple[str, ...] = ()
-        if effect.angle is not None:
-            kinds += ("dq", "q", "open", "shaft", "motion")
-        if effect.current is not None:
-            kinds += ("dq", "q", "terminal", "flux_map", "motion", "steady", "standing")
-        if effect.voltage is not None:
-            kinds += ("dq", "q", "open", "terminal", "flux_map", "steady")
-        loaded = effect.load is not None or effect.shaft is not None
-        loaded = loaded and self.segment.kind != "motion"
-        heard = loaded and "torque_shaft_nm" in self.segment.channels
-        return heard or self.segment.kind in kinds
 
     def _with(self, column: Column) -> tuple[Model, dict[str, float]]:
         effect = column.effect
@@ -288,8 +241,6 @@ class _Sampler:
         }
 
     def _hook(self, column: Column, effect: Effect) -> Array | None:
-        if not self._listens(effect):
-            return None
         _, start = self._with(column)
         moved = {**start, column.name: start[column.name] + column.step}
         change = self._pieces(effect, moved)
@@ -317,19 +268,6 @@ class _Sampler:
         else:
             there = predicted(self.segment, self.x, change, plain, self.quiet)
         return -there / column.step if np.any(np.abs(there) > _NOTHING) else None
-
-    def _listens(self, effect: Effect) -> bool:
-        kind = self.segment.kind
-        if effect.hook == "torque":
-            return len(self.segment.channels) > (2 if kind == "dq" else 0) and kind in (
-                "dq",
-                "shaft",
-                "motion",
-                "standing",
-            )
-        if effect.hook == "drop":
-            return kind in ("dq", "q", "terminal", "steady")
-        return kind in ("dq", "q", "open", "terminal", "flux_map", "motion", "steady", "standing")
 
     def _pieces_of_nothing(self) -> Pieces:
         nothing = np.zeros(self.x.omega_rad_s.shape)
