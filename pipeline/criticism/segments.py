@@ -53,12 +53,9 @@ _FEW = 12
 """Windows of a segment in a rough fit: enough to meet a sound J to a tenth."""
 _LEAST_WINDOW = 8
 """Samples of a window at the least: its test function vanishes at both ends."""
-_WINDOWS, _WINDOWS_LOG, _WINDOWS_COAST = 48, 32, 64
-"""Windows of a map or open winding, of a drive's log and of a coast, at the most. By judgement:
+_WINDOWS, _WINDOWS_LOG = 48, 32
+"""Windows of a map, an open winding or a coast, and of a drive's log, at the most. By judgement:
 cost goes with them, and a programme has several logs."""
-_COAST_PAD = 8
-"""Samples of a coast that are kept at either side of a window: a coast is sampled slowly, and what
-is smoothed or differenced needs three."""
 _LEAD = 0.05
 """Share of a coast from which on the time before it counts as driven. By judgement: the moment of
 letting go is shorter."""
@@ -171,7 +168,7 @@ def _shaft(capture: Capture, machine: Machine) -> Segment | None:
     keep = keep & _coasts(found["theta_mech_rad"], window)
     told = prepared(found, period)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    found, starts = thinned(found, keep, window, _WINDOWS_COAST, _COAST_PAD)
+    found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, ())
     return segment_of(
         capture, "shaft", "bench", period, found=found, sensors=told, channels=(channel,), weak=weak
