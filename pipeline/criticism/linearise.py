@@ -217,7 +217,9 @@ class _Sampler:
         return -(there - self.start) / column.step
 
     def _anew(self, column: Column, effect: Effect) -> Array | None:
-        model, start = self._with(column)
+        inside = effect in self.model.effects
+        model = self.model if inside else self.model.with_effects(effect)
+        start = self._start(column, effect)
         moved = {**start, column.name: start[column.name] + column.step}
         change: Array = (self._there(effect, model, moved) - self.here) / column.step
         return change if np.any(change) else None
@@ -231,17 +233,14 @@ class _Sampler:
         there = predicted(self.segment, self.x, self.pieces, model, moved)
         return measured(self.segment, self.segment.recorded, model, moved) - there
 
-    def _with(self, column: Column) -> tuple[Model, dict[str, float]]:
-        effect = column.effect
-        if effect is None or effect in self.model.effects:
-            return self.model, self.values
-        return self.model.with_effects(effect), {
-            **self.values,
-            **zero(effect, self.model, column.at),
-        }
+    def _start(self, column: Column, effect: Effect) -> dict[str, float]:
+        """The values that a column departs from; an effect not in the model is not there."""
+        if effect in self.model.effects:
+            return self.values
+        return {**self.values, **zero(effect, self.model, column.at)}
 
     def _hook(self, column: Column, effect: Effect) -> Array | None:
-        _, start = self._with(column)
+        start = self._start(column, effect)
         moved = {**start, column.name: start[column.name] + column.step}
         change = self._pieces(effect, moved)
         if effect in self.model.effects:

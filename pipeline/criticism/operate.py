@@ -66,7 +66,6 @@ def operate(
         eps_rad=x.eps_rad - error,
         theta_rad=true,
         omega_rad_s=omega,
-        kept={},
     )
 
 

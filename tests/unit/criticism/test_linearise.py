@@ -107,9 +107,9 @@ def test_a_sensor_s_column_holds_until_a_parameter_of_the_model_moves():
     assert after.matrix[:, place] == pytest.approx(fresh.matrix[:, place])
 
 
-@pytest.mark.parametrize("name", ["voltage_scale", "sample_delay", "torque_scale", "torque_lag"])
-def test_the_column_of_a_voltage_s_or_a_torque_s_sensor_is_the_residual_s(name):
-    """The machine's state is not computed anew for it, and the column is the same."""
+@pytest.mark.parametrize("name", [n for n, e in LIBRARY.items() if e.hook == "sensor"])
+def test_the_column_of_a_sensor_is_what_the_residual_moves_by(name):
+    """Of a voltage or a torque too, for which the machine's state is not computed anew."""
     segment, values = log(), {**BASE, "gain_torque": 0.01}
     with_it = PLAIN.with_effects(LIBRARY[name])
     still = {**values, **zero(LIBRARY[name], PLAIN)}

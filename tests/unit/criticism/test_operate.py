@@ -176,3 +176,26 @@ def test_a_closer_look_sees_the_torque_without_the_transducer_s_offset():
     values = {**BASE, "torque_offset.offset_nm": 0.2, **zero(coupled, model)}
     told_by_wholes((replace(drive, whole=whole),), Fitted(model, values, (), BASE), coupled)
     assert seen[0] == pytest.approx(drive.recorded["torque_shaft_nm"] - 0.2)
+
+
+def test_the_electrical_angle_and_the_current_go_with_an_error_of_the_angle():
+    """True angle p θ, and a current in the rotor frame of that: what hooks of 6ε are told."""
+    segment, off = log(), LIBRARY["angle_offset"]
+    model = Model(machine(), (off,))
+    values = {**BASE, **zero(off, model), "angle_offset.offset_rad": 0.02}
+    plain = operate(segment, segment.recorded, Model(machine(), ()), BASE)
+    x = operate(segment, segment.recorded, model, values)
+    p = machine().pole_pairs
+    assert x.eps_rad == pytest.approx(p * x.theta_rad)
+    assert x.eps_rad - plain.eps_rad == pytest.approx(np.full(segment.size, -0.02))
+    assert x.i_a == pytest.approx(plain.i_a * np.exp(0.02j))
+
+
+def test_the_complex_current_is_that_of_both_axes_of_a_copy():
+    """It is made once for both arrays, and anew for a copy with another one of either."""
+    x = operating(n=8)
+    assert x.i_a is replace(x, theta_rad=x.theta_rad + 1.0).i_a
+    for axis in ("id_a", "iq_a"):
+        moved = replace(x, **{axis: getattr(x, axis) + 1.0})
+        assert moved.i_a == pytest.approx(moved.id_a + 1j * moved.iq_a)
+        assert np.abs(moved.i_a - x.i_a) == pytest.approx(np.ones(8))

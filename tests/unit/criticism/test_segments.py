@@ -153,5 +153,6 @@ def test_of_a_long_coast_an_even_selection_of_windows_is_kept(seconds, windows):
     slowed = {**BASE, "b_nm_s_rad": BASE["j_kgm2"] / seconds}
     run = free_run(found, Model(machine(), ()), slowed)
     speed = 60.0 * np.exp(-run.t_s / seconds)
+    assert len(run.t_s) == (windows if seconds == 20 else 73)
     assert np.abs(run.simulated["omega_mech_rad_s"] - speed).max() < 0.02
     assert np.abs(run.recorded["omega_mech_rad_s"] - speed).max() < 0.02
