@@ -221,8 +221,8 @@ def system(
 ) -> System:
     """Linearises every segment around a fit, along its own columns and those of candidates.
 
-    Columns of hooks that are linear stay as they were in `before`, a system around a near fit; with
-    `chord` all that it has stay.
+    Columns that hold at this fit too (`_holds`) stay as they were in `before`, a system around a
+    near fit; with `chord` all that it has stay.
     """
     model, values = fitted.model, fitted.values
     columns = [*own_columns(model), *candidates]
