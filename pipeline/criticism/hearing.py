@@ -29,8 +29,8 @@ class Hearing:
     """
 
     constants: tuple[str, ...]
-    hooks: frozenset[str] = frozenset()
-    sensors: frozenset[str] = frozenset()
+    hooks: frozenset[str]
+    sensors: frozenset[str]
 
 
 def _hears(constants: tuple[str, ...], hooks: str, sensors: str) -> Hearing:
