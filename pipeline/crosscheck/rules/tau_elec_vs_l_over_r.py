@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.physics.conventions import copper_resistance_ohm, terminal_inductance_h
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -24,18 +25,22 @@ Array = NDArray[np.float64]
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """The smallest current step on each rotor position, its time constant over L/R.
 
-    Only the shape of the current enters, no voltage and no gain, so this sees what L and R cannot
-    say of themselves: an open delta, a lossy core, resistance in the leads.
+    No gain enters, so this sees what L and R cannot say of themselves: an open delta, a lossy core,
+    resistance between the motor and where the voltage was measured.
     """
     ld, lq = constants.best("ld_h"), constants.best("lq_h")
     r_phase = constants.best("r_phase_ohm")
     if ld is None or lq is None or r_phase is None:
         return not_evaluated(NAME, "needs ld_h, lq_h and r_phase_ohm")
     ratios: list[float] = []
+    errors: list[float] = []
     for capture in _smallest_steps(campaign):
         expected = _expected_s(capture, ld.number, lq.number, r_phase.number)
-        ratios += [tau / expected for tau in step_time_constants_s(*_trace(capture))]
-    if len(ratios) < 2:
+        found = step_time_constant_s(*_trace(capture))
+        if found is not None:
+            ratios.append(found[0] / expected)
+            errors.append(found[1] / expected)
+    if not ratios:
         return not_evaluated(NAME, "needs current_step captures that settle within the recording")
     budget = propagate(
         [
@@ -44,8 +49,8 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
             (-1.0 / r_phase.number, r_phase.budget),
         ]
     )
-    scatter = float(np.std(ratios, ddof=1)) / math.sqrt(len(ratios))
-    u = math.hypot(standard_uncertainty(budget), scatter)
+    scatter = max(float(np.std(ratios)), float(np.linalg.norm(errors)) / math.sqrt(len(errors)))
+    u = math.hypot(standard_uncertainty(budget), scatter / math.sqrt(max(len(ratios) - 1, 1)))
     return judge_ratio(
         NAME,
         float(np.mean(ratios)),
@@ -56,29 +61,39 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     )
 
 
-def step_time_constants_s(t_s: Array, v_v: Array, i_a: Array) -> list[float]:
-    """Time constants [s] of each step of a trace [n], by the integral form of an exponential.
+def step_time_constant_s(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] | None:
+    """L/R [s] of a trace [n] and its standard error, by the integral form of L di/dt = v - R i.
 
-    i(t) = c + i_end t/tau - (1/tau) integral of i dt is linear in c, i_end/tau and 1/tau; nothing
-    is differentiated, and the current need not settle. An edge is where the voltage moves by more
-    than half of its largest move between samples. A segment counts if it spans three time
-    constants and its current moves by 20 times what the line leaves over.
+    i = c + (1/L) ∫v dt - (R/L) ∫i dt between edges, with one c an edge, is linear in c, 1/L and
+    R/L, and no gain is in R/L. The voltage is the measured one: a supply that sags makes the
+    current settle sooner than L/R, by its own resistance, and a constant in place of v would take
+    that for the motor's. After the last edge v is -R_source i, which alone parts nothing: the
+    steps are taken together. What both channels read before the first edge is taken off, offsets
+    among it. An edge is where the voltage moves by more than half of its largest move between
+    samples. None where no step spans three time constants, or the current moves by less than 20
+    times what the line leaves over.
     """
     moves = np.abs(np.diff(v_v))
     edges = np.flatnonzero(moves > 0.5 * moves.max(initial=0.0)) + 1
-    found = []
-    for start, stop in pairwise([*edges, v_v.size]):
-        t, i = t_s[start : stop - 1] - t_s[start], i_a[start : stop - 1]
-        if t.size < 50:
-            continue
-        area = np.concatenate([[0.0], np.cumsum(0.5 * (i[1:] + i[:-1]) * np.diff(t))])
-        columns = np.column_stack([np.ones(t.size), t, area])
-        beta = np.linalg.lstsq(columns, i, rcond=None)[0]
-        left = float(np.std(i - columns @ beta))
-        moved = float(np.ptp(columns @ beta))
-        if beta[2] < 0.0 and -1.0 / beta[2] < t[-1] / 3.0 and moved > 20.0 * left:
-            found.append(-1.0 / float(beta[2]))
-    return found
+    spans = [slice(a, b) for a, b in pairwise([*edges, v_v.size]) if b - a >= 50]
+    if not spans:
+        return None
+    volts, amps = v_v - v_v[: edges[0]].mean(), i_a - i_a[: edges[0]].mean()
+    areas = [[_integral(t_s[s], x[s]) for s in spans] for x in (volts, amps)]
+    own = np.repeat(np.eye(len(spans)), [s.stop - s.start for s in spans], axis=0)
+    columns = np.column_stack([np.concatenate(areas[0]), np.concatenate(areas[1]), own])
+    current = np.concatenate([amps[s] for s in spans])
+    fit = linear_fit(columns, current)
+    rate, left = -float(fit.coefficients[1]), float(np.std(fit.residuals))
+    longest = max(float(t_s[s.stop - 1] - t_s[s.start]) for s in spans)
+    if not fit.full_rank or rate * longest < 3.0 or np.ptp(current) < 20.0 * left:
+        return None
+    return 1.0 / rate, fit.u(1) * math.sqrt(autocorrelation_time(fit.residuals)) / rate**2
+
+
+def _integral(t_s: Array, y: Array) -> Array:
+    """Running integral [n] by trapezoids."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t_s))])
 
 
 def _smallest_steps(campaign: Campaign) -> list[Capture]:

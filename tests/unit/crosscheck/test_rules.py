@@ -316,6 +316,34 @@ def test_the_current_s_own_time_constant() -> None:
     assert leads.value == pytest.approx(1.0 / 1.08, abs=0.005)
 
 
+@pytest.mark.parametrize("source_share", [0.05, 0.12, 0.25, 1.0])
+def test_a_healthy_motor_on_a_supply_that_sags_is_not_refused(source_share: float) -> None:
+    """Ratios of 0.79 to 0.90 refused healthy motors: the current settles with L/(R + R_source).
+
+    A step of 4 V open circuit behind `source_share` of the pair's resistance, from the closed form,
+    with offsets in both channels; the edges lie between samples.
+    """
+    rng = np.random.default_rng(6)
+    source_ohm = source_share * 2.0 * R
+    whole_ohm, tau_s = 2.0 * R + source_ohm, LD / (R * (1.0 + source_share))
+    t_s = 1e-5 * np.arange(1200)
+
+    def rise(start_s: float) -> np.ndarray:
+        return np.where(t_s > start_s, -np.expm1(-np.maximum(t_s - start_s, 0.0) / tau_s), 0.0)
+
+    current = 4.0 / whole_ohm * (rise(1.003e-3) - rise(7.006e-3))
+    opened = np.where((t_s > 1.003e-3) & (t_s < 7.006e-3), 4.0, 0.0)
+    columns = {
+        "t_s": t_s,
+        "vab_v": opened - source_ohm * current + 0.01 + rng.normal(0, 0.003, t_s.size),
+        "ia_a": current - 0.03 + rng.normal(0, 0.004, t_s.size),
+    }
+    campaign = campaign_of("current_step", columns, pair="ab", theta_elec_deg=-30.0)
+    check = judge("tau_elec_vs_l_over_r", constants(), campaign)
+    assert check.status == "pass"
+    assert check.value == pytest.approx(1.0, abs=0.005)
+
+
 def test_either_line_shows_the_step() -> None:
     """The current of terminal b, which leaves the motor there, and some values missing."""
     capture = current_step(LD / R).captures[0]
