@@ -144,17 +144,26 @@ def datasheet_schema() -> Schema:
             "provenance": _object(
                 {
                     "captures": _list(
-                        _object(capture, {"station": _or_null(TEXT), "started_at": _or_null(TEXT)})
+                        _object(
+                            capture,
+                            {
+                                "station": _or_null(TEXT),
+                                "started_at": _or_null(TEXT),
+                                "read_sha256": _or_null(SHA256),
+                            },
+                        )
                     ),
                     "config_sha256": SHA256,
                     "code_version": NAME,
-                }
+                },
+                {"libraries": TEXT},
             ),
             "constants": constants,
             "checks": _list(_check()),
         },
         {
             "why": _list(TEXT),
+            "supersedes": _or_null(_object({"version": SHA256, "by": TEXT, "why": TEXT})),
             "alternatives": _list(
                 {"allOf": [{"$ref": "#/$defs/estimate"}, _object({"name": NAME})]}
             ),

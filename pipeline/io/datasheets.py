@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.datasheet import CaptureReference, Check, Datasheet, Superseded
 from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate, Order
 from pipeline.records.uncertainty import Budget, Contribution, effective_dof
@@ -65,6 +65,7 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
                 c["integrity"],
                 c.get("station"),
                 c.get("started_at"),
+                c.get("read_sha256"),
             )
             for c in provenance["captures"]
         ),
@@ -73,7 +74,13 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
         constants={n: _estimate(n, e) for n, e in document["constants"].items()},
         alternatives=tuple(_estimate(e["name"], e) for e in document.get("alternatives", ())),
         checks=tuple(_check(check) for check in document["checks"]),
+        libraries=provenance.get("libraries", ""),
+        supersedes=_superseded(document.get("supersedes")),
     )
+
+
+def _superseded(said: Mapping[str, Any] | None) -> Superseded | None:
+    return None if said is None else Superseded(said["version"], said["by"], said["why"])
 
 
 def _check(said: Mapping[str, Any]) -> Check:

@@ -24,6 +24,7 @@ from pipeline.records.errors import PipelineError, UsageError
 from pipeline.records.ledger import (
     START,
     Event,
+    Revocation,
     Selection,
     Version,
     faults,
@@ -208,6 +209,16 @@ class Registry:
         """A motor's versions, oldest first, as they stood at a moment; empty if unknown."""
         return histories(self.events(), until).get(motor_id, ())
 
+    def revocations(self) -> Mapping[str, tuple[Revocation, ...]]:
+        """The versions that are revoked now, by motor; none where there is no registry yet."""
+        motors = histories(self._table.events() or ())
+        found = {m: tuple(r for v in own if (r := v.revocation)) for m, own in motors.items()}
+        return {motor_id: revoked for motor_id, revoked in found.items() if revoked}
+
+    def last_commit(self) -> int | None:
+        """The number of the table's last commit; None where it is not to be seen on a disk."""
+        return self._table.last_commit()
+
     def has_files(self, contents: Iterable[tuple[Key, str]]) -> bool:
         """Whether every version has its file, of this sha256 (disk only).
 
@@ -312,12 +323,13 @@ def one_of(versions: Sequence[Version], wanted: Selection, place: str) -> Versio
 
 
 def _allowed(kind: str, version: Version) -> None:
+    if kind == "revoke":
+        return
     name = f"motor {version.motor_id!r} revision {version.revision}"
-    if version.status == "refused":
-        reasons = "; ".join(version.open_points)
+    reasons = "; ".join(version.open_points)
+    if version.published.status == "refused":
         raise UsageError(f"{name} is refused: {reasons}", "no decision changes that; record anew")
-    if kind == "approve" and version.open_points:
-        reasons = "; ".join(version.open_points)
+    if version.open_points:
         raise UsageError(f"{name} is not ready for approval: {reasons}", "complete it first")
 
 

@@ -159,11 +159,19 @@ class EventTable:
 
     def missing_commits(self) -> list[int]:
         """Numbers of the commits that are missing from the log before the last one (disk only)."""
+        there = self._commits()
+        return sorted(set(range(max(there, default=0))) - there)
+
+    def last_commit(self) -> int | None:
+        """The number of the last commit; None where no log is to be seen on a disk."""
+        return max(self._commits(), default=None)
+
+    def _commits(self) -> set[int]:
+        """Numbers of the commits whose log is on this machine's disk."""
         log = None if self.folder is None else self.folder / "_delta_log"
         if log is None or not log.is_dir():
-            return []
-        there = {int(path.stem) for path in log.glob("*.json") if path.stem.isdigit()}
-        return sorted(set(range(max(there, default=0))) - there)
+            return set()
+        return {int(path.stem) for path in log.glob("*.json") if path.stem.isdigit()}
 
     def _opened(self) -> DeltaTable | None:
         from deltalake import DeltaTable

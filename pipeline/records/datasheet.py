@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from pipeline.records.estimate import Estimate
@@ -42,7 +42,11 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class CaptureReference:
-    """Which file a datasheet rests on."""
+    """Which file a datasheet rests on.
+
+    `sha256` is that of its bytes, `read_sha256` that of what was read from them: columns, metadata
+    and masks, after units, signs and gates. None in datasheets of before it was told.
+    """
 
     path: str
     sha256: str
@@ -50,6 +54,7 @@ class CaptureReference:
     integrity: str
     station: str | None = None
     started_at: str | None = None
+    read_sha256: str | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -60,12 +65,25 @@ class CaptureReference:
             "integrity": self.integrity,
             "station": self.station,
             "started_at": self.started_at,
+            "read_sha256": self.read_sha256,
         }
 
 
 @dataclass(frozen=True, slots=True)
+class Superseded:
+    """The revoked version of the same work whose place a datasheet takes: by whom and why."""
+
+    version: str
+    by: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Datasheet:
-    """Everything known of one motor, reproducibly: same inputs, configuration, code, bytes."""
+    """Everything known of one motor, reproducibly: same inputs, configuration, code, bytes.
+
+    `libraries` are the versions of Python and of the libraries that the numbers hang on.
+    """
 
     motor_id: str
     motor_type: str | None
@@ -79,6 +97,8 @@ class Datasheet:
     constants: Mapping[str, Estimate]
     alternatives: tuple[Estimate, ...]
     checks: tuple[Check, ...]
+    libraries: str = ""
+    supersedes: Superseded | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema motor-datasheet/1."""
@@ -94,7 +114,9 @@ class Datasheet:
                 "captures": [reference.document() for reference in self.captures],
                 "config_sha256": self.config_sha256,
                 "code_version": self.code_version,
+                "libraries": self.libraries,
             },
+            "supersedes": None if self.supersedes is None else asdict(self.supersedes),
             "constants": {name: est.document() for name, est in sorted(self.constants.items())},
             "alternatives": [
                 {"name": est.name} | est.document()

@@ -65,6 +65,16 @@ def _link(event: Event, before: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class Revocation:
+    """A version that was revoked: its digest, that of its content, by whom and why."""
+
+    version: str
+    content_sha256: str
+    by: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Version:
     """One version of a motor's datasheet and what was decided of it, oldest decision first.
 
@@ -99,12 +109,26 @@ class Version:
     def status(self) -> Standing:
         """What the datasheet says of itself, unless a person decided otherwise since.
 
-        A refused datasheet stays refused: an approval heals no failed check.
+        A refused datasheet is never released: an approval heals no failed check.
         """
         own = self.published.status or "refused"
-        if own == "refused" or not self.decisions:
+        if not self.decisions:
             return own
-        return "released" if self.decisions[-1].kind == "approve" else "revoked"
+        if self.decisions[-1].kind == "revoke":
+            return "revoked"
+        return own if own == "refused" else "released"
+
+    @property
+    def revocation(self) -> Revocation | None:
+        """The first revocation of a version that is revoked now; None for any other.
+
+        The first: one that repeats it in other words must not change what takes its place.
+        """
+        if self.status != "revoked":
+            return None
+        first = next(event for event in self.decisions if event.kind == "revoke")
+        own = self.published
+        return Revocation(own.version, own.content_sha256 or "", first.by or "", first.why or "")
 
     @property
     def open_points(self) -> tuple[str, ...]:

@@ -63,6 +63,9 @@ def datasheet_text(version: Version, sheet: Datasheet) -> str:
         f"station {safe(', '.join(own.stations) or NONE)}, "
         f"{counted(len(sheet.captures), 'capture')}, code {safe(sheet.code_version)}",
     ]
+    if (old := sheet.supersedes) is not None:
+        who = f"revoked by {safe(old.by)}: {safe(old.why)}"
+        lines.append(f"  takes the place of version {old.version[:SHOWN_DIGITS]}, {who}")
     lines += [f"  {sheet.status} as published: {safe(reason)}" for reason in sheet.why]
     lines += [f"  {decision(event)}" for event in version.decisions]
     if version.tags:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from pipeline.contracts.motor import agree
 from pipeline.crosscheck.registry import check_all
@@ -16,15 +15,18 @@ from pipeline.io.code_version import code_version
 from pipeline.io.publish import canonical_json, together
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
-from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.content import content_digest
+from pipeline.records.datasheet import CaptureReference, Check, Datasheet, Superseded
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
+from pipeline.records.ledger import Revocation
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
 from pipeline.stages.fleet.captures import ReadTask, usable_captures
 from pipeline.stages.fleet.fits import FitMemory
-from pipeline.stages.fleet.jobs import MotorJob, MotorResult
-from pipeline.stages.fleet.keeping import Files, Finished, note_motor
+from pipeline.stages.fleet.jobs import Files, Finished, MotorJob, MotorResult
+from pipeline.stages.fleet.keeping import libraries_version, note_motor
+from pipeline.stages.fleet.keys import key_of, superseding_parts, version_parts
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -47,28 +49,37 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
         return Finished(found, ())
     campaign = Campaign(job.motor_id, captures)
     findings.extend(agree(campaign))
+    readings = tuple(content_digest(capture) for capture in captures)
+    version = _version(job, readings)
     with watch.stage("fit"):
-        recall = None if job.key is None else FitMemory(Path(job.output), campaign, job.gates)
+        recall = None if job.key is None else FitMemory(job, readings, version)
         constants, evidence, failures = fit_all(campaign, job.fit, recall)
         if recall is not None:
             recall.save()
     findings.extend(Finding(job.motor_id, "warning", *failure) for failure in failures)
     with watch.stage("crosscheck"):
         checks = check_all(constants, campaign, job.crosscheck)
-    datasheet = assemble(job, campaign, constants, checks)
+    datasheet = superseding(
+        assemble(job, campaign, readings, version, constants, checks), job.revoked
+    )
     files = _write(job, campaign, datasheet, evidence, (*job.findings, *findings), watch)
     return Finished(tuple(findings), files)
 
 
 def assemble(
-    job: MotorJob, campaign: Campaign, constants: Constants, checks: tuple[Check, ...]
+    job: MotorJob,
+    campaign: Campaign,
+    readings: Sequence[str],
+    version: str,
+    constants: Constants,
+    checks: tuple[Check, ...],
 ) -> Datasheet:
-    """The datasheet of one motor; its version is a digest of inputs, configuration and code."""
+    """The datasheet of one motor; `readings` are the digests of its captures as read."""
     references = tuple(
         CaptureReference(
-            c.path, c.sha256, c.meta.test, c.integrity, c.meta.station, c.meta.started_at
+            c.path, c.sha256, c.meta.test, c.integrity, c.meta.station, c.meta.started_at, read
         )
-        for c in campaign.captures
+        for c, read in zip(campaign.captures, readings, strict=True)
     )
     chosen = constants.chosen()
     status, why = verdict(chosen, checks, references, job.required, job.release)
@@ -77,7 +88,7 @@ def assemble(
         motor_id=campaign.motor_id,
         motor_type=None if motor_type is None else str(motor_type),
         lot=None if lot is None else str(lot),
-        version=_version(job, campaign),
+        version=version,
         status=status,
         why=why,
         captures=references,
@@ -86,16 +97,34 @@ def assemble(
         constants=chosen,
         alternatives=constants.rest(),
         checks=checks,
+        libraries=libraries_version(),
     )
 
 
-def _version(job: MotorJob, campaign: Campaign) -> str:
-    inputs: list[dict[str, Any]] = [
-        {"path": c.path, "sha256": c.sha256, "integrity": c.integrity, "meta": asdict(c.meta)}
-        for c in campaign.captures
-    ]
-    work = {"inputs": inputs, "config": job.config_sha256, "code": code_version()}
-    return hashlib.sha256(canonical_json(work)).hexdigest()
+def _version(job: MotorJob, readings: Sequence[str]) -> str:
+    """Digest of the captures as read, the configuration, the code and its libraries."""
+    return key_of(
+        version_parts(
+            code_version(), libraries_version(), [job.motor_id, *readings], job.config_sha256
+        )
+    )
+
+
+def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
+    """The datasheet, as another version where its own is revoked and has other content.
+
+    Where the revoked version holds these very bytes, it was not them that were doubted alone: they
+    stay that version, and stay revoked.
+    """
+    known = {revocation.version: revocation for revocation in revoked}
+    while (old := known.get(sheet.version)) is not None:
+        content = canonical_json(sheet.document())
+        if hashlib.sha256(content).hexdigest() == old.content_sha256:
+            return sheet
+        place = Superseded(old.version, old.by, old.why)
+        version = key_of(superseding_parts(sheet.version, place))
+        sheet = replace(sheet, version=version, supersedes=place)
+    return sheet
 
 
 def _write(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -19,13 +21,15 @@ from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.ledger import Event, Revocation
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.report.progress import progress
 from pipeline.settings import RunSettings, configuration_folder, result_document
 from pipeline.stages.fleet.crew import Crew
 from pipeline.stages.fleet.jobs import MotorJob, MotorResult
-from pipeline.stages.fleet.keeping import Batch, Keeping, digest_of, tools_version
+from pipeline.stages.fleet.keeping import Batch, Keeping, tools_version
+from pipeline.stages.fleet.keys import batch_parts, key_of, motor_parts
 from pipeline.stages.fleet.looking import look_with
 from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
 from pipeline.stages.fleet.publishing import (
@@ -40,6 +44,7 @@ from pipeline.stages.options import check_options
 CRUMBS = ".work"
 COMMITTED = 50
 """Datasheets in a commit of the registry, at most."""
+Revocations = Mapping[str, tuple[Revocation, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,10 +89,12 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
     with watch.stage("survey"):
         ask = partial(_answers, settings, sources, crew, keeping)
         found = survey(folder, sources, ask, recover=settings.recover)
-    jobs = _jobs(settings, found, limits)
-    batch = _batch_key(settings, jobs, found)
+    plain = _jobs(settings, found, limits)
+    batch = _batch_key(settings, plain, found, registry)
     if (same := _same_again(settings, registry, keeping, batch)) is not None:
         return replace(same, timings=watch.table())
+    revoked = _revocations(registry)
+    jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
         results, died = _process(settings, jobs, crew, keeping)
     findings = tuple(
@@ -99,7 +106,8 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
         outcome = outcome_of(datasheets, findings, found, report=settings.report)
     with watch.stage("registry"):
         registered = _register(registry, output, results)
-    if not died and registered.code == 0:
+    batch = _batch_key(settings, plain, found, registry)
+    if not died and registered.code == 0 and _revocations(registry) == revoked:
         made = (file for result in results for file in result.finished.files)
         digests = [sha256 for name, sha256 in made if name.startswith("datasheets/")]
         contents = tuple(
@@ -154,13 +162,20 @@ def _register(
         except MachineError as error:
             return Registered(error.exit_code, errors=(*errors, f"error: {error}"))
         added, known = added + len(receipt.added), known + len(receipt.known)
-        errors += tuple(
-            f"error: motor {printable(event.motor_id)}: version {event.version[:12]} is registered "
-            "with other content; the same work gave other bytes, so the registered one stays"
-            for event in receipt.conflicts
-        )
+        errors += tuple(_conflict(event, registry.place) for event in receipt.conflicts)
     text = f"registry {registry.place}: {added} new, {known} known"
     return Registered(1 if errors else 0, text, errors)
+
+
+def _conflict(event: Event, place: str) -> str:
+    """The error line of a version that is registered with other content, with what to do."""
+    motor, version = printable(event.motor_id), event.version[:12]
+    return (
+        f"error: motor {motor}: version {version} is registered with other content; the same work "
+        "gave other bytes, so the registered one stays; if that one is wrong, "
+        f"`registry revoke {shlex.quote(motor)} version={version} by=NAME why=REASON "
+        f"registry={shlex.quote(place)}` and run again: the new bytes become a version of their own"
+    )
 
 
 def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:
@@ -178,12 +193,12 @@ def _answers(
 ) -> list[Answer]:
     """The survey's answers: those that are known, and those of the crew for the others."""
     folder = Path(settings.input)
-    answers = keeping.known_answers(questions, sources, settings.recover)
+    limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
+    answers = keeping.known_answers(questions, sources, limits, recover=settings.recover)
     for number, question in enumerate(questions):
         if number not in answers and (answer := settled(folder, question, sources)) is not None:
             answers[number] = answer
     open_ = [number for number in range(len(questions)) if number not in answers]
-    limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     asked = [questions[number] for number in open_]
     found = look_with(crew, folder, sources, limits, asked, recover=settings.recover)
     answers.update(zip(open_, found, strict=True))
@@ -219,30 +234,34 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
         )
         for motor_id, own in sorted(motors.items())
     ]
-    return [replace(job, key=_key(job)) for job in jobs] if settings.cache else jobs
+    return [_keyed(job) for job in jobs] if settings.cache else jobs
 
 
-def _key(job: MotorJob) -> str:
-    """Digest of all that the files of a motor are made from."""
-    return digest_of(
-        tools_version(),
-        job.motor_id,
-        [[e.path, e.sha256, e.form, repr(e.source), e.metadata, e.recovered] for e in job.entries],
-        job.config_sha256,
-        [job.report, job.recordings],
-        [finding.document() for finding in job.findings],
-    )
+def _keyed(job: MotorJob) -> MotorJob:
+    return replace(job, key=key_of(motor_parts(tools_version(), job)))
 
 
-def _batch_key(settings: RunSettings, jobs: Sequence[MotorJob], found: Survey) -> str:
+def _batch_key(
+    settings: RunSettings, jobs: Sequence[MotorJob], found: Survey, registry: Registry | None
+) -> str:
     """Digest of all that the outcome of a batch is made from, but for where it lies."""
-    return digest_of(
-        tools_version(),
-        [job.key for job in jobs],
-        [finding.document() for finding in found.findings],
-        found.note,
-        [settings.report, settings.recordings],
-    )
+    commit = None if registry is None else registry.last_commit()
+    keys = [job.key for job in jobs]
+    return key_of(batch_parts(tools_version(), settings, keys, found, commit))
+
+
+def _revocations(registry: Registry | None) -> Revocations:
+    """What is revoked, by motor; nothing where the registry cannot say: publishing tells why."""
+    if registry is not None:
+        with suppress(MachineError):
+            return registry.revocations()
+    return {}
+
+
+def _with_revoked(jobs: Sequence[MotorJob], revoked: Revocations) -> list[MotorJob]:
+    """The jobs with the revoked versions of their motors, which count as a part of the work."""
+    knowing = (replace(job, revoked=revoked.get(job.motor_id, ())) for job in jobs)
+    return [job if job.key is None or not job.revoked else _keyed(job) for job in knowing]
 
 
 def _same_again(

@@ -1,9 +1,10 @@
 """Fits of one motor that need not be done again while nothing that they were made from changes.
 
 A fit hangs on the source of the estimator's file and all that it imports, on its options, on the
-captures as they were read and judged, and on the constants that the estimator declares to use. So a
-changed estimator is fitted again with those that use what it gives, if that has changed, and no
-other.
+captures as they were read and judged (every number, name, mask and word of metadata), and on the
+constants that the estimator declares to use. So a changed estimator is fitted again with those that
+use what it gives, if that has changed, and no other. Whatever changes what is read (a unit in a
+source map, a sidecar, a gate's limit) changes the captures, and so the fits.
 """
 
 from __future__ import annotations
@@ -21,34 +22,34 @@ from numpy.typing import NDArray
 
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.registry import homes
-from pipeline.io.code_version import closure_digest, rooms_digest
+from pipeline.io.code_version import closure_digest
 from pipeline.io.publish import write_whole
-from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.errors import PipelineError
 from pipeline.records.estimate import Estimate, Order
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.naming import file_stem
 from pipeline.records.uncertainty import Contribution
-from pipeline.stages.fleet.keeping import FOLDER, digest_of, libraries_version
+from pipeline.stages.fleet.jobs import MotorJob
+from pipeline.stages.fleet.keeping import FOLDER, libraries_version
+from pipeline.stages.fleet.keys import fit_parts, key_of
 
-READING = ("io", "contracts", "records", "physics", "numerics")
 _MAX_BYTES = 2**30
 
 
 class FitMemory:
     """The fits of one motor, kept in one file."""
 
-    def __init__(self, output: Path, campaign: Campaign, gates: Mapping[str, Any]) -> None:
-        self._path = output / FOLDER / "fits" / f"{file_stem(campaign.motor_id)}.fits"
+    def __init__(self, job: MotorJob, readings: Sequence[str], version: str) -> None:
+        """`readings` are digests of the motor's captures as read; `version` is to be made of the
+        fits: where it was revoked, what is kept from before is doubted with it.
+        """
+        self._path = Path(job.output) / FOLDER / "fits" / f"{file_stem(job.motor_id)}.fits"
         self._kept = _load(self._path)
         self._homes = homes()
         self._used: dict[str, tuple[str, bytes, bytes]] = {}
-        inputs = [
-            [c.path, c.sha256, c.integrity, asdict(c.meta), [m.dropped for m in c.masks]]
-            for c in campaign.captures
-        ]
-        self._campaign = digest_of(libraries_version(), rooms_digest(READING), gates, inputs)
+        self._campaign = [job.motor_id, *readings]
+        self._doubt = [revoked for revoked in job.revoked if revoked.version == version]
 
     def __call__(
         self,
@@ -58,9 +59,17 @@ class FitMemory:
         fit: Callable[[], Fit],
     ) -> Fit:
         """The fit that is kept, or a new one."""
-        uses = [repr(estimate) for estimate in known.estimates]
         code = closure_digest(self._homes.get(estimator.name, estimator.fit.__module__))
-        key = digest_of(self._campaign, code, dict(options), uses)
+        key = key_of(
+            fit_parts(
+                code,
+                libraries_version(),
+                self._campaign,
+                options,
+                known.estimates,
+                self._doubt,
+            )
+        )
         kept = self._kept.get(estimator.name)
         if kept is not None and kept[0] == key:
             self._used[estimator.name] = kept

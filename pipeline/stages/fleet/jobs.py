@@ -8,8 +8,19 @@ from dataclasses import dataclass, field, replace
 from pipeline.io.guard import ReadLimits
 from pipeline.io.survey import Entry
 from pipeline.records.finding import Finding
+from pipeline.records.ledger import Revocation
 from pipeline.records.naming import printable
-from pipeline.stages.fleet.keeping import Finished
+
+Files = tuple[tuple[str, str], ...]
+"""Names relative to the output folder, each with its sha256."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A motor that is done: its findings and its files."""
+
+    findings: tuple[Finding, ...]
+    files: Files
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +28,8 @@ class MotorJob:
     """Everything a worker needs for one motor; plain data, so that it crosses a process.
 
     `key` is the digest of the work, None where it is not to be noted as done; `refused` are files
-    that must not be read, with the reason.
+    that must not be read, with the reason. `revoked` are the motor's revoked versions: one of this
+    work with other content is superseded.
     """
 
     motor_id: str
@@ -34,6 +46,7 @@ class MotorJob:
     crosscheck: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     limits: ReadLimits = field(default_factory=ReadLimits)
+    revoked: tuple[Revocation, ...] = ()
     key: str | None = None
     refused: tuple[tuple[str, str], ...] = ()
 

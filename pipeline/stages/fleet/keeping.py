@@ -12,24 +12,24 @@ import importlib.metadata
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from pipeline.io.code_version import code_version
+from pipeline.io.guard import ReadLimits
 from pipeline.io.identity import Identities, Identity, identity, notes_folder
-from pipeline.io.publish import canonical_json
 from pipeline.io.sealed import keep_sealed, read_sealed
 from pipeline.io.source_map import SourceMap
 from pipeline.io.survey import Answer, Entry, Question
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
+from pipeline.stages.fleet.jobs import Files, Finished
+from pipeline.stages.fleet.keys import answer_parts, key_of
 
 FOLDER = ".cache"
 LIBRARIES = ("numpy", "scipy", "polars", "pandera", "numba", "rerun-sdk", "deltalake", "zstandard")
-Files = tuple[tuple[str, str], ...]
-"""Names relative to the output folder, each with its sha256."""
 
 
 @cache
@@ -44,22 +44,9 @@ def tools_version() -> str:
     return f"{code_version()}; {libraries_version()}"
 
 
-def digest_of(*parts: Any) -> str:
-    """sha256 of plain data."""
-    return hashlib.sha256(canonical_json(parts)).hexdigest()
-
-
 def motor_note(output: Path, motor_id: str) -> Path:
     """Where it is noted that a motor is finished."""
     return output / FOLDER / "motors" / f"{file_stem(motor_id)}.json"
-
-
-@dataclass(frozen=True, slots=True)
-class Finished:
-    """A motor that is done: its findings and its files."""
-
-    findings: tuple[Finding, ...]
-    files: Files
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +85,18 @@ class Keeping:
         self._before: dict[str, Identity | None] = {}
 
     def known_answers(
-        self, questions: Sequence[Question], sources: Mapping[str, SourceMap], recover: bool
+        self,
+        questions: Sequence[Question],
+        sources: Mapping[str, SourceMap],
+        limits: ReadLimits,
+        *,
+        recover: bool,
     ) -> dict[int, Answer]:
         """Answers by the number of the question, for files that have not changed."""
         said = (read_sealed(self._notes / "survey.json") if self.on else None) or {}
-        self._context = digest_of(tools_version(), repr(sorted(sources.items())), recover)
+        self._context = partial(
+            answer_parts, tools_version(), sources=sources, limits=limits, recover=recover
+        )
         known = {}
         for number, question in enumerate(questions):
             self._before[question.path] = identity(self._folder / question.path)
@@ -134,7 +128,7 @@ class Keeping:
                 beside = hashlib.sha256((self._folder / question.sidecar).read_bytes()).hexdigest()
             except OSError:
                 beside = ""
-        return digest_of(self._context, question.path, sha256, beside, question.listed)
+        return key_of(self._context(question, sha256, beside))
 
     def finished(self, motor_id: str, key: str) -> Finished | None:
         """A motor of this key whose files are whole, or None."""

@@ -20,8 +20,7 @@ from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import COLUMNS, nothing_usable, summary
 from pipeline.report.words import KEY_CONSTANTS
 from pipeline.settings import RunSettings
-from pipeline.stages.fleet.jobs import MotorResult
-from pipeline.stages.fleet.keeping import Files
+from pipeline.stages.fleet.jobs import Files, MotorResult
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"

@@ -245,12 +245,29 @@ def test_what_no_approval_heals(registry: Registry) -> None:
     before = registry.events()
     with pytest.raises(UsageError, match="kt_vs_ke failed"):
         decide(registry, "approve", 1)
-    with pytest.raises(UsageError, match="refused"):
-        decide(registry, "revoke", 1)
     with pytest.raises(UsageError, match=r"not ready for approval: unverified: x\.csv"):
         decide(registry, "approve", 2)
     assert registry.events() == before
     assert decide(registry, "revoke", 2) == "revoked"
+    assert decide(registry, "revoke", 1) == "revoked"
+    with pytest.raises(UsageError, match="kt_vs_ke failed"):
+        decide(registry, "approve", 1)
+
+
+def test_revocations_are_those_in_force_with_their_first_reason(registry: Registry) -> None:
+    assert registry.revocations() == {}
+    registry.publish([document("a", 1), document("a", 2), document("b", 1)], NOON)
+    assert registry.revocations() == {}
+    decide(registry, "revoke", 2)
+    wanted = Selection(motor_id="a", revision=2)
+    registry.decide("revoke", wanted, "B", "said again", NOON + HOUR)
+    ((motor, (found,)),) = registry.revocations().items()
+    own = registry.history("a")[1].published
+    first = registry.history("a")[1].decisions[0]
+    assert (motor, found.version, found.content_sha256) == ("a", own.version, own.content_sha256)
+    assert (found.by, found.why) == (first.by, first.why)
+    decide(registry, "approve", 2)
+    assert registry.revocations() == {}
 
 
 def test_a_decision_needs_exactly_one_version(registry: Registry, tmp_path: Path) -> None:

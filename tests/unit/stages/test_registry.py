@@ -98,6 +98,17 @@ def test_approve_revoke_and_at(place: str, capsys: pytest.CaptureFixture[str]) -
     assert "1 motor, 0 with" in again
 
 
+def test_a_refused_version_may_be_revoked_and_is_never_released(
+    place: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Wrong bytes may be refused ones; revoked, they make way for the right ones."""
+    decision = [SERIAL, "revision=3", "by=A. Smith", "why=wrong unit"]
+    code, out, _ = told(capsys, place, "revoke", *decision)
+    assert (code, "revision 3 is revoked: revoked by A. Smith" in out) == (0, True)
+    code, _, err = told(capsys, place, "approve", *decision)
+    assert (code, "is refused: check kt_vs_ke" in err) == (2, True)
+
+
 def test_verify(place: str, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = told(capsys, place, "verify")
     assert (code, err) == (0, "")
@@ -136,7 +147,6 @@ def test_verify(place: str, capsys: pytest.CaptureFixture[str]) -> None:
         (["approve", "00123", "revision=1", "by=A", "why= "], "why= is missing"),
         (["approve", "00123", "revision=9", "by=A", "why=B"], "revision 9"),
         (["approve", SERIAL, "revision=3", "by=A", "why=B"], "is refused: check kt_vs_ke"),
-        (["revoke", SERIAL, "revision=3", "by=A", "why=B"], "is refused"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_2(
