@@ -27,6 +27,7 @@ REAL = {
     "u_rel_voltage",
     "u_rel_torque",
     "u_temp_degc",
+    "u_rel_clock",
 }
 IGNORED = {"contract"}
 

@@ -20,6 +20,9 @@ Complex = NDArray[np.complex128]
 
 SCALES = ("current_a", "voltage_v", "speed_rad_s", "freq_hz", "torque_nm", "period_s", "flux_wb")
 """What `Machine.scales` holds, and a parameter's `scale` may name."""
+RECORDERS = ("log", "open", "shaft", "step")
+"""What a bench may record on clocks of their own: logs under load, open windings, a shaft alone
+(coasts and slow turns), steps of a locked rotor."""
 
 SAMPLED = (
     "id_a",
@@ -290,6 +293,7 @@ AngleHook = Callable[[Operating, Values], Array]
 CurrentHook = Callable[[Recorded, Values], Complex]
 LoadHook = Callable[[Recorded, Values], Array]
 VoltageHook = Callable[[Complex, Operating, Values, str], Complex]
+ClockHook = Callable[[str, Values], float]
 CloserHook = Callable[[Sequence[Whole], Values], Told | None]
 
 
@@ -308,6 +312,7 @@ class Effect:
     speed(ω, q, T): a drive's own recorded speed from the true one [rad/s], T the sample period.
     voltage(v, x, q, instrument): recorded voltage from the true one [V].
     shaft(t, q): recorded shaft torque from the true one [N·m].
+    clock(recorder, q): recorded time over true time, less one [1], of a `RECORDERS` name.
 
     closer(wholes, q): which of the effects that share this very function it was, from whole logs;
         None where these do not tell. For effects whose equations differ in what windows smooth.
@@ -337,6 +342,7 @@ class Effect:
     voltage: VoltageHook | None = None
     shaft: Callable[[Array, Values], Array] | None = None
     speed: Callable[[Array, Values, float], Array] | None = None
+    clock: ClockHook | None = None
     closer: CloserHook | None = None
     left_out: tuple[int, ...] = ()
 

@@ -25,7 +25,7 @@ _VOLTAGES = (
 class Hearing:
     """The `constants` of the base that are in the equations of a kind of segment; of effects, the
     `hooks` (`flux`, `drop`, `torque`), and the sensors whose errors are (`angle`, `current`,
-    `voltage`, `load`).
+    `voltage`, `load`, `clock`).
     """
 
     constants: tuple[str, ...]
@@ -41,13 +41,13 @@ HEARS: Mapping[Kind, Hearing] = {
     "dq": _hears(
         (*_VOLTAGES, "psi_wb", "j_kgm2", "b_nm_s_rad"),
         "flux drop torque",
-        "angle current voltage load",
+        "angle current voltage load clock",
     ),
-    "q": _hears(("r_ohm", "lq_h", "psi_wb"), "flux drop", "angle current voltage"),
-    "shaft": _hears(("j_kgm2", "b_nm_s_rad"), "torque", "angle load"),
-    "motion": _hears(("psi_wb", "j_kgm2", "b_nm_s_rad"), "flux torque", "angle current"),
-    "open": _hears(("psi_wb", "bench_angle_rad"), "flux", "angle voltage"),
-    "terminal": _hears(("r_ohm", "ld_h", "lq_h"), "flux drop", "current voltage"),
+    "q": _hears(("r_ohm", "lq_h", "psi_wb"), "flux drop", "angle current voltage clock"),
+    "shaft": _hears(("j_kgm2", "b_nm_s_rad"), "torque", "angle load clock"),
+    "motion": _hears(("psi_wb", "j_kgm2", "b_nm_s_rad"), "flux torque", "angle current clock"),
+    "open": _hears(("psi_wb", "bench_angle_rad"), "flux", "angle voltage clock"),
+    "terminal": _hears(("r_ohm", "ld_h", "lq_h"), "flux drop", "current voltage clock"),
     "flux_map": _hears(("ld_h", "lq_h", "psi_wb"), "flux", "current voltage"),
     "steady": _hears(("r_ohm", "ld_h", "psi_wb"), "flux drop", "current voltage"),
     "standing": _hears(("psi_wb",), "flux torque", "current"),
@@ -80,5 +80,6 @@ def _sensors_of(effect: Effect) -> tuple[str, ...]:
         "current": (effect.current,),
         "voltage": (effect.voltage,),
         "load": (effect.load, effect.shaft),
+        "clock": (effect.clock,),
     }
     return tuple(name for name, any_of in hooks.items() if any(h is not None for h in any_of))

@@ -20,6 +20,7 @@ from pipeline.criticism.model import (
     GAINS,
     Model,
     Pieces,
+    clock_gain,
     effect_flux,
     evaluate,
     mean_current,
@@ -28,7 +29,7 @@ from pipeline.criticism.model import (
 )
 from pipeline.criticism.operate import operate
 from pipeline.criticism.residuals import RIPPLES, TORQUE_RIPPLES, measured, predicted, residual
-from pipeline.criticism.segment import Segment, projected, row_index
+from pipeline.criticism.segment import RECORDER, Segment, projected, row_index
 
 _CHUNK = 8
 """Columns that are projected at a time: more leave the processor's cache (of 32 a linearisation
@@ -150,6 +151,8 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
+_SLOWER = 1e-4
+"""Gain of the clock that its finite difference steps by: straight to 1e-4."""
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
@@ -162,6 +165,7 @@ class _Sampler:
         self.x = operate(segment, segment.recorded, model, values)
         pieces = self.pieces = evaluate(model, self.x, values)
         self.own: dict[str, Pieces] = {}
+        self.paced: Array | None = None
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         self.here = measured(segment, segment.recorded, model, values) - self.start
@@ -206,10 +210,13 @@ class _Sampler:
             "gain_lcr": self.segment.kind == "lcr",
             "gain_current": hears_sensor(self.segment, "current"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
+            "gain_clock": hears_sensor(self.segment, "clock"),
             self.segment.meter: hears_sensor(self.segment, "voltage"),
         }
         if not heard.get(column.name, False):
             return None
+        if column.name == "gain_clock":
+            return self._along_time()
         moved = {**self.values, column.name: self.values[column.name] + column.step}
         if column.name in ("gain_current", "offset_temp_k"):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
@@ -221,8 +228,19 @@ class _Sampler:
         model = self.model if inside else self.model.with_effects(effect)
         start = self._start(column, effect)
         moved = {**start, column.name: start[column.name] + column.step}
+        if effect.clock is not None:
+            recorder = RECORDER.get(self.segment.kind)
+            gains = [clock_gain(recorder, model, values) for values in (start, moved)]
+            return self._along_time() * (gains[1] - gains[0]) / column.step
         change: Array = (self._there(effect, model, moved) - self.here) / column.step
         return change if np.any(change) else None
+
+    def _along_time(self) -> Array:
+        """d(residual)/d(gain of the clock) [C, n], once for all that turn on it."""
+        if self.paced is None:
+            moved = {**self.values, "gain_clock": self.values["gain_clock"] + _SLOWER}
+            self.paced = (residual(self.segment, self.model, moved) - self.here) / _SLOWER
+        return self.paced
 
     def _there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the

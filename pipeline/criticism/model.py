@@ -69,6 +69,7 @@ BASE: tuple[Constant, ...] = (
     Constant("gain_commanded", "1", "gain of a drive's own voltage", 0.01, hook="gain"),
     Constant("gain_torque", "1", "gain of the torque transducer", 0.01, hook="gain"),
     Constant("gain_lcr", "1", "gain of the LCR meter", 0.01, hook="gain"),
+    Constant("gain_clock", "1", "recorded time over true time, less one", 1e-4, hook="gain"),
     Constant("offset_temp_k", "K", "offset of the thermometers", 2.0, hook="gain"),
 )
 GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
@@ -113,6 +114,18 @@ def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, flo
     if not effect.left_out:
         return found
     return {p.name: 0.0 for p in effect.every(machine)} | found
+
+
+def clock_gain(recorder: str | None, model: Model, values: Values) -> float:
+    """Recorded time over true time, less one [1], of one of the `RECORDERS`; 0 of a table."""
+    if recorder is None:
+        return 0.0
+    gains = [
+        effect.clock(recorder, values_of(effect, model.machine, values))
+        for effect in model.effects
+        if effect.clock is not None
+    ]
+    return values["gain_clock"] + sum(gains)
 
 
 @dataclass(slots=True)

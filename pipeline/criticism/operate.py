@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Complex, Machine, Operating, Recorded, Values
-from pipeline.criticism.model import Model, values_of
-from pipeline.criticism.segment import Segment, slow_orders
+from pipeline.criticism.model import Model, clock_gain, values_of
+from pipeline.criticism.segment import RECORDER, Segment, slow_orders
 from pipeline.criticism.traces import smoothed
 
 _SPEED_S = 0.002
@@ -31,10 +31,17 @@ _CRAWL = 1e-9
 """Speed [rad/s] of a held rotor that creeps: it has a sense and nothing else."""
 
 
+def on_true_clock(segment: Segment, model: Model, values: Values) -> Segment:
+    """The segment with its true sample period in place of the recorded one."""
+    gain = clock_gain(RECORDER.get(segment.kind), model, values)
+    return replace(segment, ts_s=segment.ts_s / (1.0 + gain)) if gain else segment
+
+
 def operate(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
     """True currents, angle and speed [n] of a segment, the sensor effects taken out."""
+    segment = on_true_clock(segment, model, values)
     if segment.kind in ("terminal", "lcr", "flux_map"):
         return _operate_still(segment, signals, model, values)
     if segment.kind in ("steady", "standing"):

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import (
+    RECORDERS,
     SAMPLED,
     SCALES,
     Effect,
@@ -38,6 +39,7 @@ _HOOKS = (
     "voltage",
     "shaft",
     "speed",
+    "clock",
 )
 _OF_RECORDED = ("i_a", "torque_nm", "eps_rad", "omega_e_rad_s")
 _MEND = "correct the file"
@@ -187,6 +189,7 @@ def _try(effect: Effect, path: Path) -> None:
         _ask(getattr(effect, name), (*given, q), q, path)
     _ask(effect.speed, (line, q, x.ts_s), q, path)
     _ask(effect.voltage, (line + 0j, x, q, "drive"), q, path)
+    _ask(effect.clock, (RECORDERS[0], q), q, path)
 
 
 def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Path) -> None:

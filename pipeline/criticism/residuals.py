@@ -14,9 +14,17 @@ from typing import Any
 import numpy as np
 
 from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Values
-from pipeline.criticism.model import Model, Pieces, air_gap_torque, evaluate, ripple, values_of
-from pipeline.criticism.operate import angle_error, current_slope, operate
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.model import (
+    Model,
+    Pieces,
+    air_gap_torque,
+    clock_gain,
+    evaluate,
+    ripple,
+    values_of,
+)
+from pipeline.criticism.operate import angle_error, current_slope, on_true_clock, operate
+from pipeline.criticism.segment import RECORDER, Segment
 from pipeline.criticism.traces import LINES_V
 from pipeline.numerics.projection import Projection
 from pipeline.physics.frames import vector_of_lines
@@ -85,6 +93,7 @@ def _open_voltage(signals: Mapping[str, Array], model: Model, values: Values) ->
 def _true_load(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Array:
+    segment = on_true_clock(segment, model, values)
     hooks = [e for e in model.effects if e.load is not None]
     torque = signals["torque_shaft_nm"]
     if not hooks:
@@ -110,6 +119,7 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """Predicted signals [C, n] of the channels from the pieces the hooks gave."""
+    segment = on_true_clock(segment, model, values)
     if segment.kind == "lcr":
         return _predict_lcr(segment, x, model, values)
     if segment.kind == "flux_map":
@@ -157,7 +167,9 @@ def _shaft_torque(
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
     if over_inertia(segment, segment.channels[-1]):
         # in the angle sensor's units: a torque's noise floor would shrink with the inertia
-        return shaft / values["j_kgm2"] - acceleration
+        # and by the recorded clock: a gain must not win by making its residual small
+        stretch = 1.0 + clock_gain(RECORDER.get(segment.kind), model, values)
+        return (shaft / values["j_kgm2"] - acceleration) / stretch**2
     shaft = shaft - values["j_kgm2"] * acceleration
     if segment.channels[-1] == "torque_shaft_nm":
         for effect in model.effects:

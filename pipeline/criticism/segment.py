@@ -20,6 +20,15 @@ Kind = Literal[
 ]
 PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 """Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
+RECORDER: Mapping[Kind, str] = {
+    "dq": "log",
+    "q": "log",
+    "motion": "log",
+    "open": "open",
+    "shaft": "shaft",
+    "terminal": "step",
+}
+"""Whose clock the equations of a kind of segment go by (`effect.RECORDERS`); tables go by none."""
 _REFERENCE_DEGC = 25.0
 
 

@@ -114,6 +114,7 @@ def stated_u(campaign: Campaign) -> dict[str, float]:
             ("gain_torque", meta.u_rel_torque),
             ("offset_temp_k", meta.u_temp_degc),
             ("gain_lcr", _u_lcr(meta)),
+            ("gain_clock", meta.u_rel_clock),
         ):
             if u:
                 found[name] = max(found.get(name, 0.0), u)

@@ -150,6 +150,8 @@ def _metadata() -> Iterable[Term]:
         yield number(f"u_rel_{gain}", "1", words, 0, 1)
     words = "standard uncertainty of the temperatures; 2 where not stated"
     yield number("u_temp_degc", "degC", words, 0, 100)
+    words = "relative standard uncertainty of the time base of t_s; 1e-4 where not stated"
+    yield number("u_rel_clock", "1", words, 0, 1)
     yield text("sha256_rows", "HEX/ROWS over the rows of a CSV")
 
 

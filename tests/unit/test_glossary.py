@@ -45,6 +45,9 @@ ambient_degc pair theta_elec_deg voltage_kind voltage_timing pwm_hz vdc_v u_rel_
 u_rel_voltage u_rel_torque u_temp_degc sha256_rows
 """)
 
+OWN_METADATA = _words("u_rel_clock")
+"""Keys that the contract keeps as others, and this project reads."""
+
 CONTRACT_TESTS = _words("""
 resistance current_step lcr open_circuit hand_turn cogging torque_map spin_down heat_run
 holding_current flux_map drive
@@ -89,7 +92,7 @@ ALL = [*COLUMNS.values(), *CONSTANTS.values(), *METADATA.values()]
     [
         (COLUMNS, CONTRACT_COLUMNS),
         (CONSTANTS, CONTRACT_CONSTANTS),
-        (METADATA, CONTRACT_METADATA),
+        (METADATA, CONTRACT_METADATA + OWN_METADATA),
         (TESTS, CONTRACT_TESTS),
     ],
     ids=["columns", "constants", "metadata", "tests"],

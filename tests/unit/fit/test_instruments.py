@@ -30,6 +30,7 @@ def test_both_rooms_take_the_same_for_an_instrument_that_states_nothing() -> Non
     assert priors["gain_voltage"] == priors["gain_commanded"] == UNSTATED_U["u_rel_voltage"]
     assert priors["gain_torque"] == UNSTATED_U["u_rel_torque"]
     assert priors["offset_temp_k"] == UNSTATED_U["u_temp_degc"]
+    assert priors["gain_clock"] == UNSTATED_U["u_rel_clock"]
 
 
 def test_what_one_capture_of_a_station_states_holds_for_all() -> None:
