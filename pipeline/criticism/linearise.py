@@ -151,8 +151,6 @@ def _restore(rows: Array, unknown: Sequence[Array]) -> None:
 
 _FINE = 1e-3
 """Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
-_SLOWER = 1e-4
-"""Gain of the clock that its finite difference steps by: straight to 1e-4."""
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
@@ -165,7 +163,7 @@ class _Sampler:
         self.x = operate(segment, segment.recorded, model, values)
         pieces = self.pieces = evaluate(model, self.x, values)
         self.own: dict[str, Pieces] = {}
-        self.paced: Array | None = None
+        self.paced: dict[float, Array] = {}
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
         self.here = measured(segment, segment.recorded, model, values) - self.start
@@ -216,7 +214,7 @@ class _Sampler:
         if not heard.get(column.name, False):
             return None
         if column.name == "gain_clock":
-            return self._along_time()
+            return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
         if column.name in ("gain_current", "offset_temp_k"):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
@@ -231,16 +229,16 @@ class _Sampler:
         if effect.clock is not None:
             recorder = RECORDER.get(self.segment.kind)
             gains = [clock_gain(recorder, model, values) for values in (start, moved)]
-            return self._along_time() * (gains[1] - gains[0]) / column.step
+            return self._along_time(column.step) * (gains[1] - gains[0]) / column.step
         change: Array = (self._there(effect, model, moved) - self.here) / column.step
         return change if np.any(change) else None
 
-    def _along_time(self) -> Array:
-        """d(residual)/d(gain of the clock) [C, n], once for all that turn on it."""
-        if self.paced is None:
-            moved = {**self.values, "gain_clock": self.values["gain_clock"] + _SLOWER}
-            self.paced = (residual(self.segment, self.model, moved) - self.here) / _SLOWER
-        return self.paced
+    def _along_time(self, step: float) -> Array:
+        """d(residual)/d(gain of the clock) [C, n], once for all candidates that turn on it."""
+        if step not in self.paced:
+            moved = {**self.values, "gain_clock": self.values["gain_clock"] + step}
+            self.paced[step] = (residual(self.segment, self.model, moved) - self.here) / step
+        return self.paced[step]
 
     def _there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
