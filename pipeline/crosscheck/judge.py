@@ -4,27 +4,52 @@ A deviation passes up to `allowance + 2 u`, is marginal up to `allowance + 3 u` 
 The allowance is what the comparison itself cannot promise (a small-signal inductance against a
 step, say); u is the standard uncertainty of the ratio with shared gains cancelled. Where 2 u
 exceeds `resolution` times the allowance a pass would mean nothing and the check is not evaluated.
+A suspect is named only where the ratio's coverage interval holds its number: no allowance widens
+that interval, for a number outside it is not what was measured.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from pipeline.physics.conventions import MOST_SUSPECTS, convention_suspect, conventions_hit
+from pipeline.physics.suspects import (
+    MOST_SUSPECTS,
+    Quantity,
+    convention_suspect,
+    conventions_hit,
+)
 from pipeline.records.datasheet import Check, CheckStatus
 from pipeline.records.estimate import Estimate
-from pipeline.records.uncertainty import Budget, propagate, standard_uncertainty
+from pipeline.records.uncertainty import (
+    Budget,
+    coverage_factor,
+    effective_dof,
+    propagate,
+    standard_uncertainty,
+)
 
 RESOLUTION = 5.0
 
 
-def ratio_of(top: Estimate, bottom: Estimate) -> tuple[float, float]:
-    """The ratio of two estimates and its standard uncertainty, correlations included."""
+class Ratio(NamedTuple):
+    """A ratio of two like quantities [1], its standard uncertainty and degrees of freedom."""
+
+    value: float
+    u: float
+    dof: float = math.inf
+
+    @classmethod
+    def of(cls, value: float, budget: Budget) -> Ratio:
+        """The ratio whose uncertainty is this budget [1]."""
+        return cls(value, standard_uncertainty(budget), effective_dof(budget))
+
+
+def ratio_of(top: Estimate, bottom: Estimate) -> Ratio:
+    """The ratio of two estimates, correlations included."""
     ratio = top.number / bottom.number
-    budget: Budget = propagate(
-        [(1.0 / bottom.number, top.budget), (-ratio / bottom.number, bottom.budget)]
-    )
-    return ratio, standard_uncertainty(budget)
+    terms = [(1.0 / bottom.number, top.budget), (-ratio / bottom.number, bottom.budget)]
+    return Ratio.of(ratio, propagate(terms))
 
 
 def judge_deviation(deviation: float, u: float, allowance: float) -> CheckStatus:
@@ -40,28 +65,50 @@ def judge_deviation(deviation: float, u: float, allowance: float) -> CheckStatus
 
 def judge_ratio(
     name: str,
-    ratio: float,
-    u: float,
+    ratio: Ratio,
     allowance: float,
     meaning: str,
+    quantity: Quantity,
     pole_pairs: int | None = None,
     otherwise: str | None = None,
 ) -> Check:
     """A check of a ratio that is 1 when all is well.
 
-    `value` is the ratio, `limit` the largest deviation from 1 that passes. On anything but a
-    pass, `suspect` names the convention whose number the ratio lands on, else `otherwise`; nothing
-    where the ratio is so uncertain that it lands on many.
+    Parameters
+    ----------
+    name
+        Of the check.
+    ratio
+        What was measured [1].
+    allowance
+        What the comparison cannot promise [1].
+    meaning
+        What the ratio is of, in words; the interval is appended, with its coverage factor.
+    quantity
+        What the ratio is of, for the conventions that can enter it.
+    pole_pairs
+        Of the machine, where counted.
+    otherwise
+        The suspect where no convention's number lies in the coverage interval.
+
+    Returns
+    -------
+    `value` is the ratio, `limit` the largest deviation from 1 that passes. `suspect` is set on
+    anything but a pass; None where the ratio is so uncertain that it lands on many conventions.
+
     """
-    status = judge_deviation(ratio - 1.0, u, allowance)
-    words = f"{meaning}; {ratio:.4f} ± {2.0 * u:.4f} (k=2), expected 1 within the limit"
+    value, u, dof = ratio
+    status = judge_deviation(value - 1.0, u, allowance)
+    k = coverage_factor(dof)
+    words = f"{meaning}; {value:.4f} ± {k * u:.4f} (k={k:.3g}), expected 1 within the limit"
     suspect = None
     if status == "not_evaluated":
         words += "; too uncertain to judge"
     elif status != "pass":
-        vague = len(conventions_hit(ratio, u, pole_pairs)) > MOST_SUSPECTS
-        suspect = None if vague else convention_suspect(ratio, u, pole_pairs) or otherwise
-    return Check(name, status, words, ratio, allowance + 2.0 * u, "1", suspect)
+        vague = len(conventions_hit(value, k * u, quantity, pole_pairs)) > MOST_SUSPECTS
+        named = convention_suspect(value, k * u, quantity, pole_pairs)
+        suspect = None if vague else named or otherwise
+    return Check(name, status, words, value, allowance + 2.0 * u, "1", suspect)
 
 
 def not_evaluated(name: str, missing: str) -> Check:

@@ -75,3 +75,14 @@ def effective_dof(budget: Budget) -> float:
     total = standard_uncertainty(budget) ** 2
     spread = sum(part.u**4 / part.dof for part in budget if math.isfinite(part.dof))
     return math.inf if spread == 0.0 else total**2 / spread
+
+
+COVERAGE = 0.9545
+"""Level at which k is 2 for infinite degrees of freedom (GUM G.6.4 and table G.2)."""
+
+
+def coverage_factor(dof: float, level: float = COVERAGE) -> float:
+    """K such that k u covers `level`: Student's t with `dof` degrees of freedom (GUM G.3)."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(min(dof, 1e9), 0.5 + level / 2.0))

@@ -22,14 +22,13 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     measured, promised = constants.best("kt_peak_nm_a"), constants.best("kt_from_ke_nm_a")
     if measured is None or promised is None or measured.method == promised.method:
         return not_evaluated(NAME, "needs a torque_map for Kt and an open_circuit spin for Ke")
-    ratio, u = ratio_of(measured, promised)
     pairs = constants.best("pole_pairs")
     return judge_ratio(
         NAME,
-        ratio,
-        u,
+        ratio_of(measured, promised),
         options["allowance"],
         "torque per peak q ampere over 1.5 p psi from the back-EMF",
+        "coupling",
         None if pairs is None else round(pairs.number),
         "gain of the torque, current or voltage sensor",
     )

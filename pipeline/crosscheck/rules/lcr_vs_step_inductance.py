@@ -23,16 +23,16 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     for name in ("ld_h", "lq_h"):
         meter, step = constants.by("lcr", name), constants.by("current_step", name)
         if meter is not None and step is not None:
-            ratios.append((*ratio_of(meter, step), name))
+            ratios.append((ratio_of(meter, step), name))
     if not ratios:
         return not_evaluated(NAME, "needs an lcr table and current_step captures")
-    ratio, u, name = max(ratios, key=lambda item: abs(item[0] - 1.0) - 2.0 * item[1])
+    ratio, name = max(ratios, key=lambda item: abs(item[0].value - 1.0) - 2.0 * item[0].u)
     return judge_ratio(
         NAME,
         ratio,
-        u,
         options["allowance"],
         f"{name} by the LCR meter over {name} by current steps",
+        "impedance",
         otherwise="eddy currents at the meter's frequency, or saturation by the step",
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.weak_rows import smooth_speed
 from pipeline.physics.conventions import copper_resistance_ohm
@@ -43,10 +43,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     pairs = constants.best("pole_pairs")
     return judge_ratio(
         NAME,
-        ratio,
-        u,
+        Ratio(ratio, u),
         options["allowance"],
         "electrical power after losses over mechanical power",
+        "power",
         None if pairs is None else round(pairs.number),
         "gain of the torque, current, voltage or speed signal",
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign
@@ -24,10 +24,14 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         return not_evaluated(NAME, _missing(constants))
     return judge_ratio(
         NAME,
-        alpha.number / COPPER_COEFFICIENT_25_1_K,
-        alpha.u / COPPER_COEFFICIENT_25_1_K,
+        Ratio(
+            alpha.number / COPPER_COEFFICIENT_25_1_K,
+            alpha.u / COPPER_COEFFICIENT_25_1_K,
+            alpha.dof,
+        ),
         options["allowance"],
         "temperature coefficient of the resistance over copper's",
+        "temperature_coefficient",
         otherwise="a thermometer that lags or sits off the winding, or a winding not of copper",
     )
 

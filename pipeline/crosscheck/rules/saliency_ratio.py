@@ -24,7 +24,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     ld, lq = constants.best("ld_h"), constants.best("lq_h")
     if ld is None or lq is None:
         return not_evaluated(NAME, "needs current_step or lcr captures on both axes")
-    ratio, u = ratio_of(lq, ld)
+    ratio, u, _ = ratio_of(lq, ld)
     status, suspect = _status(ratio, u, options["largest"], constants.best("kt_reluctance_nm_a2"))
     words = (
         f"Lq over Ld is {ratio:.4f} ± {2.0 * u:.4f} (k=2); "

@@ -9,14 +9,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.physics.conventions import copper_resistance_ohm, terminal_inductance_h
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
-from pipeline.records.uncertainty import propagate, standard_uncertainty
+from pipeline.records.uncertainty import propagate, type_a
 
 NAME = "tau_elec_vs_l_over_r"
 Array = NDArray[np.float64]
@@ -42,21 +42,23 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
             errors.append(found[1] / expected)
     if not ratios:
         return not_evaluated(NAME, "needs current_step captures that settle within the recording")
+    mean = float(np.mean(ratios))
+    dof = max(len(ratios) - 1, 1)
+    scatter = max(float(np.std(ratios)), float(np.linalg.norm(errors)) / math.sqrt(len(errors)))
     budget = propagate(
         [
-            (0.5 / ld.number, ld.budget),
-            (0.5 / lq.number, lq.budget),
-            (-1.0 / r_phase.number, r_phase.budget),
+            (0.5 * mean / ld.number, ld.budget),
+            (0.5 * mean / lq.number, lq.budget),
+            (-mean / r_phase.number, r_phase.budget),
+            (1.0, type_a(f"scatter:{NAME}", scatter / math.sqrt(dof), dof)),
         ]
     )
-    scatter = max(float(np.std(ratios)), float(np.linalg.norm(errors)) / math.sqrt(len(errors)))
-    u = math.hypot(standard_uncertainty(budget), scatter / math.sqrt(max(len(ratios) - 1, 1)))
     return judge_ratio(
         NAME,
-        float(np.mean(ratios)),
-        u,
+        Ratio.of(mean, budget),
         options["allowance"],
         "time constant of the current step over L/R",
+        "time_constant",
         otherwise="resistance in the leads of the step test, or eddy currents",
     )
 

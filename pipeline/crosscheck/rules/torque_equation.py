@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
 from pipeline.records.estimate import Estimate
-from pipeline.records.uncertainty import propagate, standard_uncertainty
+from pipeline.records.uncertainty import propagate
 
 NAME = "torque_equation"
 
@@ -34,13 +34,12 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if id_a == 0.0:
         return not_evaluated(NAME, "needs a torque_map with d currents")
     pairs = round(found["pole_pairs"].number)
-    ratio, u = _ratio(found, pairs, id_a)
     return judge_ratio(
         NAME,
-        ratio,
-        u,
+        _ratio(found, pairs, id_a),
         options["allowance"],
         f"torque at i_d = {id_a:.3g} A, dynamometer over magnet and reluctance terms",
+        "coupling",
         pairs,
         "inductances or torque of other conditions, or a sensor's gain",
     )
@@ -57,8 +56,8 @@ def _strongest_d_current_a(campaign: Campaign) -> float:
     return max(levels, key=abs, default=0.0)
 
 
-def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> tuple[float, float]:
-    """The ratio of torques per q ampere and its standard uncertainty."""
+def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> Ratio:
+    """The ratio of torques per q ampere."""
     reluctance = 1.5 * pairs * id_a
     measured = found["kt_peak_nm_a"].number + found["kt_reluctance_nm_a2"].number * id_a
     saliency_h = found["ld_h"].number - found["lq_h"].number
@@ -71,7 +70,7 @@ def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> tuple[floa
         (-ratio * reluctance / predicted, found["ld_h"].budget),
         (ratio * reluctance / predicted, found["lq_h"].budget),
     ]
-    return ratio, standard_uncertainty(propagate(terms))
+    return Ratio.of(ratio, propagate(terms))
 
 
 RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("torque_map", "open_circuit", "current_step"))

@@ -38,7 +38,7 @@ def _balanced(given: Given, letter: str, unit: str, what: str) -> list[Line]:
         found[delta] = c.wye_from_delta(given.one(delta))
     if not found:
         return []
-    value = agreed(given, found)
+    value = agreed(given, found, "impedance")
     big = letter.upper()
     from_phase = f"3·{big}_phase" if phase in found else f"1.5·{big}_ll"
     phase_formula = f"{big}_delta/3" if line not in found and delta in found else f"{big}_ll/2"
@@ -191,7 +191,9 @@ def _saliency(given: Given) -> Answer | None:
         return None
     ratio = lq / ld
     if given.has("saliency_ratio"):
-        agreed(given, {"saliency_ratio": given.one("saliency_ratio"), "lq_h/ld_h": ratio})
+        agreed(
+            given, {"saliency_ratio": given.one("saliency_ratio"), "lq_h/ld_h": ratio}, "impedance"
+        )
     lines = [
         Line("saliency_ratio", ratio, "1", "L_q/L_d", c.saliency_words(ratio)),
         Line("ld_h", ld, "H", "half of L_ab at −30°", "on the magnet's axis"),

@@ -11,7 +11,7 @@ def _pole_pairs(given: Given) -> Answer | None:
     implied = _implied(given)
     if not implied:
         return None
-    number = round(agreed(given, {name: float(value) for name, value in implied.items()}))
+    number = round(agreed(given, {name: float(value) for name, value in implied.items()}, "count"))
     formula = "f_elec/f_mech" if "f_elec_hz" in implied else "cycles/turns"
     lines = [
         Line("pole_pairs", number, "1", formula, "electrical cycles a mechanical turn"),

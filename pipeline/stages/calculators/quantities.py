@@ -8,11 +8,14 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from pipeline.physics.conventions import RAD_S_PER_RPM, convention_suspect
+from pipeline.physics.conventions import RAD_S_PER_RPM
 from pipeline.physics.glossary import suffix_of
+from pipeline.physics.suspects import Quantity, convention_suspect
 from pipeline.records.errors import UsageError
 
 AGREEMENT = 5e-3
+TYPED = 0.01
+"""How far typed numbers of a few digits may lie off a convention's own, relative."""
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 _SPELLINGS = str.maketrans({"·": "", ".": "", "*": "", " ": "", "Ω": "ohm", "µ": "u", "μ": "u"})
 
@@ -186,7 +189,7 @@ def _keys_hint(calculator: Calculator) -> str:
     return f"known are {', '.join(calculator.shown_names())}"
 
 
-def agreed(given: Given, values: Mapping[str, float]) -> float:
+def agreed(given: Given, values: Mapping[str, float], quantity: Quantity = "coupling") -> float:
     """The one value that several keys imply, the first one's.
 
     Raises UsageError where two differ by more than 0.5 %, naming the convention that the ratio
@@ -196,7 +199,7 @@ def agreed(given: Given, values: Mapping[str, float]) -> float:
     pairs = round(given.one("pole_pairs")) if given.has("pole_pairs") else None
     for name, other in others:
         if abs(other - value) > AGREEMENT * abs(value):
-            suspect = convention_suspect(other / value, 0.0, pairs)
+            suspect = convention_suspect(other / value, TYPED * other / value, quantity, pairs)
             why = f"ratio {other / value:.4f}{f', on {suspect}' if suspect else ''}"
             raise UsageError(
                 f"calc {given.kind}: {first} and {name} contradict each other ({why})", "give one"

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.physics import conventions as c
+from pipeline.physics.suspects import CONVENTIONS, convention_suspect
 
 # The worked example: 7 pole pairs, 304 rpm/V of line-line peak back-EMF.
 K_EXAMPLE = 0.018136
@@ -192,8 +193,8 @@ def test_pole_pairs(electrical: float, mechanical: float, expected: int | None) 
     ],
 )
 def test_a_ratio_on_a_magic_number_names_it(ratio: float, label: str) -> None:
-    direct = c.convention_suspect(ratio, 0.002, 11)
-    inverse = c.convention_suspect(1.0 / ratio, 0.002 / ratio, 11)
+    direct = convention_suspect(ratio, 0.004, "coupling", 11)
+    inverse = convention_suspect(1.0 / ratio, 0.004 / ratio, "coupling", 11)
     assert direct is not None
     assert direct.startswith(f"{label}: ")
     assert inverse is not None
@@ -202,29 +203,52 @@ def test_a_ratio_on_a_magic_number_names_it(ratio: float, label: str) -> None:
 
 @pytest.mark.parametrize("ratio", [1.0, 1.005, 1.08, 0.85, 2.5, 4.0, -1.1547, math.nan, 0.0])
 def test_other_ratios_name_nothing(ratio: float) -> None:
-    assert c.convention_suspect(ratio, 0.001, 7) is None
+    assert convention_suspect(ratio, 0.002, "coupling", 7) is None
 
 
 def test_an_uncertain_ratio_names_the_nearest_two() -> None:
-    named = c.convention_suspect(1.12, 0.03, None)
+    named = convention_suspect(1.12, 0.06, "coupling")
     assert named is not None
     assert [part.split(":")[0] for part in named.split(" or ")][:2] == ["1.1027", "1.1547"]
 
 
-def test_the_reach_is_relative_to_the_ratio() -> None:
-    """0.1 in 6.6 is 1.5 %: 2 pi, 5 % below, is out of 1 % + 2 u."""
-    assert c.convention_suspect(6.6, 0.1, None) is None
-    assert c.convention_suspect(6.6, 0.15, None) is not None
+def test_nothing_outside_the_interval_is_named() -> None:
+    """2 pi lies 0.317 below 6.6."""
+    assert convention_suspect(6.6, 0.31, "coupling") is None
+    assert convention_suspect(6.6, 0.32, "coupling") is not None
+
+
+@pytest.mark.parametrize(
+    ("ratio", "half_width"),
+    [(0.968, 0.006), (1.037, 0.006), (1.0 / 1.0472 + 0.0061, 0.006), (0.8948, 0.0039)],
+)
+def test_told_as_1_0472_or_1_1027_though_the_interval_excluded_it(
+    ratio: float, half_width: float
+) -> None:
+    """Published: 0.968 +- 0.006 told as 1/1.0472 = 0.955, and 1.037 +- 0.006 as 1.0472."""
+    assert convention_suspect(ratio, half_width, "coupling", 7) is None
+
+
+def test_told_as_torque_per_dc_ampere_though_no_torque_is_in_a_time_constant() -> None:
+    """Published: tau over L/R 0.9026 +- 0.018, told as 1/1.1027 = 0.9069, which it does hold."""
+    assert convention_suspect(0.9026, 0.018, "time_constant") is None
+    assert convention_suspect(0.9026, 0.018, "coupling") is not None
+    halved = convention_suspect(0.501, 0.01, "time_constant")
+    assert halved == "1/2: line-line against phase impedance"
+    assert convention_suspect(1.7321, 0.01, "impedance", 7) is None
+    assert convention_suspect(7.0, 0.01, "power", 7) is not None
+    assert convention_suspect(7.0, 0.01, "time_constant", 7) is None
 
 
 def test_two_pole_pairs_are_ambiguous_with_two() -> None:
-    named = c.convention_suspect(2.0, 0.001, 2)
+    named = convention_suspect(2.0, 0.001, "coupling", 2)
     assert named is not None
     assert "the pole pairs (2)" in named
     assert "poles against pole pairs" in named
 
 
 def test_the_labels_are_their_numbers() -> None:
-    for number, label, _ in c.MAGIC_RATIOS:
+    assert all(convention.enters for convention in CONVENTIONS)
+    for number, label, _, _ in CONVENTIONS:
         value = 2.0 * math.pi if label == "2*pi" else float(label)
         assert number == pytest.approx(value, abs=5e-5)
