@@ -125,10 +125,10 @@ def _u_lcr(meta: CaptureMeta) -> float | None:
     """Gain of an LCR meter: as stated, else that of the voltage and current it is made of."""
     if meta.test != "lcr":
         return None
-    try:
-        return float(meta.extra["u_rel_lcr"])
-    except (KeyError, ValueError):
-        return math.hypot(meta.u_rel_voltage or 0.0, meta.u_rel_current or 0.0)
+    stated = meta.stated_u_rel("u_rel_lcr")
+    if stated is not None:
+        return stated
+    return math.hypot(meta.u_rel_voltage or 0.0, meta.u_rel_current or 0.0)
 
 
 def base_scales(machine: Machine) -> dict[str, float]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.io.raw_table import RawTable
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, decoded, number, whole
 
 MAX_HEAD_BYTES = 2**18
 _MAX_COLUMNS = 4096
@@ -73,9 +74,9 @@ def split_comments(data: bytes) -> tuple[dict[str, str], int]:
         stop = data.find(b"\n", at)
         stop = len(data) if stop < 0 else stop + 1
         try:
-            line = data[at:stop].decode("utf-8").rstrip("\r\n")
-        except UnicodeDecodeError:
-            raise _refuse("encoding", "a metadata line is not UTF-8", "save it as UTF-8") from None
+            line = decoded(data[at:stop]).rstrip("\r\n")
+        except ParseError as fault:
+            raise _refuse("encoding", f"a metadata line {fault}", "save it as UTF-8") from None
         match = _COMMENT.match(line)
         if match and match[1] and found.setdefault(match[1], match[2]) != match[2]:
             raise _refuse(
@@ -135,15 +136,16 @@ def _check_last_line(body: bytes, rows: bytes) -> None:
 
 def _check_digest(data: bytes, begin: int, stated: str, rows: int) -> None:
     """Hold the rows against `sha256_rows`, HEX/ROWS."""
-    digest, _, count = stated.partition("/")
-    if not re.fullmatch(r"[0-9a-fA-F]{64}", digest) or not re.fullmatch(r"\d+", count):
+    digest, _, counted = stated.partition("/")
+    count = whole(counted)
+    if not re.fullmatch(r"[0-9a-fA-F]{64}", digest) or count is None:
         raise _refuse("bad_metadata", "sha256_rows is not of the form HEX/ROWS", "write it again")
-    if int(count) != rows:
+    if count != rows:
         raise _refuse(
             "truncated",
-            f"the file states {int(count)} rows and holds {rows}",
+            f"the file states {count} rows and holds {rows}",
             "copy the file again",
-            (min(rows, int(count)), max(rows, int(count)) - 1),
+            (min(rows, count), max(rows, count) - 1),
         )
     if hashlib.sha256(memoryview(data)[begin:]).hexdigest() != digest.lower():
         raise _refuse(
@@ -156,11 +158,9 @@ def _check_digest(data: bytes, begin: int, stated: str, rows: int) -> None:
 
 def _text(data: bytes, dialect: CsvDialect) -> str:
     try:
-        return data.decode(dialect.encoding)
-    except (UnicodeDecodeError, LookupError):
-        raise _refuse(
-            "encoding", f"the header is not {dialect.encoding} text", "state its `encoding`"
-        ) from None
+        return decoded(data, dialect.encoding)
+    except ParseError as fault:
+        raise _refuse("encoding", f"the header {fault}", "state its `encoding`") from None
 
 
 def _split_head(body: bytes, dialect: CsvDialect) -> tuple[list[bytes], bytes]:
@@ -381,15 +381,11 @@ def _number_in(text: str, pattern: str | None, what: str) -> float | None:
     if pattern is None:
         return None
     match = re.search(pattern, text, re.MULTILINE)
-    try:
-        return float(match[1]) if match else _missing_number(what)
-    except (ValueError, IndexError):
-        return _missing_number(what)
-
-
-def _missing_number(what: str) -> float:
-    raise _refuse(
-        "no_header",
-        f"the time {what} is not where the source map says",
-        "check `time` in the source map against the file's first lines",
-    )
+    found = number(match[1] or "") if match and match.re.groups else None
+    if found is None:
+        raise _refuse(
+            "no_header",
+            f"the time {what} is not where the source map says",
+            "check `time` in the source map against the file's first lines",
+        )
+    return found

@@ -11,14 +11,19 @@ from __future__ import annotations
 import faulthandler
 import os
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from pipeline.records.errors import CaptureError, UsageError
+from pipeline.records.errors import CaptureError, PipelineError, UsageError
+from pipeline.records.naming import printable
 
+READER_FAILED = "reader_failed"
+PANIC = "PanicException"
+MOST_SAID = 200
 _MB = 2**20
 _TIMEOUT = b"Timeout"
 LEAST_MB = 60
@@ -97,7 +102,8 @@ def crumbs(path: Path | None) -> Iterator[None]:
 def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
     """Bounds the memory and, where a crumb is laid, the time of the block.
 
-    Raises CaptureError where Python itself runs out of memory; beyond that the process ends.
+    Raises CaptureError where Python itself runs out of memory, beyond which the process ends, and
+    for whatever else the bytes make a reader raise.
     """
     crumb = _CRUMB.descriptor
     if crumb is not None:
@@ -105,7 +111,7 @@ def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
         os.lseek(crumb, 0, os.SEEK_END)
         faulthandler.dump_traceback_later(limits.time_s(size_bytes), exit=True, file=crumb)
     try:
-        with _memory(limits.memory_bytes(size_bytes)):
+        with _memory(limits.memory_bytes(size_bytes)), refusing():
             yield
     except MemoryError:
         most = limits.memory_bytes(size_bytes) // _MB
@@ -119,6 +125,36 @@ def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
             faulthandler.cancel_dump_traceback_later()
             os.ftruncate(crumb, 0)
             os.lseek(crumb, 0, os.SEEK_SET)
+
+
+@contextmanager
+def refusing(what: str = "its reader") -> Iterator[None]:
+    """Turns what a reader raises on bytes that it was not made for into the file's refusal.
+
+    Every conversion of `records.parse` says itself what is wrong; this is the border behind them,
+    so that one file costs itself and not its batch. The refusal names the error and its place, for
+    it is a fault of the reader too. OSError passes, being the machine's; so do the project's own.
+    """
+    try:
+        yield
+    except (PipelineError, OSError, MemoryError, KeyboardInterrupt, SystemExit, GeneratorExit):
+        raise
+    except BaseException as error:
+        # Rust's libraries panic with a class that is no Exception
+        if not isinstance(error, Exception) and type(error).__name__ != PANIC:
+            raise
+        raise _broken(what, error) from error
+
+
+def _broken(what: str, error: BaseException) -> CaptureError:
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
+    said = printable(str(error)[:MOST_SAID])
+    return CaptureError(
+        READER_FAILED,
+        f"{what} broke on it: {type(error).__name__}{place}: {said}",
+        "leave the file out, and report it with this line",
+    )
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from pipeline.io.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.csv_table import read_csv
 from pipeline.io.files import read_whole
 from pipeline.io.foreign import find_reader
+from pipeline.io.guard import refusing
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.metadata import capture_meta
@@ -28,6 +29,11 @@ __all__ = ["Entry", "Survey", "read_capture", "survey"]
 
 def read_capture(folder: Path, entry: Entry) -> Capture:
     """Decode one capture; raises CaptureError with what is wrong, and MachineError for the disk."""
+    with refusing():
+        return _read_capture(folder, entry)
+
+
+def _read_capture(folder: Path, entry: Entry) -> Capture:
     data = read_whole(folder / entry.path)
     if hashlib.sha256(data).hexdigest() != entry.sha256:
         raise CaptureError("changed", "the file changed while it was read", "run again")

@@ -25,6 +25,7 @@ from pipeline.io.source_map import SourceMap
 from pipeline.io.starter_map import FieldSeen, StreamSeen, starter_map
 from pipeline.io.survey import look, question_of
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,7 @@ def _column_faults(
     """Whether fields are not the contract's columns as they stand; the reason joins the faults."""
     pole_pairs = metadata.get("pole_pairs", "")
     try:
-        counted = int(pole_pairs) if pole_pairs.isdecimal() else None
+        counted = whole(pole_pairs, 1)
         frames = [to_frame(table, None, counted) for table in tables]
         if tables and all(frame is None for frame in frames):
             faults.append("it holds no column of the contract; finish the source map below")

@@ -10,15 +10,19 @@ from typing import Any
 
 from pipeline.io.plain_yaml import load_plain
 from pipeline.physics.glossary import METADATA, TESTS
+from pipeline.records import parse
 from pipeline.records.capture import CaptureMeta
 from pipeline.records.errors import CaptureError, merged
 from pipeline.records.finding import Finding
+from pipeline.records.parse import ParseError, decoded, is_text
 
 MANIFEST = "manifest.csv"
 SIDECAR_SUFFIX = ".meta.yaml"
 CONTRACT_VERSION = "1"
 MAX_MANIFEST_BYTES = 2**22
 MAX_SIDECAR_BYTES = 2**17
+MOST_KEY_CHARS = 200
+MOST_VALUE_CHARS = 2**16
 _CHOICES = {
     "winding": ("wye", "delta"),
     "pair": ("ab", "bc", "ca"),
@@ -58,10 +62,8 @@ def merge(
 def _same(one: str, other: str) -> bool:
     if one.strip() == other.strip():
         return True
-    try:
-        return float(one) == float(other)
-    except ValueError:
-        return False
+    values = parse.number(one), parse.number(other)
+    return None not in values and values[0] == values[1]
 
 
 def sidecar(data: bytes) -> dict[str, str]:
@@ -85,9 +87,9 @@ def manifest(data: bytes, folder: str) -> dict[str, dict[str, str]]:
     if len(data) > MAX_MANIFEST_BYTES:
         raise _bad_manifest("is larger than 4 MiB")
     try:
-        text = data.decode("utf-8-sig")
+        text = decoded(data, "utf-8-sig")
         rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
-    except (UnicodeDecodeError, csv.Error) as fault:
+    except (ParseError, csv.Error) as fault:
         raise _bad_manifest(f"cannot be read: {fault}") from None
     rows = [row for row in rows if any(cell.strip() for cell in row)]
     if not rows or rows[0][0].strip() != "file":
@@ -138,6 +140,18 @@ def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
     return CaptureMeta(**known, extra=dict(sorted(extra.items())))
 
 
+def check_texts(values: Mapping[str, str]) -> None:
+    """Raises CaptureError for a key or value that no output can hold, or that is no metadata."""
+    for key, value in values.items():
+        if not (is_text(key) and is_text(value)):
+            words = f"the text of {key[:60]!r} holds half of a surrogate pair, which is no text"
+            raise CaptureError("bad_metadata", words, "write it as UTF-8")
+        if len(key) > MOST_KEY_CHARS or len(value) > MOST_VALUE_CHARS:
+            words = f"the text of {key[:60]!r} has {len(value)} characters"
+            remedy = f"up to {MOST_VALUE_CHARS} are metadata, {MOST_KEY_CHARS} a key"
+            raise CaptureError("limit", words, remedy)
+
+
 def belongs(values: Mapping[str, str]) -> None:
     """Raises what `capture_meta` would where no motor is named: such a file is in no campaign."""
     if not values.get("motor_id", "").strip():
@@ -171,14 +185,13 @@ def _typed(key: str, value: str) -> str | int | float:
     low, high = term.low, term.high
     kind = "a whole number" if term.integer else "a number"
     remedy = f"write {kind} from {low:g} to {high:g} [{term.unit}]"
-    try:
-        number = float(value)
-    except ValueError:
-        raise _bad_value(key, value, remedy) from None
-    inside = (low is None or number >= low) and (high is None or number <= high)
-    if not inside or (term.integer and number != int(number)):
+    found = parse.number(value)
+    if found is None:
         raise _bad_value(key, value, remedy)
-    return int(number) if term.integer else number
+    inside = (low is None or found >= low) and (high is None or found <= high)
+    if not inside or (term.integer and found != int(found)):
+        raise _bad_value(key, value, remedy)
+    return int(found) if term.integer else found
 
 
 def _bad_value(key: str, value: str, remedy: str) -> CaptureError:

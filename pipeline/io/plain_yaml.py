@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, decoded, is_text
 
 _MAX_BYTES = 2**17
 _MAX_DEPTH = 12
@@ -28,11 +29,11 @@ def load_plain(data: bytes, what: str) -> Plain:
     if len(data) > _MAX_BYTES:
         raise _bad(what, f"is larger than {_MAX_BYTES} bytes")
     try:
-        text = data.decode("utf-8-sig")
+        text = decoded(data, "utf-8-sig")
         _check_events(text, what)
         node = yaml.compose(text, Loader=_LOADER)
-    except UnicodeDecodeError:
-        raise _bad(what, "is not UTF-8") from None
+    except ParseError as fault:
+        raise _bad(what, str(fault)) from None
     except yaml.YAMLError as fault:
         place = getattr(fault, "problem_mark", None)
         line = f" in line {place.line + 1}" if place else ""
@@ -66,6 +67,8 @@ def _plain(node: Any, what: str) -> Plain:
     if node.tag not in _PLAIN_TAGS:
         raise _bad(what, f"uses the tag {node.tag}")
     if isinstance(node, yaml.ScalarNode):
+        if not is_text(node.value):
+            raise _bad(what, "holds half of a surrogate pair, which is no text")
         return "" if node.tag.endswith(":null") else node.value
     if isinstance(node, yaml.SequenceNode):
         return [_plain(item, what) for item in node.value]

@@ -12,6 +12,7 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.parse import whole
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
@@ -106,7 +107,7 @@ def output_folder(output: str) -> Path:
 def partial_owner(path: Path) -> int | None:
     """The process that was writing a file of a temporary name; None where the name is no such."""
     words = path.name.split(".")
-    return int(words[-2]) if words[-1] == "partial" and words[-2].isdigit() else None
+    return whole(words[-2], 1, 2**31 - 1) if words[-1] == "partial" else None
 
 
 def _remedy(error: OSError) -> str:

@@ -26,6 +26,7 @@ from pipeline.io.publish import sync_file, sync_folder
 from pipeline.io.registry_exports import one_line
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Event
+from pipeline.records.parse import whole
 
 if TYPE_CHECKING:
     import polars as pl
@@ -171,7 +172,7 @@ class EventTable:
         log = None if self.folder is None else self.folder / "_delta_log"
         if log is None or not log.is_dir():
             return set()
-        return {int(path.stem) for path in log.glob("*.json") if path.stem.isdigit()}
+        return {n for path in log.glob("*.json") if (n := whole(path.stem)) is not None}
 
     def _opened(self) -> DeltaTable | None:
         from deltalake import DeltaTable

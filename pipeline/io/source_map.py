@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
@@ -14,6 +13,7 @@ from typing import Any, Literal, get_args
 from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.io.plain_yaml import load_plain
 from pipeline.physics.glossary import COLUMNS
+from pipeline.records import parse
 from pipeline.records.errors import CaptureError, UsageError
 
 TimeFrom = Literal["field", "even", "log", "increment"]
@@ -215,13 +215,10 @@ class _Section:
         value = self.text(key)
         if value is None:
             return default
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise self.fault(key, f"{value!r} is no number", "write a number")
-        return number
+        found = parse.number(value)
+        if found is None:
+            raise self.fault(key, f"{value[:60]!r} is no number", "write a number")
+        return found
 
     def flag(self, key: str, default: bool) -> bool:
         value = self.text(key)

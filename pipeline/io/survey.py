@@ -16,6 +16,7 @@ from typing import Literal
 from pipeline.io.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments
 from pipeline.io.files import list_files, read_head, read_whole
 from pipeline.io.foreign import find_reader
+from pipeline.io.guard import refusing
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.messages import count_messages
 from pipeline.io.metadata import (
@@ -24,6 +25,7 @@ from pipeline.io.metadata import (
     MAX_SIDECAR_BYTES,
     SIDECAR_SUFFIX,
     belongs,
+    check_texts,
     manifest,
     merge,
     sidecar,
@@ -187,16 +189,17 @@ def look(
     digest: str | None = None
     entry: Entry | None = None
     try:
-        listed = dict(question.listed)
-        beside = {}
-        if question.sidecar is not None:
-            beside = sidecar(read_whole(folder / question.sidecar, MAX_SIDECAR_BYTES))
-        if _may_be_capture(folder, question.path, listed, beside, sources):
-            data = read_whole(folder / question.path)
-            digest = hashlib.sha256(data).hexdigest()
-            entry = _entry(
-                question.path, data, digest, listed, beside, sources, findings, recover=recover
-            )
+        with refusing():
+            listed = dict(question.listed)
+            beside = {}
+            if question.sidecar is not None:
+                beside = sidecar(read_whole(folder / question.sidecar, MAX_SIDECAR_BYTES))
+            if _may_be_capture(folder, question.path, listed, beside, sources):
+                data = read_whole(folder / question.path)
+                digest = hashlib.sha256(data).hexdigest()
+                entry = _entry(
+                    question.path, data, digest, listed, beside, sources, findings, recover=recover
+                )
     except CaptureError as fault:
         findings.append(Finding.refusal(question.path, fault))
         entry = None
@@ -251,7 +254,8 @@ def _manifests(
             try:
                 home = PurePosixPath(path).parent.as_posix()
                 data = read_whole(folder / path, MAX_MANIFEST_BYTES + 1)
-                found = manifest(data, "" if home == "." else home)
+                with refusing():
+                    found = manifest(data, "" if home == "." else home)
             except CaptureError as fault:
                 findings.append(Finding.refusal(path, fault))
                 continue
@@ -300,6 +304,7 @@ def _entry(
     said, contradictions = merge(path, statements)
     findings += contradictions
     said = fixed | said
+    check_texts(said)
     belongs(said)
     return Entry(path, digest, form, source, tuple(sorted(said.items())), recovered)
 

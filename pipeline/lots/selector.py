@@ -17,6 +17,7 @@ from fnmatch import fnmatchcase
 
 from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Version
+from pipeline.records.parse import utc_moment
 
 FIELDS: Mapping[str, str] = {
     "lot": "lot",
@@ -195,8 +196,10 @@ def _midnight(day: date) -> datetime:
 
 
 def _instant(when: str) -> datetime:
-    found = datetime.fromisoformat(when)
-    return (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+    found = utc_moment(when)
+    if found is None:
+        raise ValueError(f"{when[:60]!r} is no date")
+    return found
 
 
 def _within(day: datetime, low: datetime, high: datetime) -> bool:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.records.parse import number
+
 if TYPE_CHECKING:
     import polars as pl
 
@@ -65,6 +67,11 @@ class CaptureMeta:
         """Standard uncertainty of an instrument, a key of UNSTATED_U; its default if not stated."""
         stated: float | None = getattr(self, key)
         return UNSTATED_U[key] if stated is None else stated
+
+    def stated_u_rel(self, key: str) -> float | None:
+        """A relative standard uncertainty, 0 to 1, under a key of `extra`; None without one."""
+        found = number(self.extra.get(key, ""))
+        return found if found is not None and 0.0 <= found <= 1.0 else None
 
 
 @dataclass(frozen=True, slots=True)

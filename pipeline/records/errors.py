@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+MOST_CHARS = 1500
+"""Of what is said of one file, which may quote it."""
+
 
 class PipelineError(Exception):
     """Base of every error this project raises on purpose; `exit_code` is the command's."""
@@ -43,6 +46,8 @@ class CaptureError(PipelineError):
     def __init__(
         self, code: str, message: str, remedy: str, rows: tuple[int, int] | None = None
     ) -> None:
+        if len(message) > MOST_CHARS:
+            message = message[: MOST_CHARS - 4] + " ..."
         super().__init__(message, remedy)
         self.code = code
         self.rows = rows

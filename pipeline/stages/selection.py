@@ -16,6 +16,7 @@ from pipeline.records.ledger import Version, histories
 from pipeline.records.lot_constant import Side
 from pipeline.records.lot_regression import Group
 from pipeline.records.naming import counted
+from pipeline.records.parse import utc_moment
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,18 +92,8 @@ class _Shelf:
 def _when(version: Version, sheet: Datasheet) -> str:
     """When the first capture was started, else when the version was published (ISO 8601, UTC)."""
     stated = [c.started_at for c in sheet.captures if c.started_at]
-    usable = [text for text in stated if _is_moment(text)]
+    usable = [text for text in stated if utc_moment(text) is not None]
     return min(usable) if usable else version.published.recorded_at.isoformat()
-
-
-def _is_moment(text: str) -> bool:
-    from datetime import datetime
-
-    try:
-        datetime.fromisoformat(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _selected(shelf: _Shelf, versions: Sequence[Version], query: Query) -> list[Sheet]:

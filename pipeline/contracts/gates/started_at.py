@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import datetime, timedelta
+from datetime import timedelta
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.physics.glossary import TESTS
 from pipeline.records.capture import Capture
+from pipeline.records.parse import moment
 
 NAME = "started_at"
 REMEDY = "write started_at as ISO 8601 in UTC, such as 2026-01-05T08:00:00Z"
@@ -27,10 +28,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _in_utc(stated: str) -> bool:
-    try:
-        return datetime.fromisoformat(stated).utcoffset() == timedelta(0)
-    except ValueError:
-        return False
+    found = moment(stated)
+    return found is not None and found.utcoffset() == timedelta(0)
 
 
 GATE = Gate(NAME, tuple(TESTS), check)

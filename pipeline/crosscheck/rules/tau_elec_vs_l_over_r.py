@@ -43,14 +43,16 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if not ratios:
         return not_evaluated(NAME, "needs current_step captures that settle within the recording")
     mean = float(np.mean(ratios))
-    dof = max(len(ratios) - 1, 1)
-    scatter = max(float(np.std(ratios)), float(np.linalg.norm(errors)) / math.sqrt(len(errors)))
+    fit = float(np.linalg.norm(errors)) / math.sqrt(len(errors))
+    spread, others = float(np.std(ratios)), max(len(ratios) - 1, 1)
+    scatter = max(spread, fit) / math.sqrt(others)
+    dof = others if spread > fit else math.inf
     budget = propagate(
         [
             (0.5 * mean / ld.number, ld.budget),
             (0.5 * mean / lq.number, lq.budget),
             (-mean / r_phase.number, r_phase.budget),
-            (1.0, type_a(f"scatter:{NAME}", scatter / math.sqrt(dof), dof)),
+            (1.0, type_a(f"scatter:{NAME}", scatter, dof)),
         ]
     )
     return judge_ratio(

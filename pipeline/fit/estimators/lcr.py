@@ -260,10 +260,8 @@ def _gain(used: Sequence[Capture], options: Mapping[str, float]) -> tuple[float,
     that name replaces this where it is not 0.
     """
     for capture in used:
-        try:
-            return float(capture.meta.extra["u_rel_lcr"]), ""
-        except (KeyError, ValueError):
-            continue
+        if (stated := capture.meta.stated_u_rel("u_rel_lcr")) is not None:
+            return stated, ""
     gains = instrument_uncertainties(used, ("voltage", "current"))
     gain = options["u_rel_lcr"] or math.hypot(*gains.values())
     unstated = "" if options["u_rel_lcr"] else unstated_note(used, ("voltage", "current"))

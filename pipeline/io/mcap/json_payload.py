@@ -17,6 +17,7 @@ from pipeline.io.mcap.leaf import Leaf, Wanted
 from pipeline.io.mcap.limits import MAX_DEPTH, MAX_FIELDS, MAX_JSON_BYTES
 from pipeline.io.mcap.messages import Batch
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, json_value
 
 _EXACT_INTEGER = 2**53
 _BREAKS = bytes.maketrans(b"\r\n", b"  ")
@@ -52,20 +53,11 @@ class JsonDecoder:
 
 def _object(payload: bytes, row: int) -> dict[str, Any]:
     try:
-        found = json.loads(payload.decode("utf-8"), object_pairs_hook=_unique)
-    except RecursionError:
-        raise _bad("nests too deep", row) from None
-    except ValueError as fault:
-        raise _bad(f"cannot be read: {fault}"[:160], row) from None
+        found = json_value(payload, unique_keys=True)
+    except ParseError as fault:
+        raise _bad(str(fault), row) from None
     if not isinstance(found, dict):
         raise _bad("is no object", row)
-    return found
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
-        raise ValueError("a key appears twice")
     return found
 
 

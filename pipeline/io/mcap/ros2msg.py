@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from pipeline.io.mcap.limits import MAX_DEPTH, MAX_FIELDS
+from pipeline.io.mcap.limits import MAX_CHUNK_BYTES, MAX_DEPTH, MAX_FIELDS
 from pipeline.io.mcap.records import Schema
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, decoded, whole
 
 _DTYPES = {
     "bool": "?",
@@ -59,9 +60,9 @@ class Field:
 def layout_of(schema: Schema) -> tuple[Field, ...]:
     """The fields of a schema's root message; raises CaptureError where it cannot be parsed."""
     try:
-        text = schema.data.decode("utf-8")
-    except UnicodeDecodeError:
-        raise _bad(schema, "is not UTF-8") from None
+        text = decoded(schema.data)
+    except ParseError as fault:
+        raise _bad(schema, str(fault)) from None
     sections = re.split(r"^={3,}\s*$", text, flags=re.MULTILINE)
     definitions = dict(_KNOWN)
     for section in sections[1:]:
@@ -107,13 +108,23 @@ class _Parser:
             self.count += 1
             if self.count > MAX_FIELDS:
                 raise _bad(self.schema, f"has more than {MAX_FIELDS} fields")
-            array = None
-            if match[3] is not None:
-                array = 0 if "<=" in match[3] or not match[4] else int(match[4])
+            array = self.array(match[3], match[4])
             found.append(self.field(match[1], match[5], array, package, depth))
         if len({part.name for part in found}) != len(found):
             raise _bad(self.schema, "has a field twice")
         return tuple(found)
+
+    def array(self, brackets: str | None, bound: str | None) -> int | None:
+        """The `array` of a field from `[...]` and the digits in it."""
+        if brackets is None:
+            return None
+        if "<=" in brackets or not bound:
+            return 0
+        count = whole(bound, 1, MAX_CHUNK_BYTES)
+        if count is None:
+            words = f"has an array of {bound[:20]} items, where 1 to {MAX_CHUNK_BYTES} are possible"
+            raise _bad(self.schema, words)
+        return count
 
     def field(self, kind: str, name: str, array: int | None, package: str, depth: int) -> Field:
         if kind in _DTYPES:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from pipeline.io.mcap.limits import MAX_MAP_ENTRIES
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, decoded
 
 U16 = struct.Struct("<H")
 U32 = struct.Struct("<I")
@@ -82,9 +83,9 @@ class Fields:
     def text(self) -> str:
         """UTF-8 text with a 32-bit length before it."""
         try:
-            return self.blob().decode("utf-8")
-        except UnicodeDecodeError:
-            raise corrupt(f"text in {self.what} is not UTF-8") from None
+            return decoded(self.blob())
+        except ParseError as fault:
+            raise corrupt(f"text in {self.what} {fault}") from None
 
     def inner(self) -> Fields:
         """The fields of an array or map with a 32-bit byte length before it."""

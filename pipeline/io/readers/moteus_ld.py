@@ -6,7 +6,7 @@ less the resistive drop of the q current [V]; `params` holds the number of poles
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,15 +15,16 @@ import numpy as np
 from pipeline.io.foreign import Reader
 from pipeline.io.raw_table import RawTable
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, json_value, number
 
 _REMEDY = "is it what moteus' measurement of L_d writes?"
 
 
 def _document(data: bytes) -> Mapping[str, Any]:
     try:
-        document = json.loads(data)
-    except (ValueError, RecursionError) as fault:
-        raise CaptureError("not_json", f"it is no JSON: {fault}", _REMEDY) from fault
+        document = json_value(data)
+    except ParseError as fault:
+        raise CaptureError("not_json", f"it {fault}", _REMEDY) from fault
     if not isinstance(document, dict) or not isinstance(document.get("raw"), dict):
         raise CaptureError("missing_column", "it has no table `raw`", _REMEDY)
     return document
@@ -31,16 +32,25 @@ def _document(data: bytes) -> Mapping[str, Any]:
 
 def read(data: bytes) -> RawTable:
     """Fields `d_A`, `omega` and `y`, a row a speed, levels in rising order; raises CaptureError."""
-    rows: list[tuple[float, float, float]] = []
-    try:
-        for level, runs in _document(data)["raw"].items():
-            rows += [(float(level), float(run["omega"]), float(run["y"])) for run in runs]
-    except (TypeError, KeyError, ValueError) as fault:
-        raise CaptureError(
-            "missing_column", f"a row of `raw` lacks omega or y: {fault}", _REMEDY
-        ) from fault
+    rows: list[tuple[float, ...]] = []
+    for level, runs in _document(data)["raw"].items():
+        for run in runs if isinstance(runs, list) else [None]:
+            row = run if isinstance(run, dict) else {}
+            found = number(level), _number(row.get("omega")), _number(row.get("y"))
+            if None in found:
+                place = (len(rows), len(rows))
+                words = f"a row of `raw` at {level[:60]!r} has no numbers as level, omega and y"
+                raise CaptureError("missing_column", words, _REMEDY, place)
+            rows.append(tuple(one for one in found if one is not None))
     table = np.array(sorted(rows), dtype=float).reshape(-1, 3)
     return RawTable("raw", {"d_A": table[:, 0], "omega": table[:, 1], "y": table[:, 2]})
+
+
+def _number(value: Any) -> float | None:
+    """A number of JSON; None for anything else."""
+    if isinstance(value, str):
+        return number(value)
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
 
 def metadata(data: bytes) -> Mapping[str, str]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Mapping
 
 import numpy as np
@@ -13,6 +15,12 @@ from pipeline.io.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 _MOST_BYTES = 1 << 30
+# An array's head is a literal of Python, read by its own tokenizer and parser; its shape is
+# allocated before it is read.
+BROKEN = (
+    *(ValueError, TypeError, LookupError, ArithmeticError, EOFError, OSError, RuntimeError),
+    *(SyntaxError, tokenize.TokenError, MemoryError, zipfile.BadZipFile, zlib.error),
+)
 
 
 def read(data: bytes) -> RawTable:
@@ -26,10 +34,10 @@ def read(data: bytes) -> RawTable:
                 raise CaptureError("limit", "it unpacks to more than 1 GiB", "split it")
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             fields = _fields({name: arrays[name] for name in sorted(arrays.files)})
-    except (zipfile.BadZipFile, ValueError, KeyError, EOFError, OSError) as fault:
+    except BROKEN as fault:
         raise CaptureError(
             "not_npz",
-            f"it is no numpy archive of plain arrays: {fault}",
+            f"it is no numpy archive of plain arrays: {fault}"[:200],
             "save it with numpy.savez",
         ) from fault
     if len({values.size for values in fields.values()}) > 1:

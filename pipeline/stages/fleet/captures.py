@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipeline.io.files import size_bytes
-from pipeline.io.guard import ReadLimits, died, reading
+from pipeline.io.guard import ReadLimits, died, reading, refusing
 from pipeline.io.survey import Entry
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
@@ -56,7 +56,7 @@ def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
             size = size_bytes(folder / entry.path)
             with watch.stage("read"), reading(entry.path, size, task.limits):
                 capture = read_capture(folder, entry)
-            with watch.stage("validate"):
+            with watch.stage("validate"), refusing("its validation"):
                 capture, found = validate(capture, task.gates)
         except CaptureError as error:
             findings.append(Finding.refusal(entry.path, error))

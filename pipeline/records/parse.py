@@ -1,0 +1,122 @@
+"""Numbers and texts out of strangers' files: the one place where such bytes are converted.
+
+Python's own conversions raise five kinds of errors on text that no bench writes (5,000 digits,
+half a surrogate pair, 200,000 brackets) and take some that nobody means (`1_000`, `nan`, Arabic
+digits). Here None comes back for a number that is none, so that a type checker asks every caller
+what then.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from datetime import UTC, datetime
+from typing import Any
+
+MOST_CHARS = 400
+"""Of a number: more than the 309 digits of the largest double."""
+MOST_DIGITS = 18
+"""Of a whole number: all of them fit into 64 bits."""
+_WHOLE = re.compile(r"[+-]?[0-9]+")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+
+
+class ParseError(ValueError):
+    """Bytes that are not what they should be; the text says why, as the end of a sentence."""
+
+
+def whole(text: str, low: int = 0, high: int = 10**MOST_DIGITS) -> int | None:
+    """The whole number that a text is, if it lies within `low` and `high`; else None."""
+    if len(text) > MOST_CHARS or not _WHOLE.fullmatch(text):
+        return None
+    digits = text.lstrip("+-").lstrip("0") or "0"
+    if len(digits) > MOST_DIGITS + 1:
+        return None
+    value = -int(digits) if text.startswith("-") else int(digits)
+    return value if low <= value <= high else None
+
+
+def number(text: str) -> float | None:
+    """The finite number that a text is, with a point as decimal sign; else None."""
+    bare = text.strip()
+    if len(bare) > MOST_CHARS or not _NUMBER.fullmatch(bare):
+        return None
+    value = float(bare)
+    return value if math.isfinite(value) else None
+
+
+def moment(text: str) -> datetime | None:
+    """The moment that ISO 8601 text names, with its zone where it has one; None for other text."""
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        return None
+
+
+def utc_moment(text: str) -> datetime | None:
+    """The moment that ISO 8601 text names, in UTC where it says no zone; None for other text.
+
+    None too where UTC would be before the year 1 or after 9999.
+    """
+    found = moment(text)
+    try:
+        return found and (found if found.tzinfo else found.replace(tzinfo=UTC)).astimezone(UTC)
+    except OverflowError:
+        return None
+
+
+def decoded(data: bytes, encoding: str = "utf-8") -> str:
+    """The text of bytes; raises ParseError where they are no text in that encoding."""
+    try:
+        return data.decode(encoding)
+    except (UnicodeError, LookupError):
+        name = "UTF-8" if encoding in ("utf-8", "utf-8-sig") else f"{encoding} text"
+        raise ParseError(f"is not {name}") from None
+
+
+def is_text(value: str) -> bool:
+    """Whether a text can be written: no half of a surrogate pair, as JSON can spell it."""
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def json_value(data: bytes, *, unique_keys: bool = False) -> Any:
+    """The value of a UTF-8 JSON document; NaN is taken, for recorders write it.
+
+    Raises:
+        ParseError: No JSON, nested too deep, a whole number of more digits than any counter has, a
+            text that holds half a surrogate pair, a key twice where keys are to be unique.
+
+    """
+    hook = _unique if unique_keys else None
+    try:
+        found = json.loads(decoded(data), parse_int=_json_whole, object_pairs_hook=hook)
+        if b"\\u" in data and not is_text(json.dumps(found, ensure_ascii=False)):
+            raise ParseError("holds half of a surrogate pair, which is no text")
+    except ParseError:
+        raise
+    except RecursionError:
+        raise ParseError("nests too deep") from None
+    except ValueError as fault:
+        raise ParseError(f"cannot be read: {fault}"[:160]) from None
+    return found
+
+
+def _json_whole(digits: str) -> int | float:
+    """A whole number exactly; as a double where it has more digits than 64 bits hold."""
+    if len(digits) <= MOST_DIGITS + 2:
+        return int(digits)
+    if len(digits) > MOST_CHARS:
+        raise ParseError(f"holds a number of {len(digits)} digits")
+    return float(digits)
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        raise ParseError("has a key twice")
+    return found
