@@ -4,26 +4,43 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from types import ModuleType
 
 from pipeline.io import readers as readers_room
 from pipeline.io.raw_table import RawTable
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import CaptureError, UsageError
+
+
+def _nothing(_: bytes) -> Mapping[str, str]:
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
 class Reader:
-    """How one foreign form becomes a raw table.
+    """How one foreign form becomes raw tables, one a clock.
 
-    read(data): the table of the file's bytes; raises CaptureError. metadata(data): what the file
+    read(data): the tables of the file's bytes; raises CaptureError. metadata(data): what the file
     itself says, as texts, under the contract's keys.
     """
 
     name: str
-    read: Callable[[bytes], RawTable]
-    metadata: Callable[[bytes], Mapping[str, str]]
+    read: Callable[[bytes], Sequence[RawTable]]
+    metadata: Callable[[bytes], Mapping[str, str]] = _nothing
+
+
+def library(module: str, extra: str) -> ModuleType:
+    """An optional library; raises CaptureError that names the extra to install."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise CaptureError(
+            "missing_library",
+            f"reading it takes {module.split('.', maxsplit=1)[0]}, which is not installed",
+            f"pip install 'motor-datasheets[{extra}]'",
+        ) from None
 
 
 @cache

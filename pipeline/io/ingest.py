@@ -90,7 +90,7 @@ def _read_foreign(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap 
     source = entry.source
     if source is None or source.reader is None:
         raise CaptureError("unknown_source", "no reader is named", "add a source map")
-    return [find_reader(source.reader).read(data)], source, False
+    return list(find_reader(source.reader).read(data)), source, False
 
 
 def _read_csv(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:

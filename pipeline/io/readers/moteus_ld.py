@@ -30,7 +30,7 @@ def _document(data: bytes) -> Mapping[str, Any]:
     return document
 
 
-def read(data: bytes) -> RawTable:
+def read(data: bytes) -> tuple[RawTable, ...]:
     """Fields `d_A`, `omega` and `y`, a row a speed, levels in rising order; raises CaptureError."""
     rows: list[tuple[float, ...]] = []
     for level, runs in _document(data)["raw"].items():
@@ -43,7 +43,8 @@ def read(data: bytes) -> RawTable:
                 raise CaptureError("missing_column", words, _REMEDY, place)
             rows.append(tuple(one for one in found if one is not None))
     table = np.array(sorted(rows), dtype=float).reshape(-1, 3)
-    return RawTable("raw", {"d_A": table[:, 0], "omega": table[:, 1], "y": table[:, 2]})
+    fields = {"d_A": table[:, 0], "omega": table[:, 1], "y": table[:, 2]}
+    return (RawTable("raw", fields),)
 
 
 def _number(value: Any) -> float | None:

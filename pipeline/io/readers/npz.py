@@ -23,7 +23,7 @@ BROKEN = (
 )
 
 
-def read(data: bytes) -> RawTable:
+def read(data: bytes) -> tuple[RawTable, ...]:
     """Fields `NAME`, or `NAME.real` and `NAME.imag`; tables are laid out row after row.
 
     Objects are never unpickled. Raises CaptureError for what is no archive, or too large unpacked.
@@ -44,7 +44,7 @@ def read(data: bytes) -> RawTable:
         raise CaptureError(
             "lengths", "its arrays differ in length", "save arrays of one length together"
         )
-    return RawTable("npz", fields)
+    return (RawTable("npz", fields),)
 
 
 def _fields(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -58,9 +58,4 @@ def _fields(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return found
 
 
-def metadata(_: bytes) -> Mapping[str, str]:
-    """An archive says nothing of itself."""
-    return {}
-
-
-READER = Reader("npz", read, metadata)
+READER = Reader("npz", read)

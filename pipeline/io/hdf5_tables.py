@@ -1,0 +1,62 @@
+"""Numeric datasets of an HDF5 file as raw tables; shared by HDF5 and MATLAB 7.3."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from pipeline.io.foreign import library
+from pipeline.io.raw_table import RawTable
+from pipeline.records.errors import CaptureError
+
+MOST_BYTES = 1 << 30
+
+
+def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
+    """A table for each length of vectors in a group, fields by their path in the file.
+
+    A dataset of one dimension is a field, so is a matrix of one row or one column; of a table with
+    named columns each numeric column is one. Links to other files are not followed. Raises
+    CaptureError for what is no HDF5 file, or is too large unpacked.
+    """
+    h5py = library("h5py", "hdf5")
+    found: dict[tuple[str, int], dict[str, np.ndarray]] = {}
+    try:
+        with h5py.File(io.BytesIO(data), "r") as file:
+            datasets = _datasets(h5py, file)
+            if sum(one.size * one.dtype.itemsize for one in datasets.values()) > MOST_BYTES:
+                raise CaptureError("limit", "it unpacks to more than 1 GiB", "split it")
+            for path, one in datasets.items():
+                for name, values in _vectors(path, one).items():
+                    group = path.rpartition("/")[0]
+                    found.setdefault((group, values.size), {})[name] = values
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as fault:
+        raise CaptureError(
+            f"not_{form}", f"it cannot be read as HDF5: {fault}", "write it anew"
+        ) from fault
+    return tuple(RawTable(group or form, fields) for (group, _), fields in sorted(found.items()))
+
+
+def _datasets(h5py: Any, file: Any) -> dict[str, Any]:
+    """Datasets by path; `visititems` follows no soft or external link."""
+    found: dict[str, Any] = {}
+
+    def keep(path: str, one: Any) -> None:
+        if isinstance(one, h5py.Dataset) and not path.startswith("#refs#"):
+            found[path] = one
+
+    file.visititems(keep)
+    return found
+
+
+def _vectors(path: str, one: Any) -> dict[str, np.ndarray]:
+    """The numeric vectors of a dataset by name; empty for texts, references and whole tables."""
+    if one.dtype.names is not None:
+        kept = [n for n in one.dtype.names if np.issubdtype(one.dtype[n], np.number)]
+        return {f"{path}/{name}": np.ravel(one[name]) for name in kept}
+    vector = one.ndim > 0 and max(one.shape, default=0) == one.size > 0
+    if not vector or not np.issubdtype(one.dtype, np.number):
+        return {}
+    return {path: np.ravel(one[()])}

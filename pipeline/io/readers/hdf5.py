@@ -1,0 +1,10 @@
+"""HDF5: numeric vectors by their path, `group/name`; needs h5py (the extra `hdf5`)."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from pipeline.io.foreign import Reader
+from pipeline.io.hdf5_tables import tables
+
+READER = Reader("hdf5", partial(tables, form="hdf5"))

@@ -1,0 +1,53 @@
+"""ASAM MDF 4 (and 3): a table a channel group, its master channel as `time`; needs asammdf."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from pipeline.io.foreign import Reader, library
+from pipeline.io.raw_table import RawTable
+from pipeline.records.errors import CaptureError
+
+MARK = b"MDF"
+REMEDY = "export it again as MDF 4.10"
+
+
+def read(data: bytes) -> tuple[RawTable, ...]:
+    """Tables of physical values; a channel whose name is there twice in a group counts once.
+
+    Raises CaptureError for what is no measurement file.
+    """
+    asammdf = library("asammdf", "mdf")
+    if not data.startswith(MARK):
+        raise CaptureError("not_mdf", "it does not begin as an MDF file", REMEDY)
+    found = []
+    try:
+        with asammdf.MDF(io.BytesIO(data)) as file:
+            for number, group in enumerate(file.virtual_groups):
+                fields: dict[str, np.ndarray] = {}
+                units: dict[str, str] = {}
+                for signal in file.select(
+                    [
+                        (None, g, c)
+                        for g, cs in file.included_channels(group)[group].items()
+                        for c in cs
+                    ]
+                ):
+                    values = np.asarray(signal.samples)
+                    if values.ndim == 1 and np.issubdtype(values.dtype, np.number):
+                        fields.setdefault("time", np.asarray(signal.timestamps))
+                        fields.setdefault(signal.name, values)
+                        units.setdefault(signal.name, signal.unit or "")
+                if fields:
+                    said = tuple((name, unit) for name, unit in units.items() if unit)
+                    found.append(RawTable(f"group {number}", fields, units=(("time", "s"), *said)))
+    except CaptureError:
+        raise
+    except Exception as fault:
+        raise CaptureError("not_mdf", f"it is no MDF file: {fault}", REMEDY) from fault
+    return tuple(found)
+
+
+READER = Reader("mdf4", read)

@@ -1,0 +1,34 @@
+"""One numpy array: a structured one has named fields, the columns of a plain one are `0`, `1`..."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from pipeline.io.foreign import Reader
+from pipeline.io.raw_table import RawTable
+from pipeline.records.errors import CaptureError
+
+REMEDY = "save it with numpy.save, a row a sample"
+
+
+def read(data: bytes) -> tuple[RawTable, ...]:
+    """One table; objects are never unpickled. Raises CaptureError for anything else."""
+    try:
+        array = np.load(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, EOFError, OSError, OverflowError, SyntaxError) as fault:
+        raise CaptureError("not_npy", f"it is no numpy array: {fault}", REMEDY) from fault
+    if not isinstance(array, np.ndarray):
+        raise CaptureError("not_npy", "it holds several arrays", "map it with `reader: npz`")
+    if array.dtype.names is not None and array.ndim == 1:
+        names = [n for n in array.dtype.names if np.issubdtype(array.dtype[n], np.number)]
+        return (RawTable("npy", {name: array[name] for name in names}),)
+    if not np.issubdtype(array.dtype, np.number) or array.ndim not in (1, 2):
+        what = f"an array of {array.dtype} with {array.ndim} dimensions"
+        raise CaptureError("not_a_table", f"it is {what}, no table", REMEDY)
+    columns = array.reshape(array.shape[0], -1)
+    return (RawTable("npy", {str(n): columns[:, n] for n in range(columns.shape[1])}),)
+
+
+READER = Reader("npy", read)

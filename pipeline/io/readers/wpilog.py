@@ -1,0 +1,121 @@
+"""WPILib data logs, as SysId records them: a table an entry, fields `timestamp` and its name.
+
+Form: "WPILOG", version, a header text, then records: a byte of field lengths, entry, payload size,
+time [µs], payload. Entry 0 holds control records that begin and end entries. Reference: WPILib Data
+Log File Format Specification, version 1.0 (wpilibsuite/allwpilib, datalog.adoc).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.io.foreign import Reader
+from pipeline.io.raw_table import RawTable
+from pipeline.records.errors import CaptureError
+
+MARK = b"WPILOG"
+SCALARS = {"double": "<d", "float": "<f", "int64": "<q", "boolean": "<?"}
+ARRAYS = {"double[]": ("<f8", 8), "float[]": ("<f4", 4), "int64[]": ("<i8", 8)}
+MICROSECOND_S = 1e-6
+START, FINISH = 0, 1
+
+
+@dataclass(slots=True)
+class _Entry:
+    name: str
+    kind: str
+    times_us: list[int] = field(default_factory=list)
+    payloads: list[bytes] = field(default_factory=list)
+
+
+def read(data: bytes) -> tuple[RawTable, ...]:
+    """Numeric entries; an array's elements are `NAME.0`, `NAME.1`, ... Texts are left out.
+
+    Raises CaptureError for what is no such log, or one that is cut off.
+    """
+    try:
+        entries = _entries(data)
+        found = [table for entry in entries if (table := _table(entry)) is not None]
+    except (struct.error, IndexError, UnicodeDecodeError) as fault:
+        raise CaptureError(
+            "not_wpilog", f"its records do not add up: {fault}", "copy the log again"
+        ) from fault
+    return tuple(found)
+
+
+def _entries(data: bytes) -> list[_Entry]:
+    if data[:6] != MARK:
+        raise CaptureError("not_wpilog", "it does not begin as a data log", "copy the log again")
+    (extra,) = struct.unpack_from("<I", data, 8)
+    open_, done = dict[int, _Entry](), list[_Entry]()
+    for number, time_us, payload in _records(data, 12 + extra):
+        if number == 0:
+            _control(payload, open_, done)
+        elif number in open_:
+            open_[number].times_us.append(time_us)
+            open_[number].payloads.append(payload)
+    return done
+
+
+def _control(payload: bytes, open_: dict[int, _Entry], done: list[_Entry]) -> None:
+    kind, number = struct.unpack_from("<BI", payload)
+    if kind == START:
+        name, at = _text(payload, 5)
+        form, _ = _text(payload, at)
+        open_[number] = _Entry(name, form)
+        done.append(open_[number])
+    elif kind == FINISH:
+        open_.pop(number, None)
+
+
+def _text(payload: bytes, at: int) -> tuple[str, int]:
+    (size,) = struct.unpack_from("<I", payload, at)
+    end = at + 4 + size
+    if end > len(payload):
+        raise IndexError("a name is longer than its record")
+    return payload[at + 4 : end].decode(), end
+
+
+def _records(data: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
+    """Entry, time [µs] and payload of each record."""
+    while at < len(data):
+        lengths = data[at]
+        numbers = []
+        at += 1
+        for size in ((lengths & 3) + 1, (lengths >> 2 & 3) + 1, (lengths >> 4 & 7) + 1):
+            if at + size > len(data):
+                raise IndexError(f"a record is cut off at byte {at}")
+            numbers.append(int.from_bytes(data[at : at + size], "little"))
+            at += size
+        entry, size, time_us = numbers
+        if at + size > len(data):
+            raise IndexError(f"a record is cut off at byte {at}")
+        yield entry, time_us, data[at : at + size]
+        at += size
+
+
+def _table(entry: _Entry) -> RawTable | None:
+    """The entry as numbers; None for one of texts or without any record."""
+    if not entry.payloads:
+        return None
+    times = np.array(entry.times_us, dtype=np.float64) * MICROSECOND_S
+    if entry.kind in SCALARS:
+        values = [struct.unpack(SCALARS[entry.kind], one)[0] for one in entry.payloads]
+        fields = {entry.name: np.array(values, dtype=np.float64)}
+    elif entry.kind in ARRAYS:
+        dtype, size = ARRAYS[entry.kind]
+        width = len(entry.payloads[0]) // size
+        if any(len(one) != width * size for one in entry.payloads):
+            return None
+        rows = np.frombuffer(b"".join(entry.payloads), dtype).reshape(-1, width)
+        fields = {f"{entry.name}.{n}": rows[:, n] for n in range(width)}
+    else:
+        return None
+    return RawTable(entry.name, {"timestamp": times, **fields})
+
+
+READER = Reader("wpilog", read)
