@@ -4,7 +4,7 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-data test test-slow lint lock screenshots stories recovery clean
+.PHONY: help demo demo-data test test-slow lint lock screenshots stories recovery mutants clean
 
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
@@ -14,6 +14,7 @@ help:
 	@echo "make demo-data simulate data/demo anew"
 	@echo "make screenshots  docs/images from the demo's report and recordings (needs chromium, lavapipe)"
 	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md; goes on after a stop"
+	@echo "make mutants   changes 40 places a package and runs their tests; writes docs/mutants.md; hours"
 	@echo "make stories   figures of docs/real-recordings.md, from ../shared/data/real"
 	@echo "make lock      resolve requirements.lock anew (needs uv)"
 	@echo "make clean     remove .venv and caches"
@@ -51,6 +52,9 @@ stories: $(READY)
 
 recovery: $(READY)
 	$(PY) -m tests.recovery.table --seeds 1000 --workers 2
+
+mutants: $(READY)
+	$(PY) -m tests.mutants.table --seed 1 --seed 2 --per-package 40
 
 lint: $(READY)
 	$(VENV)/bin/ruff check .

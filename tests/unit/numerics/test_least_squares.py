@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from pipeline.numerics.least_squares import (
     autocorrelation_time,
+    central_jacobian,
     gauss_newton,
     linear_fit,
 )
@@ -96,3 +98,122 @@ def test_autocorrelation_time_of_first_order_noise(phi, expected):
     for k in range(1, noise.size):
         noise[k] += phi * noise[k - 1]
     assert autocorrelation_time(noise) == pytest.approx(expected, rel=0.12)
+
+
+@pytest.mark.parametrize(
+    ("runs", "longest", "expected"),
+    [
+        ((8, 8), None, 5.375),
+        ((8, 8), 15, 5.375),
+        ((8, 8), 3, 4.75),
+        ((8, 8), 2, 2.625),
+        ((8, 8), 0, 1.0),
+        ((4, 4, 4, 4), None, 2.125),
+        ((3, 4, 2, 4, 3), None, 1.0),
+        ((4, 3), None, 1.0),
+        ((4, 4), None, 1.0),
+        ((1,) * 32, None, 1.0),
+    ],
+)
+def test_autocorrelation_time_of_runs_of_one_and_minus_one(runs, longest, expected):
+    """Sixteen samples: rho_1 = (15 - 2 changes)/16, which is noise below 2/sqrt(16) = 1/2.
+
+    Two runs of eight: rho_k = (16 - 3 k)/16; pairs 29/16, 17/16, 5/16 up to lag 5, then below 0.
+    Four runs of four: rho = 1, 9/16, then 2/16 - 5/16 < 0 ends the sum: 2 * 25/16 - 1 = 2.125.
+    """
+    signs = np.repeat(np.where(np.arange(len(runs)) % 2, -1.0, 1.0), runs)
+    assert autocorrelation_time(signs, longest) == pytest.approx(expected, rel=1e-12)
+
+
+def test_autocorrelation_time_needs_eight_samples_and_some_power():
+    assert autocorrelation_time(np.full(50, 3.0)) == 1.0
+    ramp = np.arange(8.0)  # rho = 1, 5/8, ...: below 2/sqrt(8)
+    assert autocorrelation_time(ramp) == 1.0
+    ramp = np.arange(40.0)
+    assert autocorrelation_time(ramp) == autocorrelation_time(5.0 - 2.0 * ramp) > 10.0
+
+
+def test_known_sigma_gives_its_own_covariance():
+    """(X'WX)^-1 by hand: a mean of weights 1/sigma², and chi² per degree of freedom."""
+    sigma, y = np.array([0.5, 1.0, 2.0, 1.0]), np.array([1.0, 2.0, 5.0, 4.0])
+    weight = sigma**-2
+    fit = linear_fit(np.ones((4, 1)), y, sigma)
+    mean = (weight * y).sum() / weight.sum()
+    assert fit.coefficients == pytest.approx([mean])
+    assert fit.u(0) == pytest.approx(1.0 / np.sqrt(weight.sum()))
+    assert fit.chi2_dof == pytest.approx((weight * (y - mean) ** 2).sum() / 3.0)
+    assert (fit.dof, fit.rank) == (3, 1)
+
+
+def test_an_empty_column_takes_nothing_and_spoils_nothing():
+    x = np.arange(6.0)
+    fit = linear_fit(np.column_stack([x, np.zeros(6)]), 3.0 * x)
+    assert fit.coefficients == pytest.approx([3.0, 0.0])
+    assert fit.rank == 1
+
+
+@pytest.mark.parametrize(("angle", "rank"), [(3e-10, 2), (0.5e-10, 1)])
+def test_columns_part_down_to_the_rank_tolerance(angle, rank):
+    """Two unit columns at an angle a have singular values near sqrt 2 and a/sqrt 2."""
+    columns = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)], [0.0, 0.0]])
+    assert linear_fit(columns, np.ones(3)).rank == rank
+
+
+def boxed(seed):
+    """A random linear problem whose minimum lies outside the box [0, 0.3]^4."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.standard_normal((12, 4)), rng.standard_normal(12)
+    return a, b
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_gauss_newton_in_a_box_against_scipy(seed):
+    """Bounds that hold and bounds that let go: scipy's active-set solver finds the same point."""
+    a, b = boxed(seed)
+    low, high = np.zeros(4), np.full(4, 0.3)
+    known = lsq_linear(a, b, (low, high), method="bvls", tol=1e-14).x
+    fit = gauss_newton(lambda x: (a @ x - b, a), np.array([0.0, 0.3, 0.1, 0.9]), low, high)
+    assert fit.converged
+    assert fit.parameters == pytest.approx(known, abs=1e-6)
+    assert fit.cost == pytest.approx(float(((a @ known - b) ** 2).sum()), rel=1e-9)
+
+
+def test_one_step_solves_a_linear_problem():
+    a, b = boxed(1)
+    fit = gauss_newton(lambda x: (a @ x - b, a), np.full(4, 5.0), iterations=1)
+    assert fit.parameters == pytest.approx(np.linalg.lstsq(a, b)[0], rel=1e-10)
+    assert not fit.converged
+    assert np.allclose(fit.covariance, np.linalg.inv(a.T @ a), rtol=1e-9)
+    assert fit.u(2) == pytest.approx(np.sqrt(np.linalg.inv(a.T @ a)[2, 2]))
+
+
+def test_gauss_newton_follows_the_banana_valley():
+    """Rosenbrock's function from its standard start: full steps rise, shorter ones reach (1, 1)."""
+
+    def model(x):
+        residuals = np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+        return residuals, np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]])
+
+    fit = gauss_newton(model, np.array([-1.2, 1.0]), iterations=100)
+    assert fit.converged
+    assert fit.parameters == pytest.approx([1.0, 1.0], abs=1e-6)
+
+
+def test_a_step_that_leads_nowhere_is_shortened():
+    """Of arctan from 3 full steps diverge (|x| > 1.39), and a model may end in infinity."""
+
+    def model(x):
+        wild = np.abs(x) > 10.0
+        return np.where(wild, np.inf, np.arctan(x)), np.diag(1.0 / (1.0 + x**2))
+
+    fit = gauss_newton(model, np.array([3.0]))
+    assert fit.converged
+    assert fit.parameters == pytest.approx([0.0], abs=1e-6)
+
+
+def test_central_differences_are_exact_on_parabolas():
+    def function(x):
+        return np.array([x[0] ** 2 + 3.0 * x[1], x[0] * x[1], 7.0])
+
+    jacobian = central_jacobian(function, np.array([2.0, -5.0]), np.array([0.5, 0.25]))
+    assert np.allclose(jacobian, [[4.0, 3.0], [-5.0, 2.0], [0.0, 0.0]], atol=1e-12)

@@ -57,3 +57,48 @@ def test_a_stretch_that_is_too_short_joins_the_one_before() -> None:
         (40, "a"),
         (70, "c"),
     ]
+
+
+def test_rest_is_a_hundredth_of_the_speed_and_no_current_three_hundredths() -> None:
+    """Just inside and just outside each of the two shares, in either sense."""
+    speed = np.repeat([100.0, 0.98, 1.02, -0.98, -1.02], N)
+    assert [one.state for one in regimes(speed, np.full(5 * N, 1.0))] == [
+        MOTORING,
+        LOCKED,
+        MOTORING,
+        LOCKED,
+        GENERATING,
+    ]
+    current = np.repeat([10.0, 0.29, 0.31, -0.29, -0.31], N)
+    assert [one.state for one in regimes(np.full(5 * N, 1.0), current)] == [
+        MOTORING,
+        UNPOWERED,
+        MOTORING,
+        UNPOWERED,
+        GENERATING,
+    ]
+
+
+def test_a_short_record_is_told_row_by_row() -> None:
+    """Ten rows or fewer are ten blocks; of eleven, stretches below three blocks join the last."""
+    speed = np.array([0.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0])
+    told = regimes(speed, np.ones(10))
+    assert [(one.start, one.state) for one in told] == [(0, LOCKED), (1, MOTORING)]
+    longer = np.concatenate([speed, [0.0, 0.0]])
+    told = regimes(longer, np.ones(12))
+    assert [(one.start, one.state) for one in told] == [(0, LOCKED), (1, MOTORING)]
+    told = regimes(np.concatenate([longer, [0.0]]), np.ones(13))
+    assert [(one.start, one.state) for one in told][2:] == [(10, LOCKED)]
+
+
+def test_blocks_are_means_and_at_most_two_thousand() -> None:
+    """4001 rows are blocks of three: a stretch of nine rows counts, one of six does not."""
+    speed = np.full(4001, 10.0)
+    speed[300:309] = 0.0
+    speed[900:906] = 0.0
+    told = regimes(speed, np.ones(4001))
+    assert [(one.start, one.state) for one in told] == [
+        (0, MOTORING),
+        (300, LOCKED),
+        (309, MOTORING),
+    ]

@@ -1,0 +1,88 @@
+"""Which source files make a package, and which tests are its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Package:
+    """Globs of source files, globs of those left to other packages, and its tests."""
+
+    name: str
+    sources: tuple[str, ...]
+    tests: tuple[str, ...]
+    without: tuple[str, ...] = ()
+
+    def files(self, root: Path) -> list[Path]:
+        """Source files, sorted."""
+        found = {path for glob in self.sources for path in root.glob(glob)}
+        return sorted(found - {path for glob in self.without for path in root.glob(glob)})
+
+    def test_files(self, root: Path) -> list[Path]:
+        """Test files, sorted."""
+        found: set[Path] = set()
+        for name in self.tests:
+            place = root / name
+            found.update([place] if place.is_file() else place.rglob("test_*.py"))
+        return sorted(found)
+
+
+PACKAGES = {
+    package.name: package
+    for package in (
+        Package(
+            "physics",
+            ("pipeline/physics/*.py",),
+            ("tests/unit/physics", "tests/unit/test_glossary.py", "tests/unit/stages/test_calc.py"),
+        ),
+        Package("numerics", ("pipeline/numerics/*.py",), ("tests/unit/numerics",)),
+        Package("fit", ("pipeline/fit/**/*.py",), ("tests/unit/fit",)),
+        Package(
+            "contracts",
+            ("pipeline/contracts/**/*.py",),
+            (
+                "tests/unit/contracts",
+                "tests/contracts",
+                "tests/unit/test_glossary.py",
+                "tests/faults/test_coverage.py",
+                "tests/faults/test_gaps.py",
+                "tests/faults/test_phases.py",
+                "tests/faults/test_several_captures.py",
+                "tests/faults/test_signs.py",
+                "tests/faults/test_simulated.py",
+                "tests/faults/test_temperatures.py",
+                "tests/faults/test_validate.py",
+            ),
+        ),
+        Package("crosscheck", ("pipeline/crosscheck/**/*.py",), ("tests/unit/crosscheck",)),
+        Package("criticism", ("pipeline/criticism/**/*.py",), ("tests/unit/criticism",)),
+        Package("lots", ("pipeline/lots/*.py",), ("tests/unit/lots",)),
+        Package(
+            "mcap",
+            ("pipeline/io/mcap/*.py",),
+            (
+                "tests/unit/io/mcap",
+                "tests/unit/io/test_cdr.py",
+                "tests/unit/io/test_conformance.py",
+                "tests/unit/io/test_ingest.py",
+                "tests/unit/io/test_json_payload.py",
+                "tests/unit/io/test_protobuf.py",
+                "tests/unit/io/test_write_capture.py",
+                "tests/faults/test_bad_mcap.py",
+                "tests/faults/test_recovered.py",
+            ),
+        ),
+        Package(
+            "io",
+            ("pipeline/io/*.py", "pipeline/io/readers/*.py", "pipeline/io/recordings/*.py"),
+            ("tests/unit/io",),
+        ),
+        Package("records", ("pipeline/records/*.py",), ("tests/unit/records",)),
+        Package("export", ("pipeline/export/**/*.py",), ("tests/unit/export",)),
+        Package("report", ("pipeline/report/*.py",), ("tests/unit/report",)),
+        Package("simulator", ("pipeline/simulator/*.py",), ("tests/unit/simulator",)),
+        Package("stages", ("pipeline/stages/**/*.py",), ("tests/unit/stages", "tests/unit/cli")),
+    )
+}

@@ -1,0 +1,133 @@
+"""`python -m tests.mutants.table`: mutants of every package into `docs/mutants.md`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+
+from tests.mutants.operators import Mutant
+from tests.mutants.packages import PACKAGES
+from tests.mutants.run import Outcome, run
+from tests.mutants.scratch import Scratch
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "mutants.md"
+CACHE = ROOT / "reports" / "mutants"
+WANTED = 0.85
+ABOUT = """# Do the tests see a wrong line?
+
+`make mutants` changes one point of the code (a constant by 15 % or by one, an operator, a boundary
+or a direction of a comparison, a sign, a condition, the bound of a slice), runs the tests of the
+package that run the changed line, and asks whether one fails. Text, types and messages are not
+changed. {count} mutants a package and seed; the same seed draws the same ones while the code stays.
+
+*Equivalent* are mutants that no test can tell from the code, or whose difference is below what
+the code promises; each was judged by a person, with the reason, in `tests/mutants/judged.yaml`. The
+rate is killed / (drawn - equivalent); at least 85 % is asked. The tests of a mutant stop at
+{limit:g} s of CPU time, measured under a tracer, the quickest first. A mutant that does not end
+counts as killed.
+
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs what was asked for and rebuilds the page from all results kept."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants.table", description=__doc__)
+    parser.add_argument("--seed", type=int, action="append", help="may be repeated; default 1, 2")
+    parser.add_argument("--per-package", type=int, default=40)
+    parser.add_argument("--package", action="append", choices=sorted(PACKAGES))
+    parser.add_argument("--survivors", action="store_true", help="only those that survived before")
+    parser.add_argument("--page", action="store_true", help="only the page, from results kept")
+    chosen = parser.parse_args(arguments)
+    CACHE.mkdir(parents=True, exist_ok=True)
+    if not chosen.page:
+        with tempfile.TemporaryDirectory(prefix="mutants-") as place:
+            _measure(chosen, Path(place))
+    results = {path: _kept(path) for path in sorted(CACHE.glob("result-*.json"))}
+    page = _page({path.stem: outcomes for path, outcomes in results.items()}, chosen.per_package)
+    PAGE.write_text(page, encoding="utf-8")
+    return 0
+
+
+def _measure(chosen: argparse.Namespace, place: Path) -> None:
+    scratch = Scratch(ROOT, place)
+    for name in chosen.package or PACKAGES:
+        for seed in chosen.seed or (1, 2):
+            path = CACHE / f"result-{name}-{seed}.json"
+            before = _kept(path) if chosen.survivors else []
+            left = frozenset(o.mutant.key for o in before if o.verdict == "survived")
+            if chosen.survivors and not left:
+                continue
+            outcomes = run(
+                PACKAGES[name],
+                scratch,
+                CACHE,
+                seed=seed,
+                count=chosen.per_package,
+                note=_say,
+                only=left,
+            )
+            outcomes += [o for o in before if o.mutant.key not in left]
+            outcomes.sort(key=lambda o: (o.mutant.path, o.mutant.start))
+            path.write_text(json.dumps([asdict(o) for o in outcomes], indent=1))
+            _say(f"{name} seed {seed}: {_row(name, seed, outcomes)}")
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def _kept(path: Path) -> list[Outcome]:
+    if not path.exists():
+        return []
+    return [
+        Outcome(Mutant(**o["mutant"]), o["verdict"], o["why"]) for o in json.loads(path.read_text())
+    ]
+
+
+def _row(name: str, seed: int, outcomes: list[Outcome]) -> str:
+    count = Counter(o.verdict for o in outcomes)
+    real = len(outcomes) - count["equivalent"]
+    rate = count["killed"] / real if real else 1.0
+    mark = "" if rate >= WANTED else " (short)"
+    cells = (name, seed, len(outcomes), count["killed"], count["equivalent"], count["survived"])
+    return f"| {' | '.join(map(str, cells))} | {100 * rate:.0f} %{mark} |"
+
+
+def _page(results: dict[str, list[Outcome]], count: int) -> str:
+    from tests.mutants.run import TESTS_S
+
+    lines = [ABOUT.format(count=count, limit=TESTS_S)]
+    lines.append("| package | seed | drawn | killed | equivalent | survived | rate |\n")
+    lines.append("| --- | --: | --: | --: | --: | --: | --: |\n")
+    survivors = []
+    for name in PACKAGES:
+        for stem, outcomes in results.items():
+            package, seed = stem.removeprefix("result-").rsplit("-", 1)
+            if package != name or not outcomes:
+                continue
+            lines.append(_row(name, int(seed), outcomes) + "\n")
+            survivors += [(name, seed, o) for o in outcomes if o.verdict == "survived"]
+    lines.append("\n## Survivors\n\n| package | seed | where | change | why |\n")
+    lines.append("| --- | --: | --- | --- | --- |\n")
+    for name, seed, outcome in survivors:
+        mutant = outcome.mutant
+        where = f"`{mutant.path.removeprefix('pipeline/')}` `{mutant.function}`"
+        change = f"`{_cell(mutant.before)}` to `{_cell(mutant.after)}`"
+        lines.append(f"| {name} | {seed} | {where} | {change} | {outcome.why} |\n")
+    return "".join(lines)
+
+
+def _cell(text: str) -> str:
+    line = " ".join(text.split()).replace("|", "\\|").replace("`", "'")
+    return line if len(line) <= 70 else f"{line[:67]}..."
+
+
+if __name__ == "__main__":
+    sys.exit(main())
