@@ -54,6 +54,22 @@ class ReadingSettings(Settings):
 
 
 @dataclass(kw_only=True)
+class ModelSettings:
+    """`model.name` and `model.effects`: which model is held against the recordings."""
+
+    name: str = key(
+        "standard",
+        "ideal, or standard: with copper_temperature, magnet_temperature and coulomb_friction; "
+        "model=NAME says the same",
+    )
+    effects: list[str] = key(
+        [],
+        "[a,b] adds effects, [-a] takes one away: those of effects_path, and these",
+        room="pipeline.criticism.effects",
+    )
+
+
+@dataclass(kw_only=True)
 class RunSettings(ReadingSettings):
     """`run`: captures in; datasheets, checks, report and recordings out."""
 
@@ -93,6 +109,12 @@ class RunSettings(ReadingSettings):
         place=True,
     )
     registry_options: dict[str, Any] = key({}, "of deltalake, for a URL", result=False)
+    residual_test: bool = key(
+        True,
+        "hold the captures against model= down to their noise, as diagnose does; false: "
+        "not_tested, which a person may release and release=auto does not",
+    )
+    model: ModelSettings = field(default_factory=ModelSettings)
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
     gates: dict[str, Any] = key({}, "options of a gate: gates.GATE.OPTION=number")
     crosscheck: dict[str, Any] = key({}, "options of a check: crosscheck.CHECK.OPTION=number")
@@ -206,22 +228,6 @@ class SimulateSettings(Settings):
     exact: bool = key(False, "instruments without gain errors")
     encoding: str = key("mixed", "mixed, csv, json, protobuf, cdr, or json_samples and the like")
     fleet: str | None = key(None, "fleet of conf/fleet/: many motors at once, seed its own")
-
-
-@dataclass(kw_only=True)
-class ModelSettings:
-    """`model.name` and `model.effects`: which model is held against the recordings."""
-
-    name: str = key(
-        "standard",
-        "ideal, or standard: with copper_temperature, magnet_temperature and coulomb_friction; "
-        "model=NAME says the same",
-    )
-    effects: list[str] = key(
-        [],
-        "[a,b] adds effects, [-a] takes one away: those of effects_path, and these",
-        room="pipeline.criticism.effects",
-    )
 
 
 @dataclass(kw_only=True)

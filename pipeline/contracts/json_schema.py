@@ -17,6 +17,7 @@ from pipeline.records.datasheet import CheckStatus, DatasheetStatus
 from pipeline.records.estimate import Status
 from pipeline.records.finding import Severity
 from pipeline.records.lot_regression import LotRegression
+from pipeline.records.model_verdict import ModelState
 from pipeline.records.plain_form import hints_of
 from pipeline.records.uncertainty import Kind
 
@@ -125,6 +126,27 @@ def _check() -> Schema:
     )
 
 
+def _model() -> Schema:
+    """The residual test of a datasheet: numbers where a model was fitted."""
+    quantity = _object({"value": NUMBER, "u": SPREAD, "unit": TEXT})
+    excess = {"capture": NAME, "signal": NAME, "order": SPREAD, "floors": SPREAD, "size": SPREAD}
+    return _object(
+        {
+            "verdict": _one_of(ModelState),
+            "missing": _list(_object({"effect": NAME, "parameters": _map(quantity)})),
+            "held_out": _or_null(SPREAD),
+            "residual": _or_null(SPREAD),
+        },
+        {
+            "name": NAME,
+            "effects": _list(NAME),
+            "worst": _or_null(_object({**excess, "unit": TEXT})),
+            "over": COUNT,
+            "note": TEXT,
+        },
+    )
+
+
 def datasheet_schema() -> Schema:
     """`datasheets/MOTOR.json`."""
     capture = {"path": NAME, "sha256": SHA256, "test": {"enum": [*TESTS]}}
@@ -167,6 +189,7 @@ def datasheet_schema() -> Schema:
             "alternatives": _list(
                 {"allOf": [{"$ref": "#/$defs/estimate"}, _object({"name": NAME})]}
             ),
+            "model": _model(),
         },
     )
     return _document("motor-datasheet/1", "One version of one motor's datasheet", body) | {

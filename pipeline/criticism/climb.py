@@ -14,7 +14,6 @@ from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.judge import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.order_scan import orders_left
-from pipeline.criticism.segment import Segment
 from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import Rung, search
 from pipeline.criticism.specification import model_of
@@ -76,19 +75,20 @@ def ended(
     campaign: Campaign,
     model: ModelSpec,
     machine: Machine,
-    found: Sequence[Segment],
+    begun: Begun,
     library: Mapping[str, Effect],
     name: str,
 ) -> End:
     """Climbs, once more with instruments that wander where no state of the machine predicts what is
-    left, and sketches what nothing explains as an effect of some `name`; `found` are the campaign's
-    segments.
+    left, and sketches what nothing explains as an effect of some `name`; `begun` is the fit of the
+    model to the campaign's segments.
     """
 
     def climb(*orders: float) -> Ladder:
+        if not orders:
+            return climbed(begun, library)
         wider = replace(machine, load_orders=orders)
-        seen = segments(campaign, wider) if orders else found
-        return climbed(fit_of(seen, model_of(model, wider)), library)
+        return climbed(fit_of(segments(campaign, wider), model_of(model, wider)), library)
 
     ladder, sketch = _by_orders(climb, name)
     left, notes = ladder.left, []

@@ -8,8 +8,9 @@ from dataclasses import replace
 
 from scipy.special import gammaincc
 
+from pipeline.criticism.asked import fit_of
 from pipeline.criticism.captured import at_ambient, unexcited, unused
-from pipeline.criticism.climb import Ladder, ended
+from pipeline.criticism.climb import End, ended
 from pipeline.criticism.descent import gauss_newton
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
@@ -26,6 +27,7 @@ from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import segments
 from pipeline.criticism.selection import Rung, loss_without
 from pipeline.criticism.size import PAIRLESS, machine_of
+from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import System
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -39,7 +41,7 @@ from pipeline.records.diagnosis import (
 )
 from pipeline.records.naming import file_stem
 
-_TOO_LITTLE = (
+TOO_LITTLE = (
     "the captures cannot fit the base model: record a torque map or drive log with dq voltages, "
     "currents and angle"
 )
@@ -63,15 +65,16 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     if machine is None:
         return _insufficient(campaign, model, library, PAIRLESS)
     found = segments(campaign, machine)
-    if not _enough(found):
-        return _insufficient(campaign, model, library, _TOO_LITTLE)
+    if not enough(found):
+        return _insufficient(campaign, model, library, TOO_LITTLE)
     name = f"{file_stem(campaign.motor_id)}_unknown"
-    end = ended(campaign, model, machine, found, library, name)
+    begun = fit_of(found, model_of(model, machine))
+    end = ended(campaign, model, machine, begun, library, name)
     ladder, found, last = end.ladder, end.ladder.begun.segments, end.ladder.rungs[-1]
     offered = candidates(library, last.fitted)
     ranking = _ranking(ladder.rungs, ladder.held, offered, library, found, ladder.cut)
-    unseen = unexcited(campaign, library, last, offered)
-    verdict = _verdict(ladder, end.left, unseen)
+    unseen = not_shown(campaign, library, end)
+    verdict = verdict_of(end, unseen)
     stateless = verdict == "unknown" and end.sketch is None
     return Diagnosis(
         campaign.motor_id,
@@ -108,7 +111,7 @@ def _as_told(
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
 
 
-def _enough(found: Sequence[Segment]) -> bool:
+def enough(found: Sequence[Segment]) -> bool:
     """Whether there is a test under current and one that turns, or one that is both."""
     kinds = {segment.kind for segment in found}
     if kinds & {"dq", "q", "flux_map", "steady"}:
@@ -137,10 +140,17 @@ def _insufficient(
     )
 
 
-def _verdict(ladder: Ladder, left: Sequence[Remainder], unseen: Sequence[Unexcited]) -> Verdict:
-    if left and not ladder.explains(left):
+def not_shown(campaign: Campaign, library: Mapping[str, Effect], end: End) -> tuple[Unexcited, ...]:
+    """Effects that no capture would show beside the model at the end of the ladder."""
+    last = end.ladder.rungs[-1]
+    return unexcited(campaign, library, last, candidates(library, last.fitted))
+
+
+def verdict_of(end: End, unseen: Sequence[Unexcited]) -> Verdict:
+    """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
+    if end.left and not end.ladder.explains(end.left):
         return "unknown"
-    if ladder.rungs[-1].added:
+    if end.ladder.rungs[-1].added:
         return "missing"
     return "insufficient" if unseen else "adequate"
 

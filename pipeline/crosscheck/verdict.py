@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from pipeline.records.datasheet import AWAITS_APPROVAL, CaptureReference, Check, DatasheetStatus
 from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import ModelVerdict
 
 
 def verdict(
@@ -14,13 +15,16 @@ def verdict(
     captures: Iterable[CaptureReference],
     required: Sequence[str],
     release: str,
+    model: ModelVerdict,
+    motor_id: str,
 ) -> tuple[DatasheetStatus, tuple[str, ...]]:
     """The status of `contract/outputs.md` and every reason that keeps it from `released`.
 
     `required` are the constants that the limits file wants measured; `release` is `auto` or
     `manual` (then a person approves in the registry, and the file stays provisional). A constant
     that came out where no motor is keeps any datasheet back, required or not: what is wrong with
-    its captures is in what else rests on them.
+    its captures is in what else rests on them. So does a model that misses its captures by more
+    than their noise, and one that was not held against them: what was not looked at is not sound.
     """
     failed = [check for check in checks if check.status == "fail"]
     if failed:
@@ -40,6 +44,8 @@ def verdict(
         for name, estimate in sorted(constants.items())
         if estimate.impossible and name not in required
     ]
+    if (lacking := model.reason(motor_id)) is not None:
+        why.append(lacking)
     if release != "auto":
         why.append(AWAITS_APPROVAL)
     return ("provisional", tuple(why)) if why else ("released", ())

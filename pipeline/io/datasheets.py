@@ -11,6 +11,7 @@ from typing import Any
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet, Superseded
 from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate, Order
+from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.uncertainty import Budget, Contribution, effective_dof
 
 SCHEMA = "motor-datasheet/1"
@@ -46,7 +47,8 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
     """The record that `Datasheet.document` wrote; the inverse of it.
 
     A document of before contributions told their own degrees of freedom gives those of type A
-    what makes the published total (GUM eq. G.2b). Raises LookupError, TypeError or ValueError
+    what makes the published total (GUM eq. G.2b); one of before the residual test has no model.
+    Raises LookupError, TypeError or ValueError
     for anything else.
     """
     provenance = document["provenance"]
@@ -76,6 +78,7 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
         checks=tuple(_check(check) for check in document["checks"]),
         libraries=provenance.get("libraries", ""),
         supersedes=_superseded(document.get("supersedes")),
+        model=None if document.get("model") is None else ModelVerdict.of(document["model"]),
     )
 
 

@@ -7,12 +7,22 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import MODEL_REASON, ModelVerdict
 
 CheckStatus = Literal["pass", "marginal", "fail", "not_evaluated"]
 DatasheetStatus = Literal["released", "provisional", "refused"]
 
-# The one reason in `why` that a person's approval settles.
 AWAITS_APPROVAL = "not approved: approve it in the registry, or run with release=auto"
+"""The reason in `why` of every datasheet that is not released by itself."""
+
+
+def left_to_a_person(reason: str) -> bool:
+    """Whether a person may approve a datasheet in spite of a reason in its `why`.
+
+    So it is where nothing but the approval lacks, and where the model of the motor leaves something
+    in its captures or could not be tested: constants are measured, what else the motor does is not.
+    """
+    return reason == AWAITS_APPROVAL or reason.startswith(MODEL_REASON)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +93,7 @@ class Datasheet:
     """Everything known of one motor, reproducibly: same inputs, configuration, code, bytes.
 
     `libraries` are the versions of Python and of the libraries that the numbers hang on.
+    `model` is None in datasheets of before there was a residual test.
     """
 
     motor_id: str
@@ -99,6 +110,7 @@ class Datasheet:
     checks: tuple[Check, ...]
     libraries: str = ""
     supersedes: Superseded | None = None
+    model: ModelVerdict | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema motor-datasheet/1."""
@@ -123,4 +135,4 @@ class Datasheet:
                 for est in sorted(self.alternatives, key=lambda e: (e.name, e.method))
             ],
             "checks": [check.document() for check in self.checks],
-        }
+        } | ({} if self.model is None else {"model": self.model.document()})

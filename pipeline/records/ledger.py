@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 from datetime import datetime
 from typing import Literal
 
-from pipeline.records.datasheet import AWAITS_APPROVAL, DatasheetStatus
+from pipeline.records.datasheet import DatasheetStatus, left_to_a_person
 
 EventKind = Literal["publish", "approve", "revoke", "tag", "untag"]
 Standing = Literal["released", "provisional", "refused", "revoked"]
@@ -133,7 +133,7 @@ class Version:
     @property
     def open_points(self) -> tuple[str, ...]:
         """What keeps the version from a release and no approval settles."""
-        return tuple(reason for reason in self.published.reasons if reason != AWAITS_APPROVAL)
+        return tuple(one for one in self.published.reasons if not left_to_a_person(one))
 
 
 def histories(

@@ -9,6 +9,7 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
+from pipeline.report.model_words import model_words
 
 COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("p", "pole_pairs", 1.0),
@@ -38,6 +39,11 @@ def summary(
             for c in sheet.checks
             if c.status in ("fail", "marginal")
         ]
+    lines += [
+        f"{printable(sheet.motor_id)}: {printable(words.sentence)}; {words.command} tells more"
+        for sheet in datasheets
+        if (words := model_words(sheet.model, sheet.motor_id)).command
+    ]
     counts = Counter(sheet.status for sheet in datasheets)
     states = ", ".join(f"{counts[s]} {s}" for s in ("released", "provisional", "refused"))
     refused = sum(finding.severity == "refused" for finding in findings)
@@ -58,12 +64,13 @@ def nothing_usable(folder: str, *, refused: bool) -> str:
 
 
 def _table(datasheets: Sequence[Datasheet]) -> list[str]:
-    head = ["motor", "lot", "status", *(title for title, *_ in COLUMNS)]
+    head = ["motor", "lot", "status", "model", *(title for title, *_ in COLUMNS)]
     rows = [
         [
             printable(sheet.motor_id),
             printable(sheet.lot or NONE),
             sheet.status,
+            model_words(sheet.model, sheet.motor_id).short,
             *(_cell(sheet.constants.get(name), scale) for _, name, scale in COLUMNS),
         ]
         for sheet in datasheets
@@ -71,7 +78,7 @@ def _table(datasheets: Sequence[Datasheet]) -> list[str]:
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     return [
         "  ".join(
-            text.ljust(width) if column < 3 else text.rjust(width)
+            text.ljust(width) if column < 4 else text.rjust(width)
             for column, (text, width) in enumerate(zip(row, widths, strict=True))
         ).rstrip()
         for row in [head, *rows]

@@ -13,6 +13,7 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
+from pipeline.report.model_words import ModelWords, model_words
 from pipeline.report.page import render
 from pipeline.report.strip import Dot, strip_plot
 from pipeline.report.words import KEY_CONSTANTS, constant_words, symbol
@@ -47,6 +48,7 @@ class MotorRow:
     sheet: Datasheet
     link: str
     failed: tuple[tuple[str, str], ...]
+    model: ModelWords
     cells: tuple[Cell, ...]
 
 
@@ -105,7 +107,8 @@ def _column(name: str, scale: Scale) -> Column:
 def _motor_row(sheet: Datasheet, shown: Sequence[tuple[str, Scale]]) -> MotorRow:
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     cells = tuple(_cell(sheet.constants.get(name), scale) for name, scale in shown)
-    return MotorRow(sheet, page_of(sheet.motor_id), failed, cells)
+    model = model_words(sheet.model, sheet.motor_id)
+    return MotorRow(sheet, page_of(sheet.motor_id), failed, model, cells)
 
 
 def _cell(estimate: Estimate | None, scale: Scale) -> Cell:

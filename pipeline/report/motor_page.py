@@ -16,6 +16,7 @@ from pipeline.records.finding import Finding
 from pipeline.records.uncertainty import covariance
 from pipeline.report.chart import chart
 from pipeline.report.conditions import conditions
+from pipeline.report.model_words import model_words
 from pipeline.report.page import render
 from pipeline.report.words import GROUPS, KEY_CONSTANTS, constant_words, grouped, symbol
 
@@ -23,7 +24,7 @@ NEGLIGIBLE = 1e-3
 CHECK_ORDER = ("fail", "marginal", "not_evaluated", "pass")
 STATUS_WORDS = {
     "released": "Every capture verified, every check holds, approved.",
-    "provisional": "Usable, with something missing or unverified.",
+    "provisional": "Usable, with something missing, unverified or not explained.",
     "refused": "Do not use: a check failed.",
 }
 
@@ -88,6 +89,7 @@ def render_motor(
         checks=_ordered(datasheet.checks),
         check_counts=[(status, counts[status]) for status in CHECK_ORDER if counts[status]],
         check_number=check_number,
+        model=model_words(datasheet.model, datasheet.motor_id),
         findings=sorted(findings),
         figures=figures,
         drawn={figure.estimator for figure in figures},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -38,8 +38,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     While workers read the captures, the module that the judge `needs` is imported.
     """
     input_folder(settings.input)
-    if settings.model.effects or settings.effects_path is not None:
-        _known(settings)
+    known_effects(settings.model.effects, settings.effects_path)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     watch, output = Stopwatch(), output_folder(settings.output)
     with mate(settings.effects_path) as second:
@@ -58,12 +57,14 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     return replace(outcome, timings=watch.table())
 
 
-def _known(settings: CompareSettings) -> None:
+def known_effects(wanted: Sequence[str], effects_path: str | None = None) -> None:
     """Refuses the name of an effect that there is not, also of one to take away, or is twice."""
+    if not wanted and effects_path is None:
+        return
     from pipeline.criticism.registry import chosen
 
-    names = tuple(name.removeprefix("-") for name in settings.model.effects)
-    chosen(names, settings.effects_path)
+    names = tuple(name.removeprefix("-") for name in wanted)
+    chosen(names, effects_path)
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise UsageError(f"model.effects names {twice[0]} twice", "name it once")

@@ -20,6 +20,7 @@ from pipeline.records.datasheet import CaptureReference, Check, Datasheet, Super
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
+from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
 from pipeline.stages.fleet.captures import ReadTask, usable_captures
@@ -27,6 +28,7 @@ from pipeline.stages.fleet.fits import FitMemory
 from pipeline.stages.fleet.jobs import Files, Finished, MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import libraries_version, note_motor
 from pipeline.stages.fleet.keys import key_of, superseding_parts, version_parts
+from pipeline.stages.fleet.model_tests import ModelMemory, tested_model
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -59,8 +61,12 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     findings.extend(Finding(job.motor_id, "warning", *failure) for failure in failures)
     with watch.stage("crosscheck"):
         checks = check_all(constants, campaign, job.crosscheck)
+    with watch.stage("residual test"):
+        recalled = None if job.key is None else ModelMemory(job, readings, version)
+        model, broken = tested_model(campaign, job.model, constants, recalled)
+    findings.extend(broken)
     datasheet = superseding(
-        assemble(job, campaign, readings, version, constants, checks), job.revoked
+        assemble(job, campaign, readings, version, constants, checks, model), job.revoked
     )
     files = _write(job, campaign, datasheet, evidence, (*job.findings, *findings), watch)
     return Finished(tuple(findings), files)
@@ -73,6 +79,7 @@ def assemble(
     version: str,
     constants: Constants,
     checks: tuple[Check, ...],
+    model: ModelVerdict,
 ) -> Datasheet:
     """The datasheet of one motor; `readings` are the digests of its captures as read."""
     references = tuple(
@@ -82,7 +89,9 @@ def assemble(
         for c, read in zip(campaign.captures, readings, strict=True)
     )
     chosen = constants.chosen()
-    status, why = verdict(chosen, checks, references, job.required, job.release)
+    status, why = verdict(
+        chosen, checks, references, job.required, job.release, model, campaign.motor_id
+    )
     motor_type, lot = campaign.nameplate("motor_type"), campaign.nameplate("lot")
     return Datasheet(
         motor_id=campaign.motor_id,
@@ -98,6 +107,7 @@ def assemble(
         alternatives=constants.rest(),
         checks=checks,
         libraries=libraries_version(),
+        model=model,
     )
 
 

@@ -19,6 +19,7 @@ from pipeline.io.publish import canonical_json, output_folder
 from pipeline.io.registry import Registry
 from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
+from pipeline.records.comparison import ModelSpec
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Event, Revocation
@@ -26,6 +27,7 @@ from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.report.progress import progress
 from pipeline.settings import RunSettings, configuration_folder, result_document
+from pipeline.stages.criticism import known_effects
 from pipeline.stages.fleet.crew import Crew
 from pipeline.stages.fleet.jobs import MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import Batch, Keeping, tools_version
@@ -61,6 +63,8 @@ def main(settings: RunSettings) -> Outcome:
     check_options(settings)
     ReadLimits(settings.read_seconds, settings.read_memory_mb)
     input_folder(settings.input)
+    if settings.residual_test:
+        known_effects(settings.model.effects)
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
     registry = _registry(settings)
@@ -215,6 +219,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     required = required_constants(limits)
     # Of the limits file, what a lot is held to changes no datasheet.
     work = canonical_json({**result_document(settings), "required": required})
+    model = ModelSpec(settings.model.name, tuple(settings.model.effects))
     jobs = [
         MotorJob(
             motor_id=motor_id,
@@ -229,6 +234,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             gates=settings.gates,
             fit=settings.fit,
             crosscheck=settings.crosscheck,
+            model=model if settings.residual_test else None,
             findings=tuple(f for f in found.findings if f.file in {e.path for e in own}),
             limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )

@@ -66,6 +66,7 @@ def test_auto_release_needs_every_condition(bench: Path, tmp_path: Path) -> None
     copy = tmp_path / "in"
     shutil.copytree(bench / "one", copy)
     words = ["release=auto", "report=false", "recordings=false", "workers=1"]
+    words.append("model.effects=[cogging]")
     assert main(["run", f"input={copy}", f"output={tmp_path / 'whole'}", *words]) == 0
     (sheet,) = (tmp_path / "whole" / "datasheets").iterdir()
     whole = json.loads(sheet.read_bytes())

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from pipeline.io.guard import ReadLimits
 from pipeline.io.survey import Entry
+from pipeline.records.comparison import ModelSpec
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
 from pipeline.records.naming import printable
@@ -29,7 +30,8 @@ class MotorJob:
 
     `key` is the digest of the work, None where it is not to be noted as done; `refused` are files
     that must not be read, with the reason. `revoked` are the motor's revoked versions: one of this
-    work with other content is superseded.
+    work with other content is superseded. `model` is what the captures are held against, None for
+    nothing.
     """
 
     motor_id: str
@@ -44,6 +46,7 @@ class MotorJob:
     gates: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     fit: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     crosscheck: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    model: ModelSpec | None = None
     findings: tuple[Finding, ...] = ()
     limits: ReadLimits = field(default_factory=ReadLimits)
     revoked: tuple[Revocation, ...] = ()

@@ -15,6 +15,7 @@ from typing import Any
 from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import SourceMap
 from pipeline.io.survey import Question, Survey
+from pipeline.records.comparison import ModelSpec
 from pipeline.records.content import content_digest
 from pipeline.records.datasheet import Superseded
 from pipeline.records.estimate import Estimate
@@ -123,5 +124,26 @@ def fit_parts(
         "campaign": campaign,
         "options": dict(options),
         "known": list(known),
+        "doubt": doubt,
+    }
+
+
+def model_parts(
+    code: str,
+    libraries: str,
+    campaign: Sequence[str],
+    model: ModelSpec,
+    start: Sequence[Estimate],
+    doubt: object,
+) -> Parts:
+    """What the residual test of one motor hangs on: the code of criticism, the captures as they
+    were read, the model, the constants that it starts from, and as for fits a revocation.
+    """
+    return {
+        "code": code,
+        "libraries": libraries,
+        "campaign": campaign,
+        "model": model,
+        "start": list(start),
         "doubt": doubt,
     }

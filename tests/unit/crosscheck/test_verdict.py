@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -12,9 +13,12 @@ from pipeline.fit import registry
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
+from pipeline.records.datasheet import AWAITS_APPROVAL, left_to_a_person
 from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import Excess, ModelVerdict
 from pipeline.records.uncertainty import type_a
 
+SOUND = ModelVerdict("adequate", held_out=0.5, residual=1.1)
 CAMPAIGN = Campaign("m", (Capture("a.csv", "0", "verified", CaptureMeta("m", "heat_run"), ()),))
 
 
@@ -40,7 +44,7 @@ def test_a_constant_that_no_motor_has_keeps_the_datasheet_back(
 ) -> None:
     """R from kelvin is whole, its copper coefficient is nine times copper's: provisional, named."""
     known = fitted(monkeypatch, 0.0344, 1e-4)
-    status, why = verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto")
+    status, why = verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto", SOUND, "m")
     assert status == "provisional"
     assert len(why) == 1
     assert why[0].startswith("impossible: temp_coeff_copper_1_k (came out as 0.0344 1/K")
@@ -51,7 +55,54 @@ def test_one_that_is_out_by_its_scatter_keeps_nothing_back(monkeypatch: pytest.M
     """A coefficient of -0.001 ± 0.002 is only not identifiable; the rest may be released."""
     known = fitted(monkeypatch, -0.001, 0.002)
     assert known.best("temp_coeff_copper_1_k") is None
-    assert verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto") == ("released", ())
+    assert verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto", SOUND, "m") == ("released", ())
+
+
+WORST = Excess("drive_0.mcap", "vd_v", 0, 76.3, 0.9, "V")
+OVER = ModelVerdict("missing", held_out=31.0, residual=76.3, worst=WORST, over=3)
+BELOW = ModelVerdict(
+    "missing", held_out=1.0, residual=1.2, missing={"windage": {"loss_nm": (0.1, 0.01, "N·m")}}
+)
+NOTHING = ModelVerdict("insufficient", note="record a torque map")
+OFF = ModelVerdict("not_tested", note="residual_test=false")
+
+
+def released_with(model: ModelVerdict, release: str = "auto") -> tuple[str, tuple[str, ...]]:
+    """The verdict on a datasheet that lacks nothing else."""
+    sound = {"r_phase_ohm": Estimate("r_phase_ohm", 0.3, "ohm", "measured", "odd")}
+    return verdict(sound, (), (), ("r_phase_ohm",), release, model, "m")
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (OVER, "misses vd_v of drive_0.mcap by 76 noise floors and 2 more; `diagnose motor=m`"),
+        (BELOW, "lacks an effect that shows below the noise floors; found: windage; `diagnose"),
+        (NOTHING, "could be held against the captures: record a torque map"),
+        (OFF, "was held against the captures: residual_test=false"),
+    ],
+)
+def test_released_with_76_noise_floors_left(model: ModelVerdict, said: str) -> None:
+    """What a model leaves over the noise, or was not tested on, is at most provisional, and `why`
+    says which signal, capture and command; a person may still approve it.
+    """
+    status, why = released_with(model)
+    assert (status, len(why)) == ("provisional", 1)
+    assert said in why[0]
+    assert left_to_a_person(why[0])
+    assert released_with(model, "manual")[1] == (*why, AWAITS_APPROVAL)
+
+
+def test_a_model_that_explains_its_captures_keeps_nothing_back() -> None:
+    """Also where some effect could not have shown: its residuals were tested and hold."""
+    assert released_with(SOUND) == ("released", ())
+    unseen = replace(SOUND, verdict="insufficient", note="no test here excites backlash")
+    assert released_with(unseen) == ("released", ())
+
+
+def test_no_approval_settles_what_is_not_about_the_model() -> None:
+    assert not left_to_a_person("unverified: model.csv")
+    assert not left_to_a_person("missing: lq_h (no capture of it)")
 
 
 def test_the_copper_check_does_not_ask_for_a_heat_run_that_is_there(

@@ -1,0 +1,70 @@
+"""The residual test of a datasheet for people: on a page, in a table, on a terminal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.physics.notation import quantity
+from pipeline.records.model_verdict import ModelVerdict, number
+from pipeline.report.words import sentence
+
+TONES = {
+    "adequate": "pass",
+    "missing": "marginal",
+    "unknown": "marginal",
+    "insufficient": "not_evaluated",
+    "not_tested": "not_evaluated",
+}
+OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual test; run again")
+
+
+@dataclass(frozen=True, slots=True)
+class ModelWords:
+    """Verdict and residual in `short`, one sentence without a full stop, the command that tells
+    more (empty where there is none), `rows` of name and text, and a number to `sort` by.
+    """
+
+    short: str
+    tone: str
+    sentence: str
+    command: str
+    rows: tuple[tuple[str, str], ...]
+    sort: str
+    passed: bool
+
+
+def model_words(model: ModelVerdict | None, motor_id: str) -> ModelWords:
+    """What the residual test of a motor came to; None is a datasheet of before there was one."""
+    said = model or OLD
+    floors = "" if said.residual is None else f", {number(said.residual)} floors"
+    return ModelWords(
+        short=said.verdict.replace("_", " ") + floors,
+        tone=TONES[said.verdict],
+        sentence=sentence(said.headline()),
+        command=said.command(motor_id) if said.tested and not said.passed else "",
+        rows=tuple(_rows(said)),
+        sort=repr(said.residual or 0.0),
+        passed=said.passed,
+    )
+
+
+def _rows(said: ModelVerdict) -> list[tuple[str, str]]:
+    if said.residual is None or said.held_out is None:
+        return []
+    rows = [
+        ("largest residual", f"{number(said.residual)} noise floors"),
+        ("error of captures held out", f"{number(said.held_out)} noise floors"),
+    ]
+    if said.worst is not None:
+        size = quantity(said.worst.size, said.worst.unit, 2)
+        rows.append(("where", f"{said.worst.description}, {size} beyond the noise"))
+        rows.append(("places over their floor", str(said.over)))
+    for effect, parameters in said.missing.items():
+        sizes = (
+            f"{name} {quantity(value, unit, 3)} ± {quantity(2.0 * u, unit, 2)}"
+            for name, (value, u, unit) in parameters.items()
+        )
+        rows.append((effect.replace("_", " "), "; ".join(sizes)))
+    if said.note:
+        rows.append(("cannot be shown", said.note))
+    return rows
