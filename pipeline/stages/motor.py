@@ -28,7 +28,7 @@ from pipeline.stages.fleet.fits import FitMemory
 from pipeline.stages.fleet.jobs import Files, Finished, MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import libraries_version, note_motor
 from pipeline.stages.fleet.keys import key_of, superseding_parts, version_parts
-from pipeline.stages.fleet.model_tests import ModelMemory, tested_model
+from pipeline.stages.fleet.model_tests import ModelMemory, judged_model
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -63,7 +63,7 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
         checks = check_all(constants, campaign, job.crosscheck)
     with watch.stage("residual test"):
         recalled = None if job.key is None else ModelMemory(job, readings, version)
-        model, broken = tested_model(campaign, job.model, constants, recalled)
+        model, broken = judged_model(campaign, job.model, constants, recalled)
     findings.extend(broken)
     datasheet = superseding(
         assemble(job, campaign, readings, version, constants, checks, model), job.revoked

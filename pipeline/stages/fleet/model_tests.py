@@ -50,7 +50,7 @@ class ModelMemory:
         keep_sealed(self._path, {"key": key, "model": found.document()})
 
 
-def tested_model(
+def judged_model(
     campaign: Campaign,
     model: ModelSpec | None,
     constants: Constants,

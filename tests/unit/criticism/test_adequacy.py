@@ -1,0 +1,104 @@
+"""The residual test of a run gives the verdict of `diagnose`, or says sooner that one is missing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from pipeline.criticism import adequacy
+from pipeline.criticism.adequacy import model_verdict
+from pipeline.criticism.diagnosis import TOO_LITTLE, diagnose
+from pipeline.criticism.size import PAIRLESS
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.stages.campaigns import campaigns
+
+DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
+STANDARD, COGGING = ModelSpec("standard"), ModelSpec("standard", ("cogging",))
+FEW = ("cogging", "current_step", "resistance", "spin_down")
+
+
+@cache
+def shipped() -> Campaign:
+    return campaigns(str(DEMO))[0][0]
+
+
+def only(*tests: str) -> Campaign:
+    return replace(shipped(), captures=shipped().of(*tests))
+
+
+def judged(campaign: Campaign, spec: ModelSpec) -> ModelVerdict:
+    return model_verdict(campaign, spec, Constants())
+
+
+def test_released_with_what_diagnose_calls_missing() -> None:
+    """Cogging of 250 noise floors: the same verdict, where it is and how many floors off."""
+    campaign = only(*FEW)
+    found, told = judged(campaign, STANDARD), diagnose(campaign, STANDARD, Constants())
+    assert (found.verdict, told.verdict) == ("missing", "missing")
+    assert not found.passed
+    assert found.held_out == pytest.approx(told.ladder[0].held_out, rel=1e-3)
+    assert found.worst is not None
+    assert (found.worst.signal, found.worst.order) == ("torque_shaft_nm", 84)
+    assert found.worst.capture in {c.path for c in campaign.of("cogging")}
+    assert found.worst.floors == found.residual
+    assert found.residual > 100.0
+    assert 0.002 < found.worst.size < 0.02, "the amplitude of some 7 mN·m, as an rms"
+
+
+def test_nothing_left_is_said_as_diagnose_says_it() -> None:
+    """With cogging in the model nothing is over its floor; what no capture shows is told."""
+    campaign = only(*FEW)
+    found, told = judged(campaign, COGGING), diagnose(campaign, COGGING, Constants())
+    assert (found.verdict, told.verdict) == ("insufficient", "insufficient")
+    assert found.passed
+    assert found.held_out == pytest.approx(told.ladder[0].held_out, rel=1e-3)
+    assert (found.worst, found.over, found.missing) == (None, 0, {})
+    assert all(one.effect in found.note for one in told.unexcited)
+    assert found.residual is not None
+    assert found.residual < math.sqrt(2.0), "no variance is twice its floor's"
+
+
+@pytest.mark.parametrize(("tests", "why"), [(("resistance",), TOO_LITTLE), ((), PAIRLESS)])
+def test_captures_that_fit_no_model_are_insufficient(tests: tuple[str, ...], why: str) -> None:
+    campaign = only(*tests) if tests else unnamed(only("spin_down"))
+    found, told = judged(campaign, STANDARD), diagnose(campaign, STANDARD, Constants())
+    assert (found.verdict, told.verdict) == ("insufficient", "insufficient")
+    assert (found.note, found.tested, found.passed) == (why, False, False)
+
+
+def unnamed(campaign: Campaign) -> Campaign:
+    bare = (replace(c, meta=replace(c.meta, pole_pairs=None, extra={})) for c in campaign.captures)
+    return replace(campaign, captures=tuple(bare))
+
+
+def test_the_search_is_spared_only_where_its_end_is_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Large and no drift of the instruments: something is missing. A drift that explains it all:
+    the ladder says, and names what it finds.
+    """
+    asked = []
+    whole = adequacy.ended
+    monkeypatch.setattr(adequacy, "ended", lambda *a: asked.append(a) or whole(*a))
+    campaign = only(*FEW)
+    assert judged(campaign, STANDARD).missing == {}
+    assert asked == []
+    monkeypatch.setattr(adequacy, "wandering", lambda segments, *_: tuple(segments))
+    found = judged(campaign, STANDARD)
+    assert len(asked) == 1
+    assert (found.verdict, list(found.missing)) == ("missing", ["cogging"])
+    assert found.missing["cogging"]
+    assert found.worst is not None, "what the model itself leaves, not what is left with the effect"
+
+
+def test_the_record_comes_back_from_its_document() -> None:
+    worst = Excess("a.csv", "torque_shaft_nm", 84, 250.0, 0.005, "N·m")
+    found = ModelVerdict("missing", held_out=14.0, residual=250.0, worst=worst, over=9)
+    named = replace(found, missing={"windage": {"loss_nm": (0.1, 0.01, "N·m")}}, effects=("-x",))
+    assert ModelVerdict.of(named.document()) == named
+    assert ModelVerdict.of(ModelVerdict("not_tested", note="off").document()).note == "off"

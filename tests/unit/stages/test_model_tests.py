@@ -1,0 +1,101 @@
+"""The residual test of a motor is made once, and costs nobody else anything where it breaks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipeline.criticism import adequacy
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.errors import UsageError
+from pipeline.records.estimate import Estimate
+from pipeline.records.ledger import Revocation
+from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.stages.fleet.jobs import MotorJob
+from pipeline.stages.fleet.model_tests import ModelMemory, judged_model
+
+CAMPAIGN = Campaign("m", (Capture("a.csv", "0", "verified", CaptureMeta("m", "drive"), ()),))
+FOUND = ModelVerdict(
+    "missing",
+    held_out=1.0 / 3.0,
+    residual=76.0,
+    worst=Excess("a.csv", "vd_v", 0, 76.0, 0.1, "V"),
+    over=1,
+)
+KNOWN = Constants((Estimate("pole_pairs", 7, "1", "measured", "open_circuit"),))
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> MotorJob:
+    return MotorJob("m", (), "in", str(tmp_path), "c" * 64, (), "auto", True, True)
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[ModelSpec]:
+    """The models that were held against captures, none of them recalled."""
+    asked: list[ModelSpec] = []
+
+    def verdict(campaign: Campaign, model: ModelSpec, start: Constants) -> ModelVerdict:
+        asked.append(model)
+        return FOUND
+
+    monkeypatch.setattr(adequacy, "model_verdict", verdict)
+    return asked
+
+
+def test_a_verdict_is_kept_while_nothing_that_it_hangs_on_changes(
+    job: MotorJob, made: list[ModelSpec]
+) -> None:
+    """Captures as read, model, constants to start from, a revocation: each makes it anew."""
+    spec = ModelSpec()
+    doubted = replace(job, revoked=(Revocation("v", "0" * 64, "A", "wrong"),))
+
+    def tested(of: MotorJob = job, reading: str = "r", model: ModelSpec = spec) -> int:
+        before = len(made)
+        known = KNOWN if reading != "other constants" else Constants()
+        memory = ModelMemory(of, [reading], "v")
+        assert judged_model(CAMPAIGN, model, known, memory) == (FOUND, ())
+        return len(made) - before
+
+    assert (tested(), tested()) == (1, 0)
+    assert (tested(reading="other"), tested(reading="other constants")) == (1, 1)
+    assert tested(model=ModelSpec("ideal")) == 1
+    assert tested(model=ModelSpec("standard", ("cogging",))) == 1
+    assert (tested(), tested()) == (1, 0)
+    assert (tested(doubted), tested(doubted)) == (1, 0)
+
+
+def test_a_test_that_breaks_costs_itself_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> ModelVerdict:
+        raise ValueError("odd data")
+
+    monkeypatch.setattr(adequacy, "model_verdict", broken)
+    found, (finding,) = judged_model(CAMPAIGN, ModelSpec(), KNOWN)
+    assert (found.verdict, found.passed) == ("not_tested", False)
+    assert "odd data" in found.note
+    assert (finding.code, finding.severity) == ("residual_test_failed", "warning")
+
+
+def test_a_model_that_there_is_not_is_no_fault_of_the_captures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def unknown(*_: object) -> ModelVerdict:
+        raise UsageError("unknown model x", "known are ...")
+
+    monkeypatch.setattr(adequacy, "model_verdict", unknown)
+    with pytest.raises(UsageError, match="unknown model"):
+        judged_model(CAMPAIGN, ModelSpec("x"), KNOWN)
+
+
+def test_switched_off_is_not_tested(made: list[ModelSpec]) -> None:
+    found, findings = judged_model(CAMPAIGN, None, KNOWN)
+    assert (found.verdict, found.note, findings, made) == (
+        "not_tested",
+        "residual_test=false",
+        (),
+        [],
+    )
