@@ -87,3 +87,46 @@ def test_every_check_of_a_sound_motor_holds(sheets: dict[str, dict[str, Any]]) -
     assert statuses.pop("cogging_order_vs_slots") == "not_evaluated"
     assert set(statuses.values()) == {"pass"}
     assert len(statuses) == 9
+
+
+def test_the_motor_with_nothing_hidden_leaves_nothing_over_the_noise(
+    sheets: dict[str, dict[str, Any]],
+) -> None:
+    model = sheets["P0"]["model"]
+    assert (model["verdict"], model["missing"], model["worst"]) == ("adequate", [], None)
+    assert model["held_out"] < 1.0
+    assert model["residual"] < math.sqrt(2.0)
+
+
+def test_a_motor_with_hidden_effects_says_where_they_show(
+    sheets: dict[str, dict[str, Any]],
+) -> None:
+    model, why = sheets["P1"]["model"], sheets["P1"]["why"]
+    assert (model["verdict"], model["missing"]) == ("missing", [])
+    assert model["residual"] == model["worst"]["floors"] > 10.0
+    assert any(model["worst"]["capture"] in one and "`diagnose motor=" in one for one in why)
+
+
+@pytest.mark.slow
+def test_released_with_76_noise_floors_left(tmp_path: Path) -> None:
+    """An encoder off its centre and Stribeck friction: at most provisional, and `why` says where;
+    with both in the model nothing is left, and the datasheet is released.
+    """
+    words = [f"input={RIG / 'P3'}", "report=true", "recordings=false", "release=auto"]
+    assert main(["run", *words, f"output={tmp_path / 'plain'}"]) == 0
+    (path,) = (tmp_path / "plain" / "datasheets").iterdir()
+    sheet = json.loads(path.read_bytes())
+    assert sheet["status"] == "provisional"
+    assert sheet["model"]["held_out"] == pytest.approx(76.0, abs=2.0)
+    (reason,) = sheet["why"]
+    assert "noise floors" in reason
+    (page,) = (tmp_path / "plain" / "report").glob("joint*.html")
+    assert "Nothing was found wrong" not in page.read_text(encoding="utf-8")
+
+    words.append("model.effects=[angle_eccentricity,stribeck]")
+    assert main(["run", *words, f"output={tmp_path / 'whole'}"]) == 0
+    (path,) = (tmp_path / "whole" / "datasheets").iterdir()
+    sheet = json.loads(path.read_bytes())
+    assert (sheet["status"], sheet["why"]) == ("released", [])
+    (page,) = (tmp_path / "whole" / "report").glob("joint*.html")
+    assert "Nothing was found wrong" in page.read_text(encoding="utf-8")
