@@ -19,6 +19,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence
+from pipeline.records.uncertainty import without_between
 
 BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
 REPORT = "the other constants stand; report the capture with this line"
@@ -131,6 +132,12 @@ def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
     elif term is not None and not _in_range(estimate.number, term):
         low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
         wrong = f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}"
+    elif _torn(estimate):
+        note = (
+            f"came out as {estimate.number:.4g} {estimate.unit}, and what it rests on disagrees "
+            f"beyond use: {estimate.note}; diagnose tells what the model lacks"
+        )
+        return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
     elif term is not None and _unknown_size(estimate, term):
         wrong = (
             f"came out as {estimate.number:.3g} ± {estimate.u:.2g} {estimate.unit}, no known size"
@@ -148,6 +155,17 @@ def _beyond(estimate: Estimate, term: Term | None) -> bool:
         return False
     three = 3.0 * estimate.u
     return not any(_in_range(estimate.number + part, term) for part in (-three, 0.0, three))
+
+
+def _torn(estimate: Estimate) -> bool:
+    """Whether disagreement alone makes the 95 % interval span more than a factor of two.
+
+    The ends of value (1 ± 1/3) are a factor of two apart: not even the first digit is known then.
+    """
+    beyond = abs(estimate.number) / 3.0
+    plain = replace(estimate, budget=without_between(estimate.budget))
+    wide, narrow = (e.interval()[1] - e.number for e in (estimate, plain))
+    return wide > beyond >= narrow
 
 
 def _unknown_size(estimate: Estimate, term: Term) -> bool:

@@ -33,6 +33,10 @@ class Contribution:
 
 Budget = tuple[Contribution, ...]
 
+BETWEEN = "between:"
+"""Begins the source of what independent equations, captures or methods of one constant scatter
+beyond their own uncertainties: part of u like any other, and told apart to say why u is wide."""
+
 
 def type_a(source: str, u: float, dof: float = math.inf) -> Budget:
     """A budget of one scatter contribution (GUM 4.2)."""
@@ -62,6 +66,11 @@ def propagate(terms: Iterable[tuple[float, Budget]]) -> Budget:
 def standard_uncertainty(budget: Budget, kind: Kind | None = None) -> float:
     """Root sum of squares of the contributions, of one kind or of both."""
     return math.sqrt(sum(part.u**2 for part in budget if kind in (None, part.kind)))
+
+
+def without_between(budget: Budget) -> Budget:
+    """The budget as it was before the scatter between equations, captures and methods joined."""
+    return tuple(part for part in budget if not part.source.startswith(BETWEEN))
 
 
 def covariance(one: Budget, other: Budget) -> float:

@@ -28,6 +28,8 @@ from pipeline.fit.instruments import (
 from pipeline.fit.magnet_coefficient import magnet_coefficient
 from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.regimes import Disagreement
+from pipeline.fit.shaft_regimes import drag_disagreements
 from pipeline.fit.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.fit.torque_constant import USES, torque_constant
 from pipeline.numerics.least_squares import linear_fit
@@ -37,7 +39,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Budget, Contribution, propagate
+from pipeline.records.uncertainty import BETWEEN, Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 
@@ -84,6 +86,37 @@ class Torque:
     words: str
 
 
+@dataclass(frozen=True, slots=True)
+class Doubts:
+    """What speaks against the law: the acceleration's `share` that the torque does not explain,
+    and where regimes differ in J, T_c/J, B/J.
+    """
+
+    share: float
+    regimes: tuple[Disagreement | None, Disagreement | None, Disagreement | None]
+
+    def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
+        """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
+        share = f"{BETWEEN}{NAME}:unexplained" if logged else "assumed:free_shaft"
+        parts = [Contribution(share, self.share * value, "B")]
+        for k in {0, index}:
+            found = self.regimes[k]
+            if found is not None:
+                parts.append(found.part(f"{NAME}:{GIVES[k]}", value))
+        return parts
+
+    def words(self, logged: bool) -> list[str]:
+        """What the regimes and the share say, where they say something."""
+        names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
+        words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
+        if logged and self.share > MATERIAL:
+            words.append(
+                f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
+                "neither current nor load"
+            )
+        return words
+
+
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """J, T_c and B of J dw/dt = K i_q + K_rel i_d i_q - T_load - T_c sign(w) - B w.
 
@@ -109,10 +142,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     found = drag_of(rows, driving, nuisances, options["level"])
     if not torque_is_parted(found.design, found.sigma):
         return _refused(f"the drive's torque cannot be told from its friction; {EXPERIMENT}")
-    strange = 0.0 if _load_logged(rows) else _share_of_no_torque(rows, found)
-    if strange > MATERIAL:
+    strange = _share_of_no_torque(rows, found)
+    if strange > MATERIAL and not _load_logged(rows):
         return _refused(f"{_of_no_torque(strange)}; {LOAD}")
-    estimates = _estimates(rows, torque, found, strange, _left_out(rows, campaign))
+    doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
+    estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))
     inertia = estimates[0]
     if inertia.known and inertia.u >= abs(inertia.number):
         estimates = _refused(
@@ -143,11 +177,11 @@ def _load_logged(rows: ShaftRows) -> bool:
 
 
 def _share_of_no_torque(rows: ShaftRows, found: DragFit) -> float:
-    """Share of the drives' acceleration, squared, that follows the current in no way.
+    """Share of the drives' acceleration, squared, that follows the torque in no way.
 
-    A load that is not logged and goes its own way is an error of the driving torque: it makes g
-    too small, and J too large, by this share at most. Reference: Fuller, Measurement Error Models,
-    1987, 1.1 (attenuation).
+    A torque that is not logged is an error of the driving torque, and where a speed loop fights it
+    the current goes with it: it makes g too small, and J too large, by this share at most.
+    Reference: Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
     """
     drives = rows.kind == DRIVE
     without = linear_fit(np.delete(found.design[drives], 0, axis=1), found.target[drives])
@@ -220,9 +254,9 @@ def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> 
 
 
 def _estimates(
-    rows: ShaftRows, torque: Torque, found: DragFit, strange: float, left_out: Sequence[str]
+    rows: ShaftRows, torque: Torque, found: DragFit, doubts: Doubts, left_out: Sequence[str]
 ) -> tuple[Estimate, ...]:
-    """J, T_c and B with their budgets; `strange` as by `_share_of_no_torque`, 0 with the load."""
+    """J, T_c and B with their budgets."""
 
     def values(shift: Mapping[str, float]) -> Array:
         return found.constants(found.refit(_driving_nm(rows, torque, shift)))
@@ -232,7 +266,9 @@ def _estimates(
     per_kt, per_rel, per_alpha = _slopes(values, torque)
     constants, scatter = found.constants(found.coefficients), found.scatter()
     paths = tuple(sorted(c.path for c in rows.captures))
-    note = "; ".join([*_words(rows, torque, found), *_load_words(rows, strange, left_out)])
+    logged = _load_logged(rows)
+    words = [*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out)]
+    note = "; ".join([*doubts.words(logged), *words])
     at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
     estimates = []
     for i, name in enumerate(GIVES):
@@ -244,10 +280,8 @@ def _estimates(
             Contribution(f"scatter:{NAME}:{k}", float(scatter[i, k]), "A", found.dof)
             for k in range(scatter.shape[1])
         ]
-        parts += [
-            Contribution("assumed:drag_form", float(found.u_form[i]), "B"),
-            Contribution("assumed:free_shaft", strange * float(constants[i]), "B"),
-        ]
+        parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
+        parts += doubts.parts(i, float(constants[i]), logged)
         budget = propagate(
             [
                 (1.0, (*parts, *type_b[i])),

@@ -1,0 +1,125 @@
+"""One coefficient of a regression in each regime of its rows: where it differs, the law lacks.
+
+Rows that accelerate, that brake, that run fast or slow, in either sense, early or late, of one
+capture or of another, are equations of the same constants. Where something is missing from the law
+they give different ones, each by far more than its scatter; what the regimes scatter beyond that
+belongs to the uncertainty (`between`), as no one knows which regime is free of what is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.clusters import cluster_covariance
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.numerics.random_effects import Between, between
+from pipeline.records.uncertainty import BETWEEN, Contribution
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+
+# As many windows a regime as tell its scatter to a sixth (JCGM 100:2008, E.4.3).
+LEAST_ROWS = 20
+# Errors by clusters are too small where these are few (Cameron and Miller 2015, VI).
+LEAST_CLUSTERS = 10
+LONGEST_MEMORY = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Partition:
+    """Regimes of the rows: `labels` [n] number the `names`; -1 is a row of none of them."""
+
+    name: str
+    labels: Labels
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """y [n] = design [n, k] times coefficients, noise `sigma` [n], rows correlated in `cluster`."""
+
+    design: Array
+    y: Array
+    sigma: Array
+    cluster: Labels
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """A partition whose regimes differ beyond chance: relative values [k] and their scatter."""
+
+    partition: Partition
+    relative: Array
+    found: Between
+
+    def part(self, source: str, value: float) -> Contribution:
+        """The contribution of the regimes to the uncertainty of a constant of this value."""
+        return Contribution(f"{BETWEEN}{source}", self.found.sd * value, "A", self.found.dof)
+
+    def words(self, what: str) -> str:
+        """Which regimes differ by how much."""
+        each = ", ".join(
+            f"{100.0 * (r - 1.0):+.2g} % {n}"
+            for r, n in zip(self.relative, self.partition.names, strict=True)
+        )
+        return f"{what} disagrees with itself by {self.partition.name} beyond chance ({each})"
+
+
+def halves(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_]) -> Partition:
+    """Rows `among` [n] below and above the median of their values [n]."""
+    middle = float(np.median(values[among])) if among.any() else 0.0
+    labels = np.where(among, (values > middle).astype(np.int64), -1)
+    return Partition(name, labels, (low, high))
+
+
+def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_]) -> Partition:
+    """Rows `among` [n] of negative and of positive values [n]."""
+    return Partition(name, np.where(among, (values > 0.0).astype(np.int64), -1), (low, high))
+
+
+def disagreement(
+    regression: Regression, column: int, partitions: Mapping[str, Partition], level: float
+) -> Disagreement | None:
+    """The partition whose regimes scatter most beyond chance in one coefficient, or None.
+
+    The coefficient is fitted once a regime with all else common. `level` is the chance of any
+    partition to be named where the law is whole (Bonferroni). Source of the scatter: `between`.
+    """
+    found = []
+    for partition in partitions.values():
+        one = _of_partition(regression, column, partition)
+        if one is not None:
+            found.append(one)
+    told = [one for one in found if one.found.p_value * len(found) < level and one.found.sd > 0.0]
+    return max(told, key=lambda one: one.found.sd, default=None)
+
+
+def _of_partition(regression: Regression, column: int, partition: Partition) -> Disagreement | None:
+    """The coefficient of a column in each regime, relative to the common one."""
+    design, labels = regression.design, partition.labels
+    present = [k for k in range(len(partition.names)) if np.sum(labels == k) >= LEAST_ROWS]
+    if len(present) < 2:
+        return None
+    split = [design[:, column] * (labels == k) for k in present]
+    rest = design[:, column] * ~np.isin(labels, present)
+    wide = np.column_stack([np.delete(design, column, axis=1), rest, *split])
+    wide = wide[:, np.any(wide != 0.0, axis=0)]
+    fit = linear_fit(wide, regression.y, regression.sigma)
+    common = float(linear_fit(design, regression.y, regression.sigma).coefficients[column])
+    if not fit.full_rank or common == 0.0 or fit.dof < LEAST_ROWS:
+        return None
+    tau = autocorrelation_time(fit.residuals / regression.sigma, LONGEST_MEMORY)
+    covariance, dof = fit.covariance * fit.chi2_dof * tau, max(fit.dof / tau, 1.0)
+    clusters = [np.unique(regression.cluster[labels == k]).size for k in present]
+    if min(clusters) >= LEAST_CLUSTERS:
+        robust, _ = cluster_covariance(wide, fit.residuals, regression.sigma, regression.cluster)
+        covariance, dof = robust, float(sum(clusters) - len(clusters))
+    count = len(present)
+    values = fit.coefficients[-count:] / common
+    own = covariance[-count:, -count:] / common**2
+    names = tuple(partition.names[k] for k in present)
+    return Disagreement(Partition(partition.name, labels, names), values, between(values, own, dof))
