@@ -8,8 +8,8 @@ belongs to the uncertainty (`between`), as no one knows which regime is free of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ Labels = NDArray[np.int64]
 
 # As many windows a regime as tell its scatter to a sixth (JCGM 100:2008, E.4.3).
 LEAST_ROWS = 20
+# A regime that tells less than this share of a constant moves it by less than so much of its own
+# departure: errors that are small beside the rest of the rows are large beside its few.
+LEAST_SHARE = 0.1
 # Errors by clusters are too small where these are few (Cameron and Miller 2015, VI).
 LEAST_CLUSTERS = 10
 LONGEST_MEMORY = 200
@@ -69,11 +72,15 @@ class Disagreement:
         return f"{what} disagrees with itself by {self.partition.name} beyond chance ({each})"
 
 
-def halves(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_]) -> Partition:
-    """Rows `among` [n] below and above the median of their values [n]."""
-    middle = float(np.median(values[among])) if among.any() else 0.0
-    labels = np.where(among, (values > middle).astype(np.int64), -1)
-    return Partition(name, labels, (low, high))
+def halves(
+    name: str, values: Array, low: str, high: str, information: Array, among: NDArray[np.bool_]
+) -> Partition:
+    """Rows `among` [n] below and above the value [n] that halves their information [n]."""
+    order = np.argsort(values, kind="stable")
+    share = np.cumsum(np.where(among, information, 0.0)[order])
+    labels = np.full(values.size, -1)
+    labels[order] = (share > 0.5 * share[-1]).astype(np.int64)
+    return Partition(name, np.where(among, labels, -1), (low, high))
 
 
 def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_]) -> Partition:
@@ -81,45 +88,62 @@ def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_
     return Partition(name, np.where(among, (values > 0.0).astype(np.int64), -1), (low, high))
 
 
+def information(regression: Regression, column: int) -> Array:
+    """What each row [n] tells of one coefficient beside the others: its share of 1/variance."""
+    others = np.delete(regression.design, column, axis=1)
+    own = linear_fit(others, regression.design[:, column], regression.sigma).residuals
+    told: Array = (own / regression.sigma) ** 2
+    return told / max(float(told.sum()), 1e-300)
+
+
 def disagreement(
-    regression: Regression, column: int, partitions: Mapping[str, Partition], level: float
+    regression: Regression,
+    column: int,
+    partitions: Callable[[Array], Sequence[Partition]],
+    level: float,
 ) -> Disagreement | None:
     """The partition whose regimes scatter most beyond chance in one coefficient, or None.
 
-    The coefficient is fitted once a regime with all else common. `level` is the chance of any
-    partition to be named where the law is whole (Bonferroni). Source of the scatter: `between`.
+    `partitions` makes them from the rows' information [n]. The coefficient is fitted once a regime
+    with all else common. `level` is the chance of any partition to be named where the law is whole
+    (Bonferroni).
     """
-    found = []
-    for partition in partitions.values():
-        one = _of_partition(regression, column, partition)
-        if one is not None:
-            found.append(one)
-    told = [one for one in found if one.found.p_value * len(found) < level and one.found.sd > 0.0]
-    return max(told, key=lambda one: one.found.sd, default=None)
+    told = information(regression, column)
+    tried = [_of_partition(regression, column, told, p) for p in partitions(told)]
+    found = [one for one in tried if one is not None]
+    beyond = [d for d in found if d.found.p_value * len(found) < level and d.found.sd > 0.0]
+    return max(beyond, key=lambda d: d.found.sd, default=None)
 
 
-def _of_partition(regression: Regression, column: int, partition: Partition) -> Disagreement | None:
+def _of_partition(
+    regression: Regression, column: int, told: Array, partition: Partition
+) -> Disagreement | None:
     """The coefficient of a column in each regime, relative to the common one."""
-    design, labels = regression.design, partition.labels
-    present = [k for k in range(len(partition.names)) if np.sum(labels == k) >= LEAST_ROWS]
+    design, labels, y, sigma = (
+        regression.design, partition.labels, regression.y, regression.sigma,
+    )  # fmt: skip
+    present = [
+        k
+        for k in range(len(partition.names))
+        if np.sum(labels == k) >= LEAST_ROWS and told[labels == k].sum() >= LEAST_SHARE
+    ]
     if len(present) < 2:
         return None
     split = [design[:, column] * (labels == k) for k in present]
     rest = design[:, column] * ~np.isin(labels, present)
     wide = np.column_stack([np.delete(design, column, axis=1), rest, *split])
     wide = wide[:, np.any(wide != 0.0, axis=0)]
-    fit = linear_fit(wide, regression.y, regression.sigma)
-    common = float(linear_fit(design, regression.y, regression.sigma).coefficients[column])
+    fit, common = linear_fit(wide, y, sigma), linear_fit(design, y, sigma).coefficients[column]
     if not fit.full_rank or common == 0.0 or fit.dof < LEAST_ROWS:
         return None
-    tau = autocorrelation_time(fit.residuals / regression.sigma, LONGEST_MEMORY)
+    tau = autocorrelation_time(fit.residuals / sigma, LONGEST_MEMORY)
     covariance, dof = fit.covariance * fit.chi2_dof * tau, max(fit.dof / tau, 1.0)
     clusters = [np.unique(regression.cluster[labels == k]).size for k in present]
     if min(clusters) >= LEAST_CLUSTERS:
-        robust, _ = cluster_covariance(wide, fit.residuals, regression.sigma, regression.cluster)
+        robust, _ = cluster_covariance(wide, fit.residuals, sigma, regression.cluster)
         covariance, dof = robust, float(sum(clusters) - len(clusters))
     count = len(present)
     values = fit.coefficients[-count:] / common
     own = covariance[-count:, -count:] / common**2
-    names = tuple(partition.names[k] for k in present)
-    return Disagreement(Partition(partition.name, labels, names), values, between(values, own, dof))
+    shown = replace(partition, names=tuple(partition.names[k] for k in present))
+    return Disagreement(shown, values, between(values, own, dof))

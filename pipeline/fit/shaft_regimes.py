@@ -5,37 +5,38 @@ Reference: Ljung, System Identification, 2nd ed., 16.6 (validation by parts of t
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.fit.drag import DragFit
 from pipeline.fit.regimes import Disagreement, Partition, Regression, disagreement, halves, signs
 from pipeline.fit.shaft_rows import DRIVE, ShaftRows
 
+Array = NDArray[np.float64]
 
-def shaft_partitions(rows: ShaftRows, driving_only: bool) -> dict[str, Partition]:
-    """Regimes of the rows by speed, sense, acceleration, current, time and capture.
 
-    `driving_only` leaves the coast-downs out, which tell nothing of the inertia.
-    """
-    speed, pull = rows.speed_rad_s, rows.acceleration_rad_s2 * np.sign(rows.speed_rad_s)
-    among = rows.kind == DRIVE if driving_only else np.ones(rows.count, dtype=bool)
-    drives = rows.kind == DRIVE
+def shaft_partitions(rows: ShaftRows, information: Array) -> list[Partition]:
+    """Regimes of the rows by speed, sense, acceleration, current, time and capture."""
+    speed = rows.speed_rad_s
+    gaining, current = rows.acceleration_rad_s2 * np.sign(speed), np.abs(rows.q_current_a)
+    every, drives = np.ones(rows.count, dtype=bool), rows.kind == DRIVE
     late = np.zeros(rows.count)
     for k in range(len(rows.captures)):
         own = rows.capture == k
         if own.any():
             late[own] = rows.time_s[own] - np.median(rows.time_s[own])
     files = tuple(f"in {capture.path}" for capture in rows.captures)
-    current = np.abs(rows.q_current_a)
-    return {
-        "speed": halves("speed", np.abs(speed), "slow", "fast", among),
-        "sense": signs("sense of rotation", speed, "backward", "forward", among),
-        "gain": signs("acceleration", pull, "braking", "accelerating", drives),
-        "torque": signs("sense of torque", rows.q_current_a, "negative", "positive", drives),
-        "current": halves("current", current, "small", "large", drives),
-        "time": signs("time", late, "in first halves", "in second halves", among),
-        "capture": Partition("capture", np.where(among, rows.capture, -1), files),
-    }
+    return [
+        halves("speed", np.abs(speed), "slow", "fast", information, every),
+        signs("sense of rotation", speed, "backward", "forward", every),
+        signs("acceleration", gaining, "braking", "accelerating", every),
+        signs("sense of torque", rows.q_current_a, "negative", "positive", drives),
+        halves("current", current, "small", "large", information, drives),
+        signs("time", late, "in first halves", "in second halves", every),
+        Partition("capture", rows.capture, files),
+    ]
 
 
 def drag_disagreements(
@@ -46,10 +47,8 @@ def drag_disagreements(
     With the drag curve left free only the inertia is one number.
     """
     regression = Regression(found.design, found.target, found.sigma, rows.cluster)
-    inertia = disagreement(regression, 0, shaft_partitions(rows, True), level)
-    if found.free:
-        return inertia, None, None
-    every = shaft_partitions(rows, False)
-    coulomb = disagreement(regression, found.names.index("coulomb"), every, level)
-    viscous = disagreement(regression, found.names.index("viscous"), every, level)
+    names = ("torque",) if found.free else ("torque", "coulomb", "viscous")
+    split = partial(shaft_partitions, rows)
+    told = [disagreement(regression, found.names.index(name), split, level) for name in names]
+    inertia, coulomb, viscous, *_ = (*told, None, None)
     return inertia, coulomb, viscous
