@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.fit.estimators.inertia import ESTIMATOR
-from pipeline.fit.registry import fit_all
 from pipeline.fit.regimes import Partition, Regression, disagreement, halves, information
+from pipeline.fit.registry import fit_all
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import BETWEEN, type_b, without_between
@@ -83,7 +83,7 @@ def test_inertia_of_regimes_far_apart_is_withheld_with_the_reason() -> None:
 
 
 def line(rng: np.random.Generator, slopes: tuple[float, float], n: int = 400) -> Regression:
-    """y = a x + b + noise with one slope below x = 0 and another above."""
+    """Y = a x + b + noise with one slope below x = 0 and another above."""
     x = rng.uniform(-1.0, 1.0, n)
     y = np.where(x > 0.0, slopes[1], slopes[0]) * x + 0.3 + 0.05 * rng.standard_normal(n)
     design = np.column_stack([x, np.ones(n)])
