@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import nctdtr, stdtr, stdtrit
+from scipy.special import stdtr, stdtrit
 
 Array = NDArray[np.float64]
 
@@ -64,12 +64,18 @@ def holm(p_values: ArrayLike) -> Array:
 
 
 def power(shift: float, se: float, dof: float, alpha: float) -> float:
-    """Probability that a two-sided t test at `alpha` sees a shift whose estimate has `se`."""
+    """Probability that a two-sided t test at `alpha` sees a shift whose estimate has `se`.
+
+    P(T > c) + P(T < −c) of the noncentral t law, both as upper tails: `scipy.special.nctdtr` is
+    NaN far below the mean.
+    """
+    from scipy.stats import nct
+
     if se <= 0.0:
         return 1.0 if shift else alpha
     critical = float(stdtrit(dof, 1.0 - alpha / 2.0))
     away = abs(shift) / se
-    return float(1.0 - nctdtr(dof, away, critical) + nctdtr(dof, away, -critical))
+    return float(nct.sf(critical, dof, away) + nct.sf(critical, dof, -away))
 
 
 def detectable(se: float, dof: float, alpha: float, wanted: float = 0.95) -> float:

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, ttest_ind
+from scipy.stats import chi, kstest, norm, ttest_ind
+from scipy.stats import t as student
 
 from pipeline.lots.lot_test import detectable, holm, lot_test, power
 
@@ -114,3 +115,56 @@ def test_no_scatter_at_all() -> None:
     assert float(other.p_value) == 0.0
     with pytest.raises(ValueError, match="two"):
         lot_test([1.0], 1.0)
+
+
+def test_one_lot_against_others_is_students_prediction() -> None:
+    """The same as a two-sample t test with one value on the other side (equal variances)."""
+    means = np.array([1.0, 1.3, 0.8, 1.1, 0.9])
+    tested = lot_test(means, 1.9)
+    known = ttest_ind([1.9], means)
+    assert float(tested.t) == pytest.approx(known.statistic)
+    assert float(tested.p_value) == pytest.approx(known.pvalue)
+    assert float(tested.dof) == 4.0
+
+
+def test_more_uncertainty_lowers_t_and_adds_degrees_of_freedom() -> None:
+    """Means 0, 2 (variance 2, times 3/2 is 3) and u² = 1: t = 4/2, dof (4/3)² by Welch."""
+    tested = lot_test([0.0, 2.0], 5.0, 1.0)
+    assert float(tested.t) == pytest.approx(2.0)
+    assert float(tested.dof) == pytest.approx(16.0 / 9.0)
+    exact = lot_test([1.0, 1.0], 3.0, 0.5)
+    assert float(exact.t) == pytest.approx(4.0)
+    assert float(exact.dof) == 1.0
+
+
+def test_power_against_counting_and_at_its_ends() -> None:
+    rng = np.random.default_rng(4)
+    x = rng.standard_normal((40_000, 10)) + 0.7
+    t = x.mean(axis=1) / (x.std(axis=1, ddof=1) / math.sqrt(10))
+    limit = 1.8331129326536335  # 0.95 quantile of Student's t, 9 degrees
+    seen = np.mean(np.abs(t) > limit)
+    assert power(0.7, 1.0 / math.sqrt(10), 9.0, 0.1) == pytest.approx(seen, abs=0.008)
+    assert power(-0.7, 1.0 / math.sqrt(10), 9.0, 0.1) == pytest.approx(seen, abs=0.008)
+    assert power(0.0, 1.0, 9.0, 0.1) == pytest.approx(0.1)
+    assert (power(0.0, 0.0, 9.0, 0.1), power(0.5, 0.0, 9.0, 0.1)) == (0.1, 1.0)
+    assert detectable(0.0, 9.0, 0.1) == 0.0
+    assert power(detectable(5.0, 3.0, 0.01, 0.99), 5.0, 3.0, 0.01) == pytest.approx(0.99)
+
+
+def test_holm_keeps_the_order_of_many_families_at_once() -> None:
+    table = np.array([[0.02, 0.01, 0.9], [0.5, 0.001, 0.5]])
+    assert holm(table) == pytest.approx(np.array([[0.04, 0.03, 0.9], [1.0, 0.003, 1.0]]))
+
+
+@pytest.mark.parametrize("dof", [2.0, 3.0, 5.0, 9.0, 19.0, 40.0])
+@pytest.mark.parametrize("alpha", [0.05, 0.05 / 12, 0.05 / 27])
+def test_the_detectable_shift_by_quadrature(dof: float, alpha: float) -> None:
+    """Power is E[Phi(delta - c s)] over s = sqrt(chi²/dof), whose tail below -c adds nothing.
+
+    19 degrees at 0.05/27 once said 7.07 standard errors, where 5.48 are seen in 95 %.
+    """
+    shift = detectable(1.0, dof, alpha)
+    critical = student.isf(alpha / 2.0, dof)
+    s = np.linspace(0.0, 8.0, 80_001) + 5e-5
+    density = chi.pdf(s * math.sqrt(dof), dof) * math.sqrt(dof) * 1e-4
+    assert float((norm.cdf(shift - critical * s) * density).sum()) == pytest.approx(0.95, abs=1e-4)

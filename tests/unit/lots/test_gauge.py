@@ -7,8 +7,11 @@ that ships the same data): part 9.81799, appraiser 1.58363, interaction 0.01994,
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from scipy.stats import f
 
 from pipeline.lots.gauge import anova, components, study
 
@@ -88,3 +91,64 @@ def test_interval_covers() -> None:
 def test_too_few(shape: tuple[int, int, int]) -> None:
     with pytest.raises(ValueError, match="two"):
         anova(np.zeros(shape))
+
+
+def test_an_interaction_by_hand() -> None:
+    """Two motors, two stations, repeats ±1: cells 0, 4 | 0, 0, so each effect has contrast 2.
+
+    MSP = MSO = MSI = 2 · 4 · 1 = 8 and MSE = 2: interaction (8 - 2)/2 = 3, stations and parts 0.
+    """
+    cells = np.array([[0.0, 4.0], [0.0, 0.0]])
+    table = anova(cells[:, :, None] + np.array([-1.0, 1.0]))
+    assert (table.ms_part, table.ms_station, table.ms_interaction) == (8.0, 8.0, 8.0)
+    assert table.ms_error == 2.0
+    assert table.interaction_p == pytest.approx(float(f.sf(4.0, 1, 4)))
+    found = components(table)
+    assert table.interaction_p < 0.25
+    assert (found.repeatability, found.interaction) == (2.0, 3.0)
+    assert (found.station, found.part) == (0.0, 0.0)
+    assert (found.rr, found.percent) == (5.0, 1.0)
+    pooled = components(table, pool_from=0.1)
+    assert pooled.repeatability == pytest.approx((8.0 + 4 * 2.0) / 5.0)
+    assert pooled.interaction == 0.0
+    assert pooled.station == pytest.approx((8.0 - 3.2) / 4.0)
+
+
+def test_exact_repeats() -> None:
+    """Without scatter an interaction is certain, and none is none."""
+    cells = np.array([[0.0, 4.0], [0.0, 0.0]])
+    assert anova(np.repeat(cells[:, :, None], 2, axis=2)).interaction_p == 0.0
+    additive = np.array([[0.0, 1.0], [2.0, 3.0]])
+    exact = anova(np.repeat(additive[:, :, None], 2, axis=2))
+    assert exact.interaction_p == 1.0
+    assert components(exact).percent == pytest.approx(math.sqrt(0.5 / (0.5 + 2.0)))
+    assert components(anova(np.zeros((2, 2, 2)))).percent == 0.0
+
+
+@pytest.mark.parametrize(
+    ("noise", "verdict"),
+    [(0.2, "good"), (0.33, "acceptable"), (0.75, "acceptable"), (1.1, "not_acceptable")],
+)
+def test_verdicts_at_a_tenth_and_three_tenths(noise: float, verdict: str) -> None:
+    """Ten motors 0, 1, ..., 9 (variance 55/6) on two equal stations, repeats ±noise.
+
+    MSE = 2 noise² is the gauge; parts are 55/6 (their mean square less the gauge's).
+    """
+    motors = np.arange(10.0)[:, None, None]
+    signs = np.array([[-1.0, 1.0], [-1.0, 1.0]])[None]
+    found = study(motors + noise * signs)
+    total = 55.0 / 6.0
+    # repeats scatter, cells do not: the interaction and station mean squares are zero, so pooled
+    pooled = 20 * 2 * noise**2 / 29
+    share = math.sqrt(pooled / (pooled + total - pooled / 4))
+    assert found.percent == pytest.approx(100.0 * share, rel=1e-6)
+    assert found.verdict == verdict
+    assert found.repeatability == pytest.approx(math.sqrt(pooled))
+    assert found.reproducibility == 0.0
+
+
+def test_the_interval_narrows_with_its_level() -> None:
+    wide, narrow = study(READINGS, 0.95), study(READINGS, 0.5)
+    assert wide.percent_low < narrow.percent_low < narrow.percent < narrow.percent_high
+    assert narrow.percent_high < wide.percent_high
+    assert wide.level == 0.95

@@ -110,3 +110,31 @@ def test_guard_band_of_95_percent() -> None:
     assert probability.false_accept == pytest.approx(0.0, abs=1e-9)
     outside = 0.5 * math.erfc(w / u / math.sqrt(2.0))
     assert outside == pytest.approx(0.05, abs=2e-4)
+
+
+def test_a_value_on_a_limit_belongs_to_the_better_side() -> None:
+    """Numbers that binary fractions hold exactly: each limit itself, and the next value beyond."""
+    tolerance = Tolerance(-1.0, 1.0, 0.125)
+    limits = {0.875: "pass", 1.0: "conditional_pass", 1.125: "conditional_fail"}
+    after = {0.875: "conditional_pass", 1.0: "conditional_fail", 1.125: "fail"}
+    for limit, decision in limits.items():
+        for sign in (1.0, -1.0):
+            assert tolerance.decide(sign * limit) == decision
+            assert tolerance.decide(sign * math.nextafter(limit, 2.0)) == after[limit]
+    assert (tolerance.accept_lower, tolerance.accept_upper) == (-0.875, 0.875)
+    assert Tolerance(-math.inf, 1.0).decide(-1e9) == "pass"
+
+
+def test_risks_of_an_exact_instrument_and_of_limits_that_cross() -> None:
+    exact = risks(Tolerance(-1.0, 1.0, 0.5), 0.0, 1.0, 0.0)
+    assert exact.false_accept == pytest.approx(0.0, abs=1e-12)
+    # inside the tolerance, beyond the acceptance limit: 2 (Phi(1) - Phi(0.5))
+    assert exact.false_reject == pytest.approx(0.299763, abs=1e-5)
+    crossed = risks(Tolerance(-1.0, 1.0, 1.5), 0.0, 1.0, 0.1)
+    assert crossed.false_accept == 0.0
+    assert crossed.false_reject == pytest.approx(0.682689, abs=1e-6)
+    assert risks(Tolerance(-1.0, 1.0), 1.0, 0.0, 0.0) == Risks(0.0, 0.0)
+    assert risks(Tolerance(-1.0, 1.0), 1.5, 0.0, 0.0) == Risks(0.0, 0.0)
+    for sd, u in ((-1.0, 0.1), (1.0, -0.1)):
+        with pytest.raises(ValueError, match="negative"):
+            risks(Tolerance(-1.0, 1.0), 0.0, sd, u)
