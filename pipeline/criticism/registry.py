@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import importlib.util
-import pkgutil
 import sys
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -14,9 +12,9 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from typing import Any, NoReturn
 
-from pipeline.criticism import effects as effects_room
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.own_effect import guarded, told
+from pipeline.plugins import discover
 from pipeline.records.errors import UsageError
 
 
@@ -33,10 +31,9 @@ def effects(effects_path: str | None = None) -> dict[str, Effect]:
 @cache
 def _library(files: tuple[tuple[Path, str], ...]) -> Mapping[str, Effect]:
     """Our effects and those of a user's files, which are known by path and digest."""
-    found: dict[str, Effect] = {}
-    for name in sorted(m.name for m in pkgutil.iter_modules(effects_room.__path__)):
-        effect = importlib.import_module(f"{effects_room.__name__}.{name}").EFFECT
-        found[effect.name] = effect
+    found = {
+        one.name: one.value for one in discover("pipeline.criticism.effects", "EFFECT", Effect)
+    }
     for path, digest in files:
         effect = _load(path, digest)
         if effect.name in found:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import math
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
 
-from pipeline.crosscheck import rules as rules_room
 from pipeline.crosscheck.judge import not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.plugins import discover
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
@@ -20,10 +18,8 @@ BROKEN = (ValueError, ArithmeticError, LookupError, TypeError)
 
 @cache
 def rules() -> tuple[Rule, ...]:
-    """Every rule of the room, by name."""
-    names = sorted(module.name for module in pkgutil.iter_modules(rules_room.__path__))
-    modules = [importlib.import_module(f"{rules_room.__name__}.{name}") for name in names]
-    return tuple(sorted((module.RULE for module in modules), key=lambda rule: rule.name))
+    """Every rule, by name."""
+    return tuple(one.value for one in discover("pipeline.crosscheck.rules", "RULE", Rule))
 
 
 def check_all(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -12,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.fit import estimators as estimators_room
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.plugins import PlugIn, discover
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -34,16 +32,18 @@ class Failure(NamedTuple):
 
 
 def homes() -> Mapping[str, str]:
-    """The module of every estimator of the room, by the estimator's name."""
-    names = sorted(m.name for m in pkgutil.iter_modules(estimators_room.__path__))
-    places = [f"{estimators_room.__name__}.{name}" for name in names]
-    return {importlib.import_module(place).ESTIMATOR.name: place for place in places}
+    """The module of every estimator, by the estimator's name."""
+    return {one.name: one.module for one in _found()}
+
+
+def _found() -> tuple[PlugIn, ...]:
+    return discover("pipeline.fit.estimators", "ESTIMATOR", Estimator)
 
 
 @cache
 def estimators() -> tuple[Estimator, ...]:
-    """Every estimator of the room, ordered so that each comes after those it uses."""
-    found = {name: importlib.import_module(place).ESTIMATOR for name, place in homes().items()}
+    """Every estimator, ordered so that each comes after those it uses."""
+    found: dict[str, Estimator] = {one.name: one.value for one in _found()}
     givers: dict[str, list[str]] = {}
     for estimator in found.values():
         for constant in estimator.gives:

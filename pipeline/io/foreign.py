@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 
-from pipeline.io import readers as readers_room
 from pipeline.io.raw_table import RawTable
+from pipeline.plugins import discover
 from pipeline.records.errors import CaptureError, UsageError
 
 
@@ -46,11 +45,7 @@ def library(module: str, extra: str) -> ModuleType:
 @cache
 def readers() -> dict[str, Reader]:
     """Every reader by name."""
-    found: dict[str, Reader] = {}
-    for name in sorted(m.name for m in pkgutil.iter_modules(readers_room.__path__)):
-        reader = importlib.import_module(f"{readers_room.__name__}.{name}").READER
-        found[reader.name] = reader
-    return found
+    return {one.name: one.value for one in discover("pipeline.io.readers", "READER", Reader)}
 
 
 def find_reader(name: str) -> Reader:
