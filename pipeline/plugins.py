@@ -6,16 +6,20 @@ the plug-in: `[project.entry-points."motor_datasheets.effects"] seal_drag = "sea
 
 from __future__ import annotations
 
+import hashlib
 import pkgutil
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from pipeline.records.errors import UsageError
 
 GROUP = "motor_datasheets"
+ROOMS = ("readers", "gates", "estimators", "rules", "exporters", "effects")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +42,7 @@ def discover(room: str, attribute: str, kind: type) -> tuple[PlugIn, ...]:
         module = f"{room}.{name}"
         value = getattr(import_module(module), attribute)
         found[value.name] = PlugIn(value.name, module, value)
-    group = f"{GROUP}.{room.rpartition('.')[2]}"
-    for point in sorted(_outside().select(group=group), key=lambda one: one.name):
+    for point in _outside()[room.rpartition(".")[2]]:
         value = _loaded(point, kind)
         if value.name in found:
             other = found[value.name].module
@@ -49,12 +52,37 @@ def discover(room: str, attribute: str, kind: type) -> tuple[PlugIn, ...]:
 
 
 @cache
-def _outside() -> Any:
-    """The entry points of all installed packages, read once a process."""
-    return entry_points()
+def outside_version() -> str:
+    """What outside plug-ins there are and what they say: names, versions, digest of their sources.
+
+    Empty where there are none. A result hangs on them as it does on the code of this package.
+    """
+    points = [point for room in _outside().values() for point in room]
+    names = sorted({f"{p.group} {p.value} {p.dist.version if p.dist else ''}" for p in points})
+    digest = hashlib.sha256()
+    for home in sorted({p.module.partition(".")[0] for p in points}):
+        for source in _sources(home):
+            digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
+    return "; ".join([*names, digest.hexdigest()]) if names else ""
 
 
-def _loaded(point: Any, kind: type) -> Any:
+def _sources(home: str) -> list[Path]:
+    """The Python files of an installed package or module, sorted; none where it is not there."""
+    spec = find_spec(home)
+    if spec is None or spec.origin is None:
+        return []
+    places = [Path(place) for place in spec.submodule_search_locations or ()]
+    return sorted(p for place in places for p in place.rglob("*.py")) or [Path(spec.origin)]
+
+
+@cache
+def _outside() -> dict[str, list[EntryPoint]]:
+    """The entry points of each room by name, read once a process."""
+    named = {room: entry_points(group=f"{GROUP}.{room}") for room in ROOMS}
+    return {room: sorted(found, key=lambda one: one.name) for room, found in named.items()}
+
+
+def _loaded(point: EntryPoint, kind: type) -> Any:
     """The object of an entry point; a package that breaks is named, whatever it raised."""
     remedy = f"mend or remove {point.dist.name if point.dist else point.module}"
     try:

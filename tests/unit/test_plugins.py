@@ -106,3 +106,18 @@ def test_one_at_fault_is_named_and_no_traceback_shown(
     assert said in done.stderr
     assert "outside_plug_in:EFFECT" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_what_is_kept_hangs_on_the_sources_of_outside_plug_ins(tmp_path: Path) -> None:
+    """A fit that is kept must not outlive an edit of the estimator that gave it."""
+    package(tmp_path, "estimators", example("ESTIMATOR"), "ESTIMATOR")
+    code = "from pipeline.plugins import outside_version as v; print(v())"
+    before = python(tmp_path, "-c", code).stdout
+    assert "outside_plug_in:ESTIMATOR 1.0" in before
+    module = tmp_path / "outside_plug_in.py"
+    module.write_text(module.read_text().replace("least_swing_a", "smallest_swing_a"))
+    after = python(tmp_path, "-c", code).stdout
+    assert after != before
+    assert python(ROOT, "-c", code).stdout == "\n"
+    whole = "from pipeline.stages.fleet.keeping import libraries_version as v; print(v())"
+    assert after.strip() in python(tmp_path, "-c", whole).stdout

@@ -11,6 +11,7 @@ import hashlib
 import importlib.metadata
 import platform
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -22,6 +23,7 @@ from pipeline.io.identity import Identities, Identity, identity, notes_folder
 from pipeline.io.sealed import keep_sealed, read_sealed
 from pipeline.io.source_map import SourceMap
 from pipeline.io.survey import Answer, Entry, Question
+from pipeline.plugins import outside_version
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -29,14 +31,32 @@ from pipeline.stages.fleet.jobs import Files, Finished
 from pipeline.stages.fleet.keys import answer_parts, key_of
 
 FOLDER = ".cache"
-LIBRARIES = ("numpy", "scipy", "polars", "pandera", "numba", "rerun-sdk", "deltalake", "zstandard")
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "polars",
+    "pandera",
+    "numba",
+    "rerun-sdk",
+    "deltalake",
+    "zstandard",
+    "lz4",
+    "isal",
+    "protobuf",
+    "pyyaml",
+)
+OPTIONAL_LIBRARIES = ("h5py", "asammdf", "nptdms")
 
 
 @cache
 def libraries_version() -> str:
-    """The versions of Python and of the libraries that results hang on."""
+    """The versions of Python, of the libraries that results hang on, and of outside plug-ins."""
     libraries = [f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES]
-    return "; ".join([platform.python_version(), platform.machine(), *libraries])
+    for name in OPTIONAL_LIBRARIES:
+        with suppress(importlib.metadata.PackageNotFoundError):
+            libraries.append(f"{name} {importlib.metadata.version(name)}")
+    machine = platform.python_version(), platform.machine()
+    return "; ".join([*machine, *libraries, outside_version()])
 
 
 def tools_version() -> str:
