@@ -8,11 +8,13 @@ GUM 5.1.3 note 2 (numerical sensitivity) and H.1.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.capture import UNSTATED_U, Capture, CaptureMeta
+from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
@@ -45,11 +47,17 @@ def temperature_source(meta: CaptureMeta) -> str:
     return f"temperature@{station(meta)}"
 
 
+def clock_source(meta: CaptureMeta) -> str:
+    """The source of a time base's error."""
+    return f"clock@{station(meta)}"
+
+
 SOURCES: Mapping[str, tuple[Callable[[CaptureMeta], str], str]] = {
     "voltage": (voltage_source, "u_rel_voltage"),
     "current": (current_source, "u_rel_current"),
     "temperature": (temperature_source, "u_temp_degc"),
     "torque": (torque_source, "u_rel_torque"),
+    "clock": (clock_source, "u_rel_clock"),
 }
 
 
@@ -108,6 +116,17 @@ def contributions(
         for index in range(size):
             budgets[index].append(Contribution(source, float(half[index]), "B"))
     return budgets
+
+
+def with_clock(estimate: Estimate, power: int, captures: Iterable[Capture]) -> Estimate:
+    """The estimate with what the time bases of its captures may have made of it.
+
+    A clock fast by a share g shows (1 + g)^power of the constant. The time bases of several
+    stations count in full each: never too little. Reference: GUM 5.1.6, u(X)/X = p u(t)/t.
+    """
+    gains = instrument_uncertainties(captures, ("clock",))
+    parts = [Contribution(name, power * estimate.number * u, "B") for name, u in gains.items()]
+    return replace(estimate, budget=budget_of((*estimate.budget, *parts)))
 
 
 def budget_of(parts: Iterable[Contribution]) -> Budget:

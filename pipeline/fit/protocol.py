@@ -37,6 +37,9 @@ class Estimator:
     `rank`: preference among estimators that give the same constant; the lowest is published.
     `experiment`: the test to record, in words, when the constant is missing.
     `terms`: glossary entries for constants of its own that `contract/outputs.md` does not name.
+    `clock_powers`: by constant, the power p of a clock that is wrong by a factor in what the
+        captures themselves say of it: an inertia is seen as (1 + gain)² of itself, a torque over a
+        current as it is (0, not in it). What comes with `known` constants is in their budgets.
     `options`: its settings with defaults; `fit.NAME.KEY=` in the configuration overrides.
     """
 
@@ -50,4 +53,5 @@ class Estimator:
     aids: tuple[str, ...] = ()
     rank: int = 0
     terms: tuple[Term, ...] = ()
+    clock_powers: Mapping[str, int] = field(default_factory=dict)
     options: Mapping[str, float] = field(default_factory=dict)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.fit.instruments import with_clock
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.physics.glossary import CONSTANTS, Term
 from pipeline.plugins import PlugIn, discover
@@ -78,7 +79,9 @@ def fit_all(
         if campaign.of(*estimator.tests):
             chosen = {**estimator.options, **options.get(estimator.name, {})}
             try:
-                result = _fitted(estimator, campaign, known, chosen, recall)
+                result = _timed(
+                    estimator, campaign, _fitted(estimator, campaign, known, chosen, recall)
+                )
             except BROKEN as error:
                 reason = f"{estimator.name} broke on this data: {type(error).__name__}: {error}"
                 failures.append(Failure("estimator_failed", reason, REPORT))
@@ -103,6 +106,19 @@ def _fitted(
     if recall is None:
         return estimator.fit(campaign, used, options)
     return recall(estimator, used, options, lambda: estimator.fit(campaign, used, options))
+
+
+def _timed(estimator: Estimator, campaign: Campaign, result: Fit) -> Fit:
+    """The result with the uncertainty of the time bases in its budgets."""
+    if not estimator.clock_powers:
+        return result
+    timed = []
+    for estimate in result.estimates:
+        power = estimator.clock_powers.get(estimate.name, 0)
+        used = [c for c in campaign.captures if c.path in estimate.captures]
+        known = power and estimate.known
+        timed.append(with_clock(estimate, power, used) if known else estimate)
+    return replace(result, estimates=tuple(timed))
 
 
 def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:

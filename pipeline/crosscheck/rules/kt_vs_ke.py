@@ -30,7 +30,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         "torque per peak q ampere over 1.5 p psi from the back-EMF",
         "coupling",
         None if pairs is None else round(pairs.number),
-        "gain of the torque, current or voltage sensor",
+        "gain of the torque, current or voltage sensor, or the time base",
     )
 
 

@@ -395,5 +395,6 @@ ESTIMATOR = Estimator(
     ("current_step",),
     EXPERIMENT,
     fit_current_step,
+    clock_powers=dict.fromkeys(GIVES, 1),
     options={"least_share": 0.2},
 )

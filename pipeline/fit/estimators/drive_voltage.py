@@ -316,5 +316,6 @@ ESTIMATOR = Estimator(
     fit=fit,
     uses=("pole_pairs", "temp_coeff_magnet_1_k"),
     rank=30,
+    clock_powers={"ke_phase_peak_v_s_rad": 1},
     options={"level": 0.001},
 )

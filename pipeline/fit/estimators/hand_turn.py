@@ -169,6 +169,7 @@ ESTIMATOR = Estimator(
     fit_hand_turn,
     uses=("temp_coeff_magnet_1_k",),
     rank=1,
+    clock_powers={"psi_pm_wb": 1},
     options={
         "temp_assumed_degc": 25.0,
         "alpha_assumed_1_k": USUAL_1_K,

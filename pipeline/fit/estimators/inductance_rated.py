@@ -300,4 +300,5 @@ ESTIMATOR = Estimator(
     fit=fit,
     uses=("pole_pairs", "temp_coeff_magnet_1_k", "r_phase_ohm"),
     rank=0,
+    clock_powers=dict.fromkeys(GIVES, 1),
 )

@@ -372,5 +372,6 @@ ESTIMATOR = Estimator(
     either=USES,
     aids=AIDS,
     rank=0,
+    clock_powers={"j_rotor_kgm2": 2, "b_visc_nm_s_rad": 1},
     options={"level": 0.001},
 )

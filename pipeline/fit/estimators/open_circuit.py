@@ -329,6 +329,7 @@ ESTIMATOR = Estimator(
     EXPERIMENT,
     fit_open_circuit,
     terms=TERMS,
+    clock_powers={"psi_pm_wb": 1, **dict.fromkeys(KE_NAMES, 1), "kv_ll_peak_rpm_v": -1},
     options={
         "speed_change": 0.02,
         "temp_assumed_degc": 25.0,

@@ -346,5 +346,6 @@ ESTIMATOR = Estimator(
     fit=fit,
     rank=0,
     terms=TERMS,
+    clock_powers={"coast_coulomb_rad_s2": -2, "coast_viscous_1_s": -1},
     options={"level": 0.001},
 )

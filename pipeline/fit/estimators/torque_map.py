@@ -388,5 +388,6 @@ ESTIMATOR = Estimator(
     uses=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),
     rank=5,
     terms=(RELUCTANCE,),
+    clock_powers={"b_visc_nm_s_rad": 1},
     options={"level": 0.01},
 )
