@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.crosscheck.judge import judge_ratio, not_evaluated
+from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -56,10 +56,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     files = ", ".join(off[:NAMED]) + more
     return judge_ratio(
         NAME,
-        worst.ratio,
-        worst.u,
+        Ratio(worst.ratio, worst.u, BLOCKS - 2.0),
         allowance,
         f"speed integrated over the recorded time, over the angle, in {worst.path}",
+        "count",
         None,
         f"the clock t_s of {files}, or the scale of its omega_mech_rad_s: record a speed that a "
         "second clock knows",
