@@ -1,13 +1,13 @@
 """Current of a locked machine under voltage levels, and its fit to many captures at once.
 
-    dI/dt = (v - R I)/L(I)
+    dI/dt = (v - R I)/L(I),  v = e - R_source I
     L(I)  = 2 [cos²g Ld(i_d) + sin²g Lq(i_q)],  i_d + j i_q = (2/√3) I e^{jg}
 
-g is the angle from the d axis to the pair's current. Ld and Lq are incremental and saturate with
-their own flux, L0/(1 + a y + b y² + c y³ + d y⁴), y the flux that the current made; on q with |y|,
-for there both senses are alike. So i is a polynomial of y, which is how iron bends. Every step of
-the integration is an exact exponential with L frozen at its midpoint: exact for a constant L, else
-second order.
+g is the angle from the d axis to the pair's current; e and R_source are the supply's. Ld and Lq
+are incremental and saturate with their own flux, L0/(1 + a y + b y² + c y³ + d y⁴) on d, y the flux
+that the current made, L0/(1 + a y² + b |y|³ + c y⁴ + d |y|⁵) on q. So i is a polynomial of y, which
+is how iron bends. Every step of the integration is an exact exponential with L frozen at its
+midpoint: exact for a constant L, else second order.
 
 References: IEEE Std 1812-2014, 8 (step response at standstill); Hairer, Norsett and Wanner,
 Solving Ordinary Differential Equations I, II.1 (midpoint rule).
@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.fit.step_record import StepRecord
+from pipeline.fit.step_wave import BETWEEN
 
 Array = NDArray[np.float64]
 SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4")
@@ -33,73 +34,97 @@ SPACE = 2.0 / math.sqrt(3.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """Where the parameters sit: those of the axes, then each capture's own.
+class Own:
+    """Where one capture's own parameters sit, counted from its first; None where it has none.
 
-    Own ones in order: R, current offset where the voltage has two levels or more, the edges to
-    place, the first current where the capture starts unsettled, the inverter's drop where
-    commanded, and each level's error in units of its standard error, known to be 0 ± 1.
+    The pair's and the supply's resistance, the current's offset where the voltage has two levels
+    or more, the moves of its edges [samples], the first current where the capture starts unsettled,
+    the inverter's drop where commanded, and the supply's open voltages.
     """
 
+    r_ohm: int
+    source_ohm: int | None
+    offset_a: int | None
+    moves: slice
+    first_a: int | None
+    drop_v: int | None
+    levels_v: slice
+    size: int
+
+
+def own_of(record: StepRecord) -> Own:
+    """The places of a capture's own parameters."""
+    wave, at = record.wave, 1
+    places: list[int | None] = []
+    for there in (
+        wave.has_supply and not record.commanded,
+        wave.levels_v.size > 1,
+        not record.starts_settled,
+        record.commanded,
+    ):
+        places.append(at if there else None)
+        at += there
+    source, offset, first, drop = places
+    moves = slice(at, at + wave.moves.shape[1])
+    levels = slice(moves.stop, moves.stop + (wave.levels_v.size if wave.has_supply else 0))
+    return Own(0, source, offset, moves, first, drop, levels, levels.stop)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the parameters sit: those of the axes, then from `starts` each capture's own."""
+
     starts: tuple[int, ...]
-    sizes: tuple[int, ...]
+    own: tuple[Own, ...]
 
     @property
     def size(self) -> int:
         """How many parameters in all."""
-        return self.starts[-1] + self.sizes[-1]
+        return self.starts[-1] + self.own[-1].size
 
 
 def layout_of(records: Sequence[StepRecord]) -> Layout:
     """The layout for these captures."""
-    sizes = [
-        1
-        + (r.wave.levels_v.size > 1)
-        + len(r.wave.free)
-        + (not r.starts_settled)
-        + r.commanded
-        + r.wave.u_levels_v.size
-        for r in records
-    ]
-    starts = np.cumsum([len(SHARED), *sizes[:-1]])
-    return Layout(tuple(int(s) for s in starts), tuple(sizes))
+    own = tuple(own_of(record) for record in records)
+    starts = np.cumsum([len(SHARED), *(o.size for o in own[:-1])])
+    return Layout(tuple(int(s) for s in starts), own)
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
-    """One capture's own parameters for m variants [m each]; edges [m, s + 1], levels [m, s]."""
+class Drive:
+    """What drives one capture in m variants [m each]; edges [m, s + 1], open voltages [m, s]."""
 
     r_ohm: Array
+    source_ohm: Array
     offset_a: Array
     edges_s: Array
     first_a: Array
     drop_v: Array
     levels_v: Array
 
+    @property
+    def loop_ohm(self) -> Array:
+        """Resistance of pair and supply [m]."""
+        return self.r_ohm + self.source_ohm
 
-def unpack(record: StepRecord, own: Array) -> Own:
-    """The own parameters of a capture from their columns [m, size]."""
-    count = own.shape[0]
-    at = 1
-    offset = np.zeros(count)
-    if record.wave.levels_v.size > 1:
-        offset, at = own[:, at], at + 1
-    edges = np.tile(record.wave.edges_s, (count, 1))
-    for index in record.wave.free:
-        edges[:, index] = record.wave.edges_s[index] + own[:, at] * record.wave.period_s
-        at += 1
-    levels = np.tile(record.wave.levels_v, (count, 1))
-    if record.wave.u_levels_v.size:
-        levels = levels + own[:, -record.wave.u_levels_v.size :] * record.wave.u_levels_v
-    first = levels[:, 0] / own[:, 0]
-    if not record.starts_settled:
-        first, at = own[:, at], at + 1
-    drop = own[:, at] if record.commanded else np.zeros(count)
-    return Own(own[:, 0], offset, edges, first, drop, levels)
+
+def drive_of(record: StepRecord, own: Own, values: Array) -> Drive:
+    """The drive of a capture from the columns of its own parameters [m, size]."""
+    wave, none = record.wave, np.zeros(values.shape[0])
+
+    def column(place: int | None) -> Array:
+        return none if place is None else values[:, place]
+
+    r_ohm, source_ohm = values[:, own.r_ohm], column(own.source_ohm)
+    edges = wave.edges_s + wave.period_s * values[:, own.moves] @ wave.moves.T
+    levels = values[:, own.levels_v] if wave.has_supply else np.tile(wave.levels_v, (none.size, 1))
+    settled = levels[:, 0] / (r_ohm + source_ohm)
+    first = settled if own.first_a is None else values[:, own.first_a]
+    return Drive(r_ohm, source_ohm, column(own.offset_a), edges, first, column(own.drop_v), levels)
 
 
 def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
-    """Starting values: the integrated form's L split over the axes, its R; no saturation."""
+    """Starting values: the integrated form's L split over the axes, its R, the supply; linear."""
     cos2 = np.array([math.cos(r.axis_rad) ** 2 for r in records])
     mixing = 2.0 * np.column_stack([cos2, 1.0 - cos2])
     l_total = np.array([r.l_start_h for r in records])
@@ -109,24 +134,34 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
     )
     start = np.zeros(layout.size)
     start[[LD, LQ]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
-    for record, at in zip(records, layout.starts, strict=True):
+    for record, at, own in zip(records, layout.starts, layout.own, strict=True):
         start[at] = record.r_start_ohm
+        if own.source_ohm is not None:
+            start[at + own.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
+        if record.wave.has_supply:
+            start[at + own.levels_v.start : at + own.levels_v.stop] = record.wave.levels_v
     return start
 
 
 def axis_inductances(shared: Array, flux_d: Array, flux_q: Array) -> tuple[Array, Array]:
-    """Incremental Ld and Lq [m] at the fluxes [m] made by current; shared [m, 10]."""
-    d_axis = shared[:, LD] / _bend(shared[:, LD + 1 : LD + 1 + TERMS], flux_d)
-    q_axis = shared[:, LQ] / _bend(shared[:, LQ + 1 : LQ + 1 + TERMS], np.abs(flux_q))
-    return d_axis, q_axis
+    """Incremental Ld and Lq [m] at the fluxes [m] made by current; shared [m, 10].
+
+    The q axis begins with y²: both senses are alike, and iron has no corner at zero current.
+    """
+    y = np.abs(flux_q)
+    bend_d = _polynomial(shared[:, LD + 1 : LD + 1 + TERMS], flux_d)
+    bend_q = _polynomial(shared[:, LQ + 1 : LQ + 1 + TERMS], y) * y
+    return shared[:, LD] / np.maximum(1.0 + bend_d, 0.05), shared[:, LQ] / np.maximum(
+        1.0 + bend_q, 0.05
+    )
 
 
-def _bend(terms: Array, flux: Array) -> Array:
-    """L0/L [m] at an axis flux [m], kept above 1/20."""
-    bend = terms[:, 3] * flux
+def _polynomial(terms: Array, flux: Array) -> Array:
+    """Polynomial of a flux [m] without a constant."""
+    value = terms[:, 3] * flux
     for column in (2, 1, 0):
-        bend = (bend + terms[:, column]) * flux
-    return np.maximum(1.0 + bend, 0.05)
+        value = (value + terms[:, column]) * flux
+    return value
 
 
 def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
@@ -147,9 +182,9 @@ def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
 
 def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
     """Segment of each integration step and the shares of the segment where it begins and ends."""
-    tau = record.l_start_h / record.r_start_ohm
+    tau = record.l_start_h / (record.r_start_ohm + max(record.wave.source_ohm, 0.0))
     segments, begin, end = [], [], []
-    sampled = record.wave.levels_v.size > 20
+    sampled = not record.wave.has_supply
     for index, length in enumerate(np.diff(record.wave.edges_s)):
         if sampled:
             nodes = np.array([0.0, 1.0])
@@ -177,15 +212,10 @@ class StepModel:
     def predict(self, variants: Sequence[Array]) -> list[Array]:
         """Currents [n, m] of each capture; variants[c] [m, size] are full parameter vectors."""
         shared, cos_g, width, volts, own = [], [], [], [], []
-        for record, grid, rows, at, size in zip(
-            self.records,
-            self._grids,
-            variants,
-            self.layout.starts,
-            self.layout.sizes,
-            strict=True,
+        for record, grid, rows, at, places in zip(
+            self.records, self._grids, variants, self.layout.starts, self.layout.own, strict=True
         ):
-            mine = unpack(record, rows[:, at : at + size])
+            mine = drive_of(record, places, rows[:, at : at + places.size])
             segment, begin, end = grid
             lengths = np.diff(mine.edges_s, axis=1)[:, segment]
             pad = self._count - segment.size
@@ -210,10 +240,10 @@ class StepModel:
         return currents
 
     def _sweep(
-        self, shared: Array, cos_g: Array, width: Array, volts: Array, own: Sequence[Own]
+        self, shared: Array, cos_g: Array, width: Array, volts: Array, own: Sequence[Drive]
     ) -> tuple[Array, Array, Array]:
         """Currents at the nodes [k + 1, m]; inductance and final current of each step [k, m]."""
-        r = np.concatenate([o.r_ohm for o in own])
+        r = np.concatenate([o.loop_ohm for o in own])
         drop = np.concatenate([o.drop_v for o in own])
         knee = np.concatenate(
             [
@@ -248,12 +278,12 @@ class StepModel:
         return nodes, l_mid, target
 
     def residuals(
-        self, parameters: Array, sigmas: Sequence[float], jacobian: NDArray[np.bool_]
+        self, parameters: Array, weights: Sequence[Array], jacobian: NDArray[np.bool_]
     ) -> tuple[Array, Array]:
         """Weighted residuals [n] and their Jacobian [n, k] over the parameters that are free.
 
-        After the samples of each capture come its levels' errors, as observations of 0 ± 1.
-        One-sided differences of width 1e-6 of each parameter's natural scale.
+        Of each capture first the currents, then the voltages, each times its row of `weights`
+        [2, rows]. One-sided differences of width 1e-6 of each parameter's natural scale.
         """
         widths = self._widths(parameters)
         free = np.flatnonzero(jacobian)
@@ -264,41 +294,56 @@ class StepModel:
             rows[np.arange(1, mine.size + 1), mine] += widths[mine]
             variants.append(rows)
         blocks, slopes = [], []
-        for c, current in enumerate(self.predict(variants)):
+        for c, (current, volts) in enumerate(self.predict_both(variants)):
             record, mine = self.records[c], columns[c]
-            weight = np.sqrt(record.count) / sigmas[c]
-            blocks.append((current[:, 0] - record.i_a) * weight)
-            slope = np.zeros((record.i_a.size, free.size))
             place = np.searchsorted(free, mine)
-            slope[:, place] = (current[:, 1:] - current[:, :1]) / widths[mine] * weight[:, None]
-            slopes.append(slope)
-            levels = self.level_columns(c)
-            blocks.append(parameters[levels])
-            slopes.append((levels[:, None] == free[None, :]).astype(np.float64))
+            for read, seen, weight in zip(
+                (current, volts), (record.i_a, record.v_v), weights[c], strict=True
+            ):
+                blocks.append((read[:, 0] - seen) * weight)
+                slope = np.zeros((seen.size, free.size))
+                slope[:, place] = (read[:, 1:] - read[:, :1]) / widths[mine] * weight[:, None]
+                slopes.append(slope)
         return np.concatenate(blocks), np.vstack(slopes)
+
+    def predict_both(self, variants: Sequence[Array]) -> list[tuple[Array, Array]]:
+        """Currents and voltages [n, m each] of each capture; a voltage of no level is 0."""
+        found = []
+        for current, record, rows, at, own in zip(
+            self.predict(variants),
+            self.records,
+            variants,
+            self.layout.starts,
+            self.layout.own,
+            strict=True,
+        ):
+            drive = drive_of(record, own, rows[:, at : at + own.size])
+            volts = np.zeros_like(current)
+            there = record.level != BETWEEN
+            through = current[there] - drive.offset_a
+            volts[there] = drive.levels_v.T[record.level[there]] - drive.source_ohm * through
+            found.append((current, volts))
+        return found
 
     def bounds(self, start: Array) -> tuple[Array, Array]:
         """Where the search may go from `start`: beyond, a current would run away without end.
 
-        Inductances and resistances stay positive, and an edge near the samples that leave it open.
+        Inductances and resistances stay positive, the loop's too, and an edge near the samples
+        that leave it open.
         """
         low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
         positive = [LD, LQ, *self.layout.starts]
         low[positive] = 1e-3 * start[positive]
-        for record, at in zip(self.records, self.layout.starts, strict=True):
-            first = at + 1 + (record.wave.levels_v.size > 1)
-            edges = slice(first, first + len(record.wave.free))
-            low[edges], high[edges] = -EDGE_REACH, EDGE_REACH
+        for at, own in zip(self.layout.starts, self.layout.own, strict=True):
+            if own.source_ohm is not None:
+                low[at], low[at + own.source_ohm] = 0.6 * start[at], -0.5 * start[at]
+            moves = slice(at + own.moves.start, at + own.moves.stop)
+            low[moves], high[moves] = -EDGE_REACH, EDGE_REACH
         return low, high
-
-    def level_columns(self, capture: int) -> NDArray[np.intp]:
-        """Where the errors of a capture's voltage levels sit among the parameters."""
-        end = self.layout.starts[capture] + self.layout.sizes[capture]
-        return np.arange(end - self.records[capture].wave.u_levels_v.size, end)
 
     def columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:
         """Those of the free parameters that a capture depends on."""
-        start, size = self.layout.starts[capture], self.layout.sizes[capture]
+        start, size = self.layout.starts[capture], self.layout.own[capture].size
         own = (free >= start) & (free < start + size)
         return free[own | (free < len(SHARED))]
 
@@ -308,25 +353,25 @@ class StepModel:
         for place in (LD, LQ):
             flux = parameters[place] * largest
             widths[place] = 1e-6 * parameters[place]
-            widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux ** -np.arange(1.0, 1.0 + TERMS)
-        for record, at, size in zip(
-            self.records, self.layout.starts, self.layout.sizes, strict=True
-        ):
+            powers = np.arange(1.0, 1.0 + TERMS) + (place == LQ)
+            widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux**-powers
+        for record, at, own in zip(self.records, self.layout.starts, self.layout.own, strict=True):
+            ampere = max(record.largest_a, 1e-9)
+            widths[at : at + own.size] = 1e-5 * ampere
             widths[at] = 1e-6 * parameters[at]
-            widths[at + 1 : at + size] = 1e-5 * max(record.largest_a, 1e-9)
-            shift = 2 if record.wave.levels_v.size > 1 else 1
-            widths[at + shift : at + shift + len(record.wave.free)] = 1e-4
-            last = at + size - record.wave.u_levels_v.size
-            if record.commanded:
-                widths[last - 1] = 1e-5 * record.largest_a * parameters[at]
-            widths[last : at + size] = 1e-2
+            if own.source_ohm is not None:
+                widths[at + own.source_ohm] = 1e-6 * parameters[at]
+            widths[at + own.moves.start : at + own.moves.stop] = 1e-4
+            widths[at + own.moves.stop : at + own.size] = 1e-5 * ampere * parameters[at]
+            if own.drop_v is not None:
+                widths[at + own.drop_v] = 1e-5 * ampere * parameters[at]
         return widths
 
 
 def _at_samples(
     record: StepRecord,
     grid: tuple[NDArray[np.intp], Array, Array],
-    own: Own,
+    own: Drive,
     trace: tuple[Array, Array, Array],
 ) -> Array:
     """Current [n, m] at the record's times, by the exact step from the node before each."""
@@ -338,6 +383,6 @@ def _at_samples(
         starts = own.edges_s[column, segment] + begin * lengths[column, segment]
         index = np.clip(np.searchsorted(starts, record.t_s, side="right") - 1, 0, segment.size - 1)
         goal = target[index, column]
-        decay = np.exp(-(record.t_s - starts[index]) * own.r_ohm[column] / l_mid[index, column])
+        decay = np.exp(-(record.t_s - starts[index]) * own.loop_ohm[column] / l_mid[index, column])
         currents[:, column] = goal + (nodes[index, column] - goal) * decay + own.offset_a[column]
     return currents

@@ -123,7 +123,10 @@ class Motor:
 
 @dataclass(frozen=True, slots=True)
 class Instruments:
-    """The gains and offsets one station really has: common to all its samples."""
+    """The gains and offsets one station really has: common to all its samples.
+
+    Offsets of clamp and probe are shares of half the scope's range.
+    """
 
     current: float = 1.0
     voltage: float = 1.0
@@ -131,9 +134,28 @@ class Instruments:
     torque: float = 1.0
     lcr: float = 1.0
     temperature_degc: float = 0.0
+    clamp: float = 1.0
+    probe: float = 1.0
+    clamp_offset: float = 0.0
+    probe_offset: float = 0.0
 
 
 EXACT = Instruments()
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """An oscilloscope with a current clamp and a voltage probe, each with a gain of its own.
+
+    `noise_steps` is the noise before the converter in its steps. Offsets are drawn with a standard
+    deviation of `offset_rel` of half the range.
+    """
+
+    bits: int = 12
+    noise_steps: float = 0.7
+    u_rel_clamp: float = 2e-3
+    u_rel_probe: float = 1e-3
+    offset_rel: float = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +167,8 @@ class Bench:
     from the stated uncertainties; `EXACT` is a perfect station. `drift_rel`, `hum_rel` are the
     size of a random walk at the end of a capture and of a mains pick-up, in units of the
     channel's noise. `jitter_s` scatters the time stamps only. `temperature_hz` puts thermometers
-    of fast captures on a clock of their own.
+    of fast captures on a clock of their own. `scope` records the current steps in place of the
+    station's own sensors.
     """
 
     station: str = "sim-1"
@@ -174,6 +197,7 @@ class Bench:
     hum_hz: float = 50.0
     jitter_s: float = 0.0
     temperature_hz: float | None = None
+    scope: Scope | None = None
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:
@@ -181,13 +205,23 @@ class Bench:
         if self.instruments is not None:
             return self.instruments
         draw = rng.standard_normal(6)
-        return Instruments(
+        station = Instruments(
             current=1.0 + self.u_rel_current * float(draw[0]),
             voltage=1.0 + self.u_rel_voltage * float(draw[1]),
             voltage_commanded=1.0 + self.u_rel_voltage * float(draw[2]),
             torque=1.0 + self.u_rel_torque * float(draw[3]),
             lcr=1.0 + self.u_rel_lcr * float(draw[4]),
             temperature_degc=self.u_temp_degc * float(draw[5]),
+        )
+        if self.scope is None:
+            return station
+        draw = rng.standard_normal(4)
+        return replace(
+            station,
+            clamp=1.0 + self.scope.u_rel_clamp * float(draw[0]),
+            probe=1.0 + self.scope.u_rel_probe * float(draw[1]),
+            clamp_offset=self.scope.offset_rel * float(draw[2]),
+            probe_offset=self.scope.offset_rel * float(draw[3]),
         )
 
 

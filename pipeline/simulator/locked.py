@@ -36,8 +36,37 @@ def pair_rate(
 
 
 @njit(cache=True)
+def advanced(
+    flux: Pair,
+    way: Pair,
+    ramp: tuple[float, float],
+    time: tuple[float, int],
+    ohm: float,
+    eps: float,
+    t_m: float,
+    p: Plant,
+) -> Pair:
+    """Flux after `time` = (step, how many), by RK4 under the voltage `ramp` = (start, slope)."""
+    d, q = flux
+    h, slope = time[0], ramp[1]
+    for m in range(time[1]):
+        v1 = ramp[0] + slope * m * h
+        v2, v4 = v1 + 0.5 * slope * h, v1 + slope * h
+        a1, b1 = pair_rate((d, q), way, v1, ohm, eps, t_m, p)
+        at = (d + 0.5 * h * a1, q + 0.5 * h * b1)
+        a2, b2 = pair_rate(at, way, v2, ohm, eps, t_m, p)
+        at = (d + 0.5 * h * a2, q + 0.5 * h * b2)
+        a3, b3 = pair_rate(at, way, v2, ohm, eps, t_m, p)
+        a4, b4 = pair_rate((d + h * a3, q + h * b3), way, v4, ohm, eps, t_m, p)
+        d += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+        q += h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
+    return d, q
+
+
+@njit(cache=True)
 def pair_step(
     source: Array,
+    early: Array,
     step_s: float,
     substeps: int,
     pair: tuple[float, float, float],
@@ -50,31 +79,31 @@ def pair_step(
     """Voltage and current [n, 2] of one terminal pair, rotor locked at eps, third open, by RK4.
 
     `source` [n + 1] is the open voltage of the supply, linear between its points except that a
-    jump of more than half its largest value is an edge on the later point. `pair` holds the
-    current direction in alpha and beta and the pair's resistance at 25 degC. The state is the
-    flux vector; the open terminal's voltage is what keeps its current zero.
+    jump of more than half its largest value is an edge, `early` [n + 1] samples before the later
+    point. `pair` holds the current direction in alpha and beta and the pair's resistance at
+    25 degC. The state is the flux vector; the open terminal's voltage is what keeps its current
+    zero.
     """
     out = np.empty((source.size - 1, 2))
     c, s = np.cos(eps), np.sin(eps)
     way = (c * pair[0] + s * pair[1], c * pair[1] - s * pair[0])
     whole = pair[2] * resistance_rise(0.0, t_w, p) + source_ohm
     d, q, _, _ = magnet(eps, t_m, p)
+    flux = (d, q)
     edge = 0.5 * np.max(np.abs(source))
     h = step_s / substeps
     for n in range(source.size - 1):
-        i = pair_current((d, q), way, eps, t_m, p)
+        i = pair_current(flux, way, eps, t_m, p)
         out[n, 0], out[n, 1] = source[n] - source_ohm * i, i
         jump = source[n + 1] - source[n]
-        slope = 0.0 if abs(jump) > edge else jump / step_s
-        for m in range(substeps):
-            v1 = source[n] + slope * m * h
-            v2, v4 = v1 + 0.5 * slope * h, v1 + slope * h
-            a1, b1 = pair_rate((d, q), way, v1, whole, eps, t_m, p)
-            at = (d + 0.5 * h * a1, q + 0.5 * h * b1)
-            a2, b2 = pair_rate(at, way, v2, whole, eps, t_m, p)
-            at = (d + 0.5 * h * a2, q + 0.5 * h * b2)
-            a3, b3 = pair_rate(at, way, v2, whole, eps, t_m, p)
-            a4, b4 = pair_rate((d + h * a3, q + h * b3), way, v4, whole, eps, t_m, p)
-            d += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
-            q += h * (b1 + 2.0 * b2 + 2.0 * b3 + b4) / 6.0
+        if abs(jump) > edge:
+            after = early[n + 1]
+            first = (h * (1.0 - after), substeps)
+            flux = advanced(flux, way, (source[n], 0.0), first, whole, eps, t_m, p)
+            if after > 0.0:
+                last = (h * after, substeps)
+                flux = advanced(flux, way, (source[n + 1], 0.0), last, whole, eps, t_m, p)
+        else:
+            ramp = (source[n], jump / step_s)
+            flux = advanced(flux, way, ramp, (h, substeps), whole, eps, t_m, p)
     return out

@@ -24,8 +24,10 @@ class Resistance:
 class CurrentStep:
     """Voltage step on one pair, rotor locked; `level` is the final current in rated currents.
 
-    Times are in electrical time constants. The edges fall on sampling instants unless `rise_s`
-    gives the supply a ramp; `source_share` is the supply's resistance over the pair's.
+    Times are in electrical time constants. The edges fall on sampling instants unless
+    `random_edges` puts each anywhere between two of them or `rise_s` gives the supply a ramp;
+    `source_share` is the supply's resistance over the pair's. The rotor is `theta_off_deg` from
+    where it is said to be.
     """
 
     pair: str = "ab"
@@ -37,7 +39,9 @@ class CurrentStep:
     samples_tau: float = 140.0
     rate_hz: float | None = None
     rise_s: float = 0.0
+    random_edges: bool = False
     source_share: float = 0.0
+    theta_off_deg: float = 0.0
     temp_degc: float | None = None
 
 

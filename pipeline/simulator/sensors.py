@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulator.design import Bench, Instruments, Motor
+from pipeline.simulator.design import Bench, Instruments, Motor, Scope
 from pipeline.simulator.effects import active
 from pipeline.simulator.plant import Plant
 
@@ -39,6 +39,13 @@ def first_order_lag(signal: Array, step: float) -> Array:
     mean = -math.expm1(-step) / step
     late: Array = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal - signal[0]) + signal[0]
     return late
+
+
+def scope_range(largest: float) -> float:
+    """Half the range of a scope, of the series 1, 2, 5: holds a signal and a tenth more."""
+    wanted = 1.1 * largest
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return next(x * decade for x in (1.0, 2.0, 5.0, 10.0) if x * decade >= wanted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +124,21 @@ class Session:
         gain = self.instruments.voltage * (1.0 + self.fault("voltage_scale"))
         sigma = self.bench.voltage_noise_rel * self.motor.vdc_v
         return to_grid(gain * v + self.noise(v.size, sigma, t_s), self.voltage_step_v)
+
+    def probe(self, v: Array, scope: Scope) -> Array:
+        """A voltage [n] as the scope's probe shows it."""
+        return self._scoped(self.instruments.probe * v, self.instruments.probe_offset, scope)
+
+    def clamp(self, i_a: Array, scope: Scope) -> Array:
+        """A current [n] as the scope's clamp shows it."""
+        return self._scoped(self.instruments.clamp * i_a, self.instruments.clamp_offset, scope)
+
+    def _scoped(self, seen: Array, offset: float, scope: Scope) -> Array:
+        """One channel of a scope in the least range that holds it; `offset` is a share of that."""
+        half = scope_range(float(np.max(np.abs(seen))))
+        step = 2.0 * half / 2.0**scope.bits
+        noise = scope.noise_steps * step * self.rng.standard_normal(seen.size)
+        return to_grid(seen + offset * half + noise, step)
 
     def angle(self, theta: Array) -> Array:
         """Mechanical angle [n] by the encoder, with its faults."""

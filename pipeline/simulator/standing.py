@@ -109,25 +109,34 @@ def current_step(session: Session, how: protocols.CurrentStep) -> Recording:
     source = _supply(volt, before, on, n, round(how.rise_s * rate))
     alpha, beta, first, _ = PAIRS[how.pair]
     steps = max(1, math.ceil(1.0 / (rate * tau * 0.02)))
+    early = session.rng.uniform(size=n + 1) if how.random_edges else np.zeros(n + 1)
     true = pair_step(
         source,
+        early,
         1.0 / rate,
         steps,
         (alpha, beta, ohm),
         how.source_share * ohm,
-        math.radians(how.theta_elec_deg),
+        math.radians(how.theta_elec_deg + how.theta_off_deg),
         degc,
         degc,
         plant,
     )
-    table = {
-        "t_s": stamps,
-        f"v{how.pair}_v": session.voltage(true[:, 0], t_s),
-        f"i{'abc'[first]}_a": session.line_current(true[:, 1], first, t_s),
-    }
-    meta = session.meta(
-        "current_step", pair=how.pair, theta_elec_deg=f"{how.theta_elec_deg % 360.0:.2f}"
-    )
+    scope = session.bench.scope
+    if scope is None:
+        volts = session.voltage(true[:, 0], t_s)
+        amps = session.line_current(true[:, 1], first, t_s)
+        stated = {}
+    else:
+        volts = session.probe(true[:, 0], scope)
+        amps = session.clamp(true[:, 1], scope)
+        stated = {
+            "u_rel_voltage": f"{scope.u_rel_probe:g}",
+            "u_rel_current": f"{scope.u_rel_clamp:g}",
+        }
+    table = {"t_s": stamps, f"v{how.pair}_v": volts, f"i{'abc'[first]}_a": amps}
+    place = f"{how.theta_elec_deg % 360.0:.2f}"
+    meta = session.meta("current_step", pair=how.pair, theta_elec_deg=place, **stated)
     return Recording(f"current_step_{how.pair}", meta, (table,))
 
 

@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 
 from pipeline.fit.estimators import (
-    current_step,
     hand_turn,
     heat_run,
     lcr,
@@ -24,7 +23,7 @@ from pipeline.fit.estimators import (
 )
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import truth
-from pipeline.simulator.protocols import CurrentStep, HandTurn, Lcr, Resistance
+from pipeline.simulator.protocols import HandTurn, Lcr, Resistance
 from tests.recovery.harness import Case, Trial, cramer_rao
 from tests.recovery.simulated import BENCH, MOTOR, Plan, recorded
 
@@ -36,11 +35,6 @@ RESISTANCE: Plan = (
     ("resistance_bc", "resistance", {"pair": "bc"}),
     ("resistance_ca", "resistance", {"pair": "ca"}),
     ("resistance_ab_warm", "resistance", {"pair": "ab", "temp_degc": WARM_DEGC}),
-)
-STEPS: Plan = tuple(
-    (f"step_{axis}_{k}", "current_step", {"theta_elec_deg": angle, "level": level})
-    for axis, angle in (("d", -30.0), ("q", 60.0))
-    for k, level in enumerate((-0.45, 0.45, 0.9))
 )
 LCR: Plan = (("lcr", "lcr", {}),)
 SPEEDS = (0.3, 0.6, 0.9)
@@ -116,54 +110,6 @@ def _soak_trial(seed: int) -> Trial:
 @cache
 def _soak_bound() -> Mapping[str, float]:
     return {"temp_coeff_copper_1_k": math.sqrt(_resistance_covariance(math.inf)[3, 3])}
-
-
-def _step_trial(seed: int) -> Trial:
-    campaign, real = recorded(STEPS, seed)
-    true = true_constants()
-    names = ("ld_h", "lq_h")
-    gain = real.voltage / real.current
-    return Trial(campaign, {n: true[n] for n in names}, {n: true[n] * gain for n in names})
-
-
-def _axis_bound(l_phase_h: float) -> float:
-    """One axis: the levels share L; R, current offset, both edges and the voltages are each's own.
-
-    The samples of the voltage before, on and after the step are worth their three means.
-    """
-    how = CurrentStep()
-    tau = MOTOR.tau_elec_s
-    rate = 5e5 if how.samples_tau / tau > 2e5 else 2e5
-    before, on, off = (round(x * tau * rate) for x in (how.before_tau, how.on_tau, how.off_tau))
-    t = np.arange(before + on + off) / rate
-    r_ll = 2.0 * MOTOR.r_phase_ohm
-    amps = np.array([-0.45, 0.45, 0.9]) * MOTOR.current_rated_a
-
-    def rise(x: np.ndarray, tau_ll: float) -> np.ndarray:
-        return np.where(x > 0.0, -np.expm1(-np.maximum(x, 0.0) / tau_ll), 0.0)
-
-    def mean(p: np.ndarray) -> np.ndarray:
-        parts = []
-        for k in range(3):
-            r, offset, start, stop, rest, volts, after = p[1 + 7 * k : 8 + 7 * k]
-            up, down = rise(t - start, p[0] / r), rise(t - stop, p[0] / r)
-            current = (rest + (volts - rest) * up + (after - volts) * down) / r
-            parts += [current + offset, np.array([rest, volts, after])]
-        return np.concatenate(parts)
-
-    at = [2.0 * l_phase_h]
-    for amp in amps:
-        edges = (before - 0.3) / rate, (before + on - 0.3) / rate
-        at += [r_ll, 0.0, *edges, 0.0, amp * r_ll, 0.0]
-    levels = SIGMA_V / np.sqrt([before, on, off])
-    one = np.append(np.full(t.size, SIGMA_I), levels)
-    covariance = cramer_rao(mean, np.array(at), np.tile(one, 3), step=1e-7)
-    return math.sqrt(covariance[0, 0]) / 2.0
-
-
-@cache
-def _step_bound() -> Mapping[str, float]:
-    return {"ld_h": _axis_bound(MOTOR.ld_h), "lq_h": _axis_bound(MOTOR.lq_h)}
 
 
 def _lcr_trial(seed: int) -> Trial:
@@ -337,7 +283,6 @@ def _thermal_bound() -> Mapping[str, float]:
 CASES = (
     Case("resistance", resistance.ESTIMATOR, _resistance_trial, _resistance_bound),
     Case("soak", soak.ESTIMATOR, _soak_trial, _soak_bound),
-    Case("current_step", current_step.ESTIMATOR, _step_trial, _step_bound, few=8),
     Case("lcr", lcr.ESTIMATOR, _lcr_trial, _lcr_bound),
     Case("open_circuit", open_circuit.ESTIMATOR, _spin_trial, _spin_bound),
     Case("hand_turn", hand_turn.ESTIMATOR, _hand_trial, _hand_bound),

@@ -4,7 +4,8 @@ A `Case` is one estimator on one simulated bench. `simulate(seed)` returns a `Tr
 what was put in (`truth`), and what an estimator without noise would read through the gains drawn
 for that seed (`seen`). Bias and coverage are judged against `truth`; scatter is that of
 value - `seen`, so that it holds noise alone, and is judged against `bound()`: the Cramér-Rao
-standard deviations of the noise model.
+standard deviations of the noise model. Where the noise differs from seed to seed, the trial states
+its own.
 
 Every verdict carries its own sampling error: a limit counts as broken only where the 99 % interval
 of the statistic lies wholly beyond it, so a small sample is lenient and a large one is sharp.
@@ -31,12 +32,16 @@ CONFIDENCE = 0.99
 
 @dataclass(frozen=True)
 class Trial:
-    """One seed's captures with what was put in; `known` is handed to the estimator."""
+    """One seed's captures with what was put in; `known` is handed to the estimator.
+
+    `bound` are the seed's own Cramér-Rao deviations, None where the case's hold for all seeds.
+    """
 
     campaign: Campaign
     truth: Mapping[str, float]
     seen: Mapping[str, float]
     known: Constants = field(default_factory=Constants)
+    bound: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,7 @@ class Draw:
     estimate: float | None
     u: float
     covered: bool
+    bound: float | None = None
 
 
 def run(case: Case, seeds: range) -> tuple[Verdict, ...]:
@@ -114,12 +120,13 @@ def draw(case: Case, seeds: Iterable[int]) -> list[Draw]:
         found = {e.name: e for e in reversed(fit.estimates)}
         for name, truth in trial.truth.items():
             estimate, seen = found[name], trial.seen[name]
+            own = None if trial.bound is None else trial.bound.get(name)
             if not estimate.known:
-                draws.append(Draw(name, truth, seen, None, 0.0, False))
+                draws.append(Draw(name, truth, seen, None, 0.0, False, own))
                 continue
             low, high = estimate.interval(0.95)
             covered = bool(low <= truth <= high)
-            draws.append(Draw(name, truth, seen, estimate.number, estimate.u, covered))
+            draws.append(Draw(name, truth, seen, estimate.number, estimate.u, covered, own))
     return draws
 
 
@@ -129,19 +136,19 @@ def judge(case: Case, draws: Sequence[Draw]) -> tuple[Verdict, ...]:
     verdicts = []
     for name in sorted({d.constant for d in draws}):
         own = [d for d in draws if d.constant == name]
+        usual = bound.get(name)
+        bounded = usual is not None or all(d.bound is not None for d in own)
         rows = [
-            (d.estimate - d.truth, d.estimate - d.seen, d.covered, d.u, d.truth)
+            (e - d.truth, (e - d.seen) / (d.bound or usual or 1.0), d.covered, d.u, d.truth)
             for d in own
-            if d.estimate is not None
+            if (e := d.estimate) is not None
         ]
         missing = len(own) - len(rows)
-        verdicts.append(_judge(case.name, name, np.array(rows), missing, bound.get(name)))
+        verdicts.append(_judge(case.name, name, np.array(rows), missing, bounded))
     return tuple(verdicts)
 
 
-def _judge(
-    case: str, constant: str, rows: np.ndarray, missing: int, bound: float | None
-) -> Verdict:
+def _judge(case: str, constant: str, rows: np.ndarray, missing: int, bounded: bool) -> Verdict:
     if rows.size == 0:
         return Verdict(case, constant, 0, missing, 0, math.inf, 0, (0, 1), None, None, math.inf)
     error, noise, covered, u, truth = rows.T
@@ -155,8 +162,8 @@ def _judge(
     interval = stats.binomtest(hits, n).proportion_ci(CONFIDENCE, method="exact")
     coverage_interval = (COVERAGE_LIMITS[0],) * 2 if exact and hits == n else tuple(interval)
     scatter = scatter_interval = None
-    if bound is not None:
-        scatter = float(noise.std(ddof=1) / bound)
+    if bounded:
+        scatter = float(noise.std(ddof=1))
         low, high = stats.chi2.ppf([0.5 + CONFIDENCE / 2, 0.5 - CONFIDENCE / 2], n - 1)
         scatter_interval = (
             scatter * math.sqrt((n - 1) / low),

@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.fit.instruments import (
-    budget_of,
-    current_source,
-    instrument_uncertainties,
-    unstated_note,
-    voltage_source,
-)
+from pipeline.fit.instruments import budget_of, unstated_note
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.fit.step_model import LD, LQ, SHARED, SPACE, TERMS, StepModel, along_ramp, start_of
+from pipeline.fit.step_budget import birge_ratio, gains, rotor_angles
+from pipeline.fit.step_fit import AXES, Offer, Solution, between_models, offers_of, solve
+from pipeline.fit.step_model import SHARED, SPACE, Drive, StepModel, along_ramp, drive_of
 from pipeline.fit.step_record import StepRecord, disagreement, read_step
-from pipeline.numerics.least_squares import (
-    NonlinearFit,
-    autocorrelation_time,
-    gauss_newton,
-    linear_fit,
-)
+from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
@@ -38,35 +28,7 @@ EXPERIMENT = (
     "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
     "and 60), both senses of current, two or more amplitudes"
 )
-AXES = {
-    "ld_h": (LD, tuple(range(LD + 1, LD + 1 + TERMS))),
-    "lq_h": (LQ, tuple(range(LQ + 1, LQ + 1 + TERMS))),
-}
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Offer = tuple[float, int, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """The model, its fit over the free parameters, and each capture's noise.
-
-    `weighted_by` are the noises that weighted this fit's residuals, `sigmas` those found in it.
-    """
-
-    model: StepModel
-    parameters: Array
-    free: Flags
-    fit: NonlinearFit
-    weighted_by: tuple[float, ...]
-    sigmas: tuple[float, ...]
-
-    def covariance(self) -> Array:
-        """Covariance over all parameters [k, k], zero where one was held."""
-        full = np.zeros((self.free.size, self.free.size))
-        where = np.flatnonzero(self.free)
-        full[np.ix_(where, where)] = self.fit.covariance
-        return full
 
 
 def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -85,17 +47,17 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
         reason = "; ".join([*notes, odd or EXPERIMENT])
         return Fit(tuple(not_identifiable(n, "H", NAME, reason) for n in GIVES))
     model = StepModel(records)
-    solution = _solve(model, axes)
+    solution = solve(model, axes)
     used = tuple(r.capture for r in records)
     notes.append(unstated_note(used, ("voltage", "current")))
-    offers = _offers(solution, axes, solution.sigmas)
+    offers = offers_of(solution, axes, solution.sigmas)
     estimates = []
     for name in GIVES:
         if name not in axes:
             missing = f"no step with enough current on the {name[1]} axis; {EXPERIMENT}"
             estimates.append(not_identifiable(name, "H", NAME, missing))
             continue
-        estimates.append(_estimate(name, solution, offers[name], notes))
+        estimates.append(_estimate(name, solution, offers[name], notes, options))
     return Fit(tuple(estimates), tuple(_evidence(solution, axes)))
 
 
@@ -127,134 +89,22 @@ def _axes_told(records: Sequence[StepRecord], least_share: float) -> tuple[str, 
     return ("lq_h",) if np.all(cos2 < 0.1 * least_share) else ()
 
 
-def _solve(model: StepModel, axes: Sequence[str]) -> Solution:
-    """Adds saturation terms while they pay, then drops those that no longer do.
-
-    A term pays where it lowers the weighted sum of squares by more than log n (BIC). Terms are
-    proposed by the score of the present fit under white noise, one an axis and round, and judged
-    after a fit with them by their own standard error, which counts correlated residuals.
-    """
-    free = np.ones(model.layout.size, dtype=bool)
-    free[: len(SHARED)] = False
-    free[[AXES[name][0] for name in axes]] = True
-    start = start_of(model.records, model.layout)
-    if len(axes) == 1:
-        start[[LD, LQ]] = start[AXES[axes[0]][0]]
-    solution = _fit(model, start, free, [record.sigma_a for record in model.records])
-    price = math.log(sum(float(r.count.sum()) for r in model.records))
-    for _ in range(TERMS):
-        offers = _offers(solution, axes, [record.sigma_a for record in model.records])
-        wanted = [max(own)[1] for own in offers.values() if own and max(own)[0] > price]
-        if not wanted:
-            break
-        free = solution.free.copy()
-        free[wanted] = True
-        solution = _fit(model, solution.parameters, free, solution.sigmas)
-    while True:
-        worth = {k: _worth(solution, k) for name in axes for k in AXES[name][1] if solution.free[k]}
-        idle = [k for k, value in worth.items() if value < price]
-        if not idle:
-            return solution
-        least = min(idle, key=lambda k: worth[k])
-        free, start = solution.free.copy(), solution.parameters.copy()
-        free[least], start[least] = False, 0.0
-        solution = _fit(model, start, free, solution.sigmas)
-
-
-def _worth(solution: Solution, term: int) -> float:
-    """What dropping one term would cost in weighted squares: (value/u)², Wald."""
-    variance = float(solution.covariance()[term, term])
-    return float(solution.parameters[term]) ** 2 / max(variance, 1e-300)
-
-
-def _offers(
-    solution: Solution, axes: Sequence[str], sigmas: Sequence[float]
-) -> dict[str, list[Offer]]:
-    """For each axis and each term not in use: gain in weighted squares, term, change of L.
-
-    One Gauss-Newton step of the present fit with that term added (Rao's score test).
-    """
-    everything = solution.free.copy()
-    for name in axes:
-        everything[list(AXES[name][1])] = True
-    residuals, jacobian = solution.model.residuals(solution.parameters, sigmas, everything)
-    scale = np.linalg.norm(jacobian, axis=0)
-    scale[scale == 0.0] = 1.0
-    scaled = jacobian / scale
-    normal, gradient = scaled.T @ scaled, scaled.T @ residuals
-    places = np.flatnonzero(everything)
-    offers: dict[str, list[Offer]] = {}
-    for name in axes:
-        offers[name] = []
-        for term in AXES[name][1]:
-            if solution.free[term]:
-                continue
-            use = np.flatnonzero(solution.free[places] | (places == term))
-            step = -np.linalg.pinv(normal[np.ix_(use, use)], 1e-13, hermitian=True) @ gradient[use]
-            moved = step[np.flatnonzero(places[use] == AXES[name][0])[0]]
-            change = float(moved / scale[np.flatnonzero(places == AXES[name][0])[0]])
-            offers[name].append((-float(step @ gradient[use]), term, change))
-    return offers
-
-
-def _fit(model: StepModel, start: Array, free: Flags, sigmas: Sequence[float]) -> Solution:
-    """Gauss-Newton over the free parameters; the noise of each capture from its residuals."""
-    where = np.flatnonzero(free)
-
-    def residuals_and_jacobian(values: Array) -> tuple[Array, Array]:
-        trial = start.copy()
-        trial[where] = values
-        return model.residuals(trial, sigmas, free)
-
-    low, high = model.bounds(start)
-    fit = gauss_newton(
-        residuals_and_jacobian, start[where], low[where], high[where], tolerance=1e-3
-    )
-    parameters = start.copy()
-    parameters[where] = fit.parameters
-    scale = np.linalg.norm(fit.jacobian, axis=0)
-    meat = np.zeros((where.size, where.size))
-    found, first = [], 0
-    for capture, (record, sigma) in enumerate(zip(model.records, sigmas, strict=True)):
-        stop = first + record.i_a.size
-        rms = float(np.sqrt(np.mean(fit.residuals[first:stop] ** 2)))
-        noise = rms * math.sqrt(autocorrelation_time(fit.residuals[first:stop]))
-        found.append(sigma * max(noise, 1e-9))
-        mine = np.searchsorted(where, model.columns_of(capture, where))
-        last = stop + record.wave.u_levels_v.size
-        rows = fit.jacobian[first:last, mine] / scale[mine]
-        rows[: stop - first] *= noise
-        meat[np.ix_(mine, mine)] += rows.T @ rows
-        first = last
-    bread = fit.covariance * np.outer(scale, scale)
-    covariance = bread @ meat @ bread / np.outer(scale, scale)
-    honest = NonlinearFit(
-        fit.parameters, covariance, fit.residuals, fit.jacobian, fit.cost, fit.converged
-    )
-    return Solution(model, parameters, free, honest, tuple(sigmas), tuple(found))
-
-
-def _between_models(solution: Solution, offers: Sequence[Offer]) -> float:
-    """Standard deviation of L between the chosen model and those with one term more.
-
-    Each is weighted by exp(-BIC/2), the chosen one by 1.
-    """
-    price = math.log(sum(float(r.count.sum()) for r in solution.model.records))
-    weights = [math.exp(-0.5 * max(price - gain, 0.0)) for gain, _, _ in offers]
-    spread = sum(w * change**2 for w, (_, _, change) in zip(weights, offers, strict=True))
-    return math.sqrt(spread / (1.0 + sum(weights)))
-
-
 def _estimate(
-    name: str, solution: Solution, offers: Sequence[Offer], notes: Sequence[str]
+    name: str,
+    solution: Solution,
+    offers: Sequence[Offer],
+    notes: Sequence[str],
+    options: Mapping[str, float],
 ) -> Estimate:
     place, terms = AXES[name]
     value = float(solution.parameters[place])
     scatter = math.sqrt(max(float(solution.covariance()[place, place]), 0.0))
+    scatter *= birge_ratio(solution)
     parts = [Contribution(f"scatter:{NAME}:{name}", scatter, "A")]
-    between = _between_models(solution, offers)
+    between = between_models(solution, offers)
     parts.append(Contribution(f"scatter:{NAME}:saturation:{name}", between, "A"))
-    parts += _gains(name, solution)
+    parts += gains(name, solution)
+    parts += rotor_angles(name, solution, math.radians(options["u_theta_elec_deg"]))
     largest = max(SPACE * r.largest_a * abs(_share(r, name)) for r in solution.model.records)
     at: dict[str, float | int | str] = {"current_a": 0.0, "current_largest_a": largest}
     words = [n for n in notes if n]
@@ -280,53 +130,14 @@ def _incremental(name: str, solution: Solution, current_a: float) -> float:
     return float(along_ramp(shared, 1.0 if name == "ld_h" else 0.0, ramp)[-1]) / 2.0
 
 
-def _gains(name: str, solution: Solution) -> list[Contribution]:
-    """Each instrument's share, by the linearised fit: dp = -C J' W dr under its gain.
-
-    A gain of v scales the predicted current, one of i the measured; both act on the captures of
-    their station alone.
-    """
-    records = solution.model.records
-    fit = solution.fit
-    where = np.flatnonzero(solution.free)
-    row = int(np.flatnonzero(where == AXES[name][0])[0])
-    scale = np.linalg.norm(fit.jacobian, axis=0)
-    scaled = fit.jacobian / scale
-    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
-    lever = -(inverse[row] / scale[row]) @ scaled.T
-    captures = [r.capture for r in records]
-    found = []
-    for source, u in instrument_uncertainties(captures, ("voltage", "current")).items():
-        change, first = np.zeros(fit.residuals.size), 0
-        for record, offset, sigma in zip(
-            records, _offsets(solution), solution.weighted_by, strict=True
-        ):
-            stop = first + record.i_a.size
-            weight = np.sqrt(record.count) / sigma
-            part = fit.residuals[first:stop]
-            if voltage_source(record.capture.meta) == source:
-                change[first:stop] += part + (record.i_a - offset) * weight
-            if current_source(record.capture.meta) == source:
-                change[first:stop] -= (record.i_a - offset) * weight
-            first = stop + record.wave.u_levels_v.size
-        found.append(Contribution(source, u * float(lever @ change), "B"))
-    return found
-
-
-def _offsets(solution: Solution) -> list[float]:
-    layout = solution.model.layout
-    return [
-        float(solution.parameters[at + 1]) if r.wave.levels_v.size > 1 else 0.0
-        for r, at in zip(solution.model.records, layout.starts, strict=True)
-    ]
-
-
-def _chord(record: StepRecord, edges_s: Array) -> float:
+def _chord(record: StepRecord, drive: Drive) -> float:
     """Mean inductance [H] between the terminals over one capture, by the integrated form.
 
-    i = (1/L) ∫v dt - (R/L) ∫i dt + c with the levels and the fitted edges as v, which are exact.
+    i = (1/L) ∫v dt - (R/L) ∫i dt + c with the open voltages and the edges found as v, which are
+    exact, and the resistance of pair and supply as R.
     """
-    areas = np.concatenate([[0.0], np.cumsum(record.wave.levels_v * np.diff(edges_s))])
+    edges_s = drive.edges_s[0]
+    areas = np.concatenate([[0.0], np.cumsum(drive.levels_v[0] * np.diff(edges_s))])
     volts = np.interp(record.t_s, edges_s, areas)
     mean = 0.5 * (record.i_a[1:] + record.i_a[:-1])
     amps = np.concatenate([[0.0], np.cumsum(mean * np.diff(record.t_s))])
@@ -362,19 +173,18 @@ def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:
     series = []
     for name in axes:
         x, y, fitted = [], [], []
-        for record, at in zip(model.records, model.layout.starts, strict=True):
+        for record, at, own in zip(
+            model.records, model.layout.starts, model.layout.own, strict=True
+        ):
             if abs(_share(record, name)) < math.sqrt(0.5):
                 continue
-            edges = record.wave.edges_s.copy()
-            skip = at + 1 + (record.wave.levels_v.size > 1)
-            for k, index in enumerate(record.wave.free):
-                edges[index] += solution.parameters[skip + k] * record.wave.period_s
+            drive = drive_of(record, own, solution.parameters[None, at : at + own.size])
             peak = float(record.i_a[int(np.argmax(np.abs(record.i_a)))])
             ramp = np.linspace(0.0, peak, 41)
             shared = solution.parameters[: len(SHARED)]
             inside = along_ramp(shared, math.cos(record.axis_rad), ramp)
             x.append(peak)
-            y.append(_chord(record, edges))
+            y.append(_chord(record, drive))
             fitted.append(float(inside.mean()))
         order = np.argsort(x)
         series.append(Series(name, np.array(x)[order], np.array(y)[order], np.array(fitted)[order]))
@@ -396,5 +206,9 @@ ESTIMATOR = Estimator(
     EXPERIMENT,
     fit_current_step,
     clock_powers=dict.fromkeys(GIVES, 1),
-    options={"least_share": 0.2},
+    options={
+        "least_share": 0.2,
+        # A rotor that current aligned stops short by asin(friction / holding torque).
+        "u_theta_elec_deg": 0.5,
+    },
 )
