@@ -146,18 +146,26 @@ def test_logged_voltage_makes_the_flux_change_that_its_timing_says(before, right
     assert errors[wrong] > 0.02
 
 
+@pytest.mark.parametrize("early", [0.0, 0.3, 0.95])
+@pytest.mark.parametrize("source_ohm", [0.0, 0.2])
 @pytest.mark.parametrize(("theta_deg", "henry"), [(-30.0, 2 * 1.9e-4), (60.0, 2 * 2.35e-4)])
-def test_locked_step_is_the_exponential(theta_deg, henry):
-    """Pair ab at -30 deg sees 2 Ld, at 60 deg 2 Lq: i = V/R (1 - exp(-t R/L))."""
+def test_locked_step_is_the_exponential(theta_deg, henry, source_ohm, early):
+    """Pair ab at -30 deg sees 2 Ld, at 60 deg 2 Lq: i = V/R (1 - exp(-t R/L)).
+
+    The edge lies `early` of a sample before sample 100, and the supply has a resistance.
+    """
     motor = design("gimbal-5208")
     source = np.zeros(1201)
     source[100:] = 2.0
     pair = (1.0, -1.0 / math.sqrt(3.0), 0.84)
-    out = pair_step(
-        source, 2e-6, 2, pair, 0.0, math.radians(theta_deg), 25.0, 25.0, plant_of(motor)
-    )
-    t = np.arange(1100) * 2e-6
-    assert out[100:, 1] == pytest.approx(2.0 / 0.84 * (1 - np.exp(-t * 0.84 / henry)), abs=1e-9)
+    before = np.full(1201, early)
+    angle = math.radians(theta_deg)
+    out = pair_step(source, before, 2e-6, 2, pair, source_ohm, angle, 25.0, 25.0, plant_of(motor))
+    t = (np.arange(1100) + early) * 2e-6
+    loop = 0.84 + source_ohm
+    current = 2.0 / loop * (1 - np.exp(-t * loop / henry))
+    assert out[100:, 1] == pytest.approx(current, abs=1e-9)
+    assert out[100:, 0] == pytest.approx(2.0 - source_ohm * current, abs=1e-9)
     assert out[:100, 1] == pytest.approx(0.0, abs=1e-15)
 
 
