@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -26,6 +27,19 @@ class Finding:
     def refusal(cls, file: str, error: CaptureError) -> Finding:
         """The finding for a capture that had to be refused."""
         return cls(file, "refused", error.code, error.message, error.remedy, error.rows)
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Finding:
+        """The finding that `document` wrote; raises LookupError or TypeError for anything else."""
+        rows = document["rows"]
+        return cls(
+            document["file"],
+            document["severity"],
+            document["code"],
+            document["message"],
+            document["remedy"],
+            None if rows is None else (rows[0], rows[1]),
+        )
 
     def line(self) -> str:
         """The one line that standard error carries."""

@@ -94,7 +94,7 @@ class ModelVerdict:
         if self.verdict == "not_tested":
             return f"no model was held against the captures: {self.note}"
         if not self.tested:
-            return f"no model could be held against the captures: {self.note}"
+            return self.note
         if self.passed:
             largest = number(self.residual or 0.0)
             return f"{self.name} leaves nothing that matters; largest residual {largest} floors"

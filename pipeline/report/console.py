@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from pipeline.records.current_status import CurrentStatus, current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
 from pipeline.report.model_words import model_words
+from pipeline.report.status_text import status_lines
 
 COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("p", "pole_pairs", 1.0),
@@ -26,12 +28,21 @@ NONE = "-"
 
 
 def summary(
-    datasheets: Sequence[Datasheet], findings: Sequence[Finding], output: str, *, report: bool
+    datasheets: Sequence[Datasheet],
+    findings: Sequence[Finding],
+    output: str,
+    *,
+    report: bool,
+    statuses: Mapping[str, CurrentStatus] | None = None,
 ) -> str:
-    """The text for a terminal: a table of motors, the failed checks, the counts, the way in."""
+    """The text for a terminal: a table of motors, the failed checks, the counts, the way in.
+
+    `statuses` are the current ones, by motor; what a datasheet says of itself without.
+    """
+    now = {s.motor_id: (statuses or {}).get(s.motor_id, current_status(s)) for s in datasheets}
     lines: list[str] = []
     if datasheets:
-        lines += [*_table(datasheets), ""]
+        lines += [*_table(datasheets, now), ""]
     for sheet in datasheets:
         lines += [
             f"{printable(sheet.motor_id)}: {c.name} {c.status}: {c.meaning}"
@@ -44,8 +55,15 @@ def summary(
         for sheet in datasheets
         if (words := model_words(sheet.model, sheet.motor_id)).command
     ]
-    counts = Counter(sheet.status for sheet in datasheets)
-    states = ", ".join(f"{counts[s]} {s}" for s in ("released", "provisional", "refused"))
+    lines += [
+        f"{printable(motor_id)}: {printable(line)}"
+        for motor_id, current in now.items()
+        for line in status_lines(current)
+    ]
+    counts = Counter(current.status for current in now.values())
+    states = f"{counts['released']} released, {counts['provisional']} provisional, "
+    states += f"{counts['refused']} refused"
+    states += f", {counts['revoked']} revoked" if counts["revoked"] else ""
     refused = sum(finding.severity == "refused" for finding in findings)
     lines.append(
         f"{counted(len(datasheets), 'motor')}: {states}; {counted(refused, 'capture')} refused"
@@ -63,13 +81,13 @@ def nothing_usable(folder: str, *, refused: bool) -> str:
     return f"undecided: no usable capture in {folder}; {remedy}"
 
 
-def _table(datasheets: Sequence[Datasheet]) -> list[str]:
+def _table(datasheets: Sequence[Datasheet], now: Mapping[str, CurrentStatus]) -> list[str]:
     head = ["motor", "lot", "status", "model", *(title for title, *_ in COLUMNS)]
     rows = [
         [
             printable(sheet.motor_id),
             printable(sheet.lot or NONE),
-            sheet.status,
+            now[sheet.motor_id].status,
             model_words(sheet.model, sheet.motor_id).short,
             *(_cell(sheet.constants.get(name), scale) for _, name, scale in COLUMNS),
         ]

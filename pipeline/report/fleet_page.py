@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from urllib.parse import quote
 
 from pipeline.physics.notation import Reading, Scale, reading, scale_for
+from pipeline.records.current_status import CurrentStatus, current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.report.model_words import ModelWords, model_words
 from pipeline.report.page import render
+from pipeline.report.status_text import status_lines
 from pipeline.report.strip import Dot, strip_plot
 from pipeline.report.words import KEY_CONSTANTS, constant_words, symbol
 
-STATUS_ORDER = ("refused", "provisional", "released")
+STATUS_ORDER = ("refused", "revoked", "provisional", "released")
 NO_LOT = "no lot"
 NO_TYPE = "type not stated"
 
@@ -46,6 +48,8 @@ class MotorRow:
     """One line of the fleet table."""
 
     sheet: Datasheet
+    current: CurrentStatus
+    why: str
     link: str
     failed: tuple[tuple[str, str], ...]
     model: ModelWords
@@ -60,23 +64,29 @@ class Strip:
     svg: str
 
 
-def render_fleet(datasheets: Sequence[Datasheet], findings: Sequence[Finding]) -> str:
+def render_fleet(
+    datasheets: Sequence[Datasheet],
+    findings: Sequence[Finding],
+    statuses: Mapping[str, CurrentStatus] | None = None,
+) -> str:
     """The self-contained HTML page of all motors; pages of motors lie beside it.
 
+    `statuses` are the current ones, by motor; what a datasheet says of itself without.
     Motors stand in order of their id, whatever order they came in; equal input, equal text.
     """
     sheets = sorted(datasheets, key=lambda sheet: sheet.motor_id)
+    now = {s.motor_id: (statuses or {}).get(s.motor_id, current_status(s)) for s in sheets}
     scales = {name: _scale(name, sheets) for name in KEY_CONSTANTS}
     shown = [(name, scale) for name, scale in scales.items() if scale is not None]
-    counts: Counter[str] = Counter(sheet.status for sheet in sheets)
+    counts: Counter[str] = Counter(current.status for current in now.values())
     ordered = sorted(findings)
     return render(
         "fleet.html.jinja",
         counts=[(status, counts[status]) for status in STATUS_ORDER if counts[status]],
         motors=len(sheets),
         columns=[_column(name, scale) for name, scale in shown],
-        rows=[_motor_row(sheet, shown) for sheet in sheets],
-        types=_strips(sheets, shown),
+        rows=[_motor_row(sheet, now[sheet.motor_id], shown) for sheet in sheets],
+        types=_strips(sheets, shown, now),
         refused=[f for f in ordered if f.severity == "refused"],
         warnings=[f for f in ordered if f.severity != "refused"],
     )
@@ -104,11 +114,14 @@ def _column(name: str, scale: Scale) -> Column:
     return Column(name, symbol(name), constant_words(name), scale.unit)
 
 
-def _motor_row(sheet: Datasheet, shown: Sequence[tuple[str, Scale]]) -> MotorRow:
+def _motor_row(
+    sheet: Datasheet, current: CurrentStatus, shown: Sequence[tuple[str, Scale]]
+) -> MotorRow:
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     cells = tuple(_cell(sheet.constants.get(name), scale) for name, scale in shown)
     model = model_words(sheet.model, sheet.motor_id)
-    return MotorRow(sheet, page_of(sheet.motor_id), failed, model, cells)
+    why = "; ".join((*status_lines(current), *current.why))
+    return MotorRow(sheet, current, why, page_of(sheet.motor_id), failed, model, cells)
 
 
 def _cell(estimate: Estimate | None, scale: Scale) -> Cell:
@@ -119,7 +132,9 @@ def _cell(estimate: Estimate | None, scale: Scale) -> Cell:
 
 
 def _strips(
-    sheets: Sequence[Datasheet], shown: Sequence[tuple[str, Scale]]
+    sheets: Sequence[Datasheet],
+    shown: Sequence[tuple[str, Scale]],
+    now: Mapping[str, CurrentStatus],
 ) -> list[tuple[str, list[Strip]]]:
     """Strip plots by motor type; a constant that is the same in all motors has none."""
     by_type: dict[str, list[Datasheet]] = {}
@@ -130,7 +145,7 @@ def _strips(
         strips = [
             Strip(
                 _column(name, scale),
-                strip_plot(name, _known(name, members)[0].unit, _lots(name, members)),
+                strip_plot(name, _known(name, members)[0].unit, _lots(name, members, now)),
             )
             for name, scale in shown
             if len({estimate.number for estimate in _known(name, members)}) > 1
@@ -140,13 +155,14 @@ def _strips(
     return sections
 
 
-def _lots(name: str, sheets: Sequence[Datasheet]) -> list[tuple[str, list[Dot]]]:
+def _lots(
+    name: str, sheets: Sequence[Datasheet], now: Mapping[str, CurrentStatus]
+) -> list[tuple[str, list[Dot]]]:
     lots: dict[str, list[Dot]] = {}
     for sheet in sheets:
         estimate = sheet.constants.get(name)
         if estimate is not None and estimate.known:
-            dot = Dot(
-                sheet.motor_id, page_of(sheet.motor_id), sheet.status, estimate.number, estimate.u
-            )
+            motor_id, status = sheet.motor_id, now[sheet.motor_id].status
+            dot = Dot(motor_id, page_of(motor_id), status, estimate.number, estimate.u)
             lots.setdefault(sheet.lot or NO_LOT, []).append(dot)
     return sorted(lots.items())

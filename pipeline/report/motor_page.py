@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from pipeline.physics.glossary import Term
 from pipeline.physics.notation import MINUS, Reading, plain, quantity, reading, significant
+from pipeline.records.current_status import current_status
 from pipeline.records.datasheet import Check, Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
@@ -18,15 +19,11 @@ from pipeline.report.chart import chart
 from pipeline.report.conditions import conditions
 from pipeline.report.model_words import model_words
 from pipeline.report.page import render
+from pipeline.report.status_block import status_block
 from pipeline.report.words import GROUPS, KEY_CONSTANTS, constant_words, grouped, symbol
 
 NEGLIGIBLE = 1e-3
 CHECK_ORDER = ("fail", "marginal", "not_evaluated", "pass")
-STATUS_WORDS = {
-    "released": "Every capture verified, every check holds, approved.",
-    "provisional": "Usable, with something missing, unverified or not explained.",
-    "refused": "Do not use: a check failed.",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +71,7 @@ def render_motor(
 ) -> str:
     """The self-contained HTML page of one motor; equal input gives equal text.
 
+    Its status is what the datasheet says of itself, until `status_block.with_status`.
     `own` are the terms of constants that the glossary does not know, by name.
     """
     words = {name: constant_words(name, own) for name in sorted(datasheet.constants)}
@@ -83,7 +81,7 @@ def render_motor(
     return render(
         "motor.html.jinja",
         sheet=datasheet,
-        status_words=STATUS_WORDS[datasheet.status],
+        status=status_block(datasheet, current_status(datasheet)),
         key_rows=[rows[n] for n in KEY_CONSTANTS if n in rows and rows[n].reading],
         groups=[(title, [rows[n] for n in names]) for title, names in grouped(rows)],
         checks=_ordered(datasheet.checks),
@@ -93,7 +91,6 @@ def render_motor(
         findings=sorted(findings),
         figures=figures,
         drawn={figure.estimator for figure in figures},
-        unverified=sum(c.integrity != "verified" for c in datasheet.captures),
     )
 
 

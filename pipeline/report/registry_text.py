@@ -12,6 +12,7 @@ from pipeline.records.difference import Change
 from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Event, Version
 from pipeline.records.naming import counted
+from pipeline.report.model_words import model_words
 
 NONE = "-"
 SHOWN_DIGITS = 12
@@ -67,6 +68,7 @@ def datasheet_text(version: Version, sheet: Datasheet) -> str:
         who = f"revoked by {safe(old.by)}: {safe(old.why)}"
         lines.append(f"  takes the place of version {old.version[:SHOWN_DIGITS]}, {who}")
     lines += [f"  {sheet.status} as published: {safe(reason)}" for reason in sheet.why]
+    lines.append(f"  model: {safe(model_words(sheet.model, version.motor_id).sentence)}")
     lines += [f"  {decision(event)}" for event in version.decisions]
     if version.tags:
         lines.append(f"  tags: {safe(', '.join(sorted(version.tags)))}")

@@ -14,6 +14,7 @@ from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Selection, Version, in_force
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
+from pipeline.report.status_text import exported, not_exported
 from pipeline.settings import ExportSettings
 
 
@@ -41,7 +42,8 @@ def main(settings: ExportSettings) -> Outcome:
     name = ".".join((file_stem(version.motor_id), *ending))
     path = output_folder(settings.output) / "export" / name
     write_whole(path, text.encode())
-    return Outcome(text=text, errors=(*notes, f"note: wrote {path.as_posix()}"))
+    which = f"note: {exported(version)}"
+    return Outcome(text=text, errors=(which, *notes, f"note: wrote {path.as_posix()}"))
 
 
 def _exporter(settings: ExportSettings) -> Exporter:
@@ -65,7 +67,7 @@ def _version(registry: Registry, settings: ExportSettings) -> tuple[Version, tup
         found, last = in_force(history), history[-1]
         if found is None:
             raise _unreleased(last)
-        newer = f"note: revision {last.revision} is newer and {last.status}; it is not exported"
+        newer = f"note: {not_exported(last)}"
         return found, (newer,) * (last.revision > found.revision)
     wanted = Selection(settings.motor, revision=_whole(settings.revision), version=settings.version)
     version = one_of([v for v in history if wanted.takes(v)], wanted, registry.place)

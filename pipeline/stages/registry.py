@@ -9,8 +9,9 @@ from typing import Literal
 
 from pipeline.io.registry import Registry, one_of
 from pipeline.lots.selector import OF_CONTENT, known, parse_selector
+from pipeline.records.current_status import status_of
 from pipeline.records.difference import changes
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import PipelineError, UsageError
 from pipeline.records.ledger import Selection, Version, histories, in_force, newest, select
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome
@@ -24,6 +25,7 @@ from pipeline.report.registry_text import (
     when,
 )
 from pipeline.settings import RegistrySettings
+from pipeline.stages.fleet.statuses import show_decision
 
 PREFIX = re.compile("[0-9a-f]{4,64}")
 TAG = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -115,7 +117,14 @@ def _decide(
     version, new = registry.decide(kind, wanted, by, why, datetime.now(UTC))
     said = "" if new else " (already so)"
     text = f"{safe(version.motor_id)} revision {version.revision} is {version.status}{said}: "
-    return Outcome(text=text + decision(version.decisions[-1]))
+    lines = [text + decision(version.decisions[-1])]
+    lines += [f"  stands: {safe(reason)}" for reason in status_of(version, None).why]
+    try:
+        lines += [f"  shown in {page}" for page in show_decision(registry, version.motor_id)]
+    except PipelineError as error:
+        failed = f"error: decided, but not shown: {error}; `run` again shows it"
+        return Outcome(error.exit_code, "\n".join(lines), (failed,))
+    return Outcome(text="\n".join(lines))
 
 
 def _tag(registry: Registry, settings: RegistrySettings) -> Outcome:

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.io.datasheets import read_datasheet
 from pipeline.io.recordings.readback import recording_property
 from pipeline.io.recordings.seal import verify
 from pipeline.io.recordings.viewer import (
@@ -22,10 +23,13 @@ from pipeline.io.recordings.viewer import (
     window,
 )
 from pipeline.io.recordings.web import page_server, recording_address
+from pipeline.io.registry import Registry
 from pipeline.records.errors import MachineError, RecordingError, UsageError
-from pipeline.records.naming import file_stem
+from pipeline.records.naming import file_stem, printable
 from pipeline.records.outcome import Outcome
+from pipeline.report.status_text import status_lines
 from pipeline.settings import ReviewSettings
+from pipeline.stages.fleet.statuses import histories_of, status_now
 
 LAST_PORT = 65534
 """One less than there are, for the fleet's table is on the next."""
@@ -74,6 +78,7 @@ def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
             origin = f"http://127.0.0.1:{table}"
             server = stack.enter_context(page_server(chosen.files, page, [origin]))
         text = _said(settings, chosen, (page, table), catalogues)
+        text = "\n".join([text, *_decided(Path(settings.output), chosen.all)])
         kept = stack.pop_all()
 
     def then() -> tuple[int, tuple[str, ...]]:
@@ -151,6 +156,22 @@ def _refused(paths: Sequence[Path], output: Path) -> tuple[str, ...]:
 def _ports(first: int) -> tuple[int, int]:
     """Ports of the page and of the table."""
     return (first, first + 1) if first else (free_port(), free_port())
+
+
+def _decided(output: Path, shown: Sequence[Path]) -> list[str]:
+    """What people decided of the motors that are shown, whose recordings are of before that."""
+    versions = histories_of(Registry((output / "registry").as_posix()))
+    lines = []
+    for path in sorted((output / "datasheets").glob("*.json")) if versions else ():
+        parts = {path.stem, f"motor-{path.stem}"}
+        if not any(parts & {one.stem, one.parent.name} for one in shown):
+            continue
+        sheet = read_datasheet(path)
+        current = status_now(output, sheet, versions)
+        said = "; ".join(status_lines(current))
+        if said:
+            lines.append(f"{printable(sheet.motor_id)} is {current.status} now: {said}")
+    return lines
 
 
 def _said(

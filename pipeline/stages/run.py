@@ -41,6 +41,7 @@ from pipeline.stages.fleet.publishing import (
     publish,
     removed_note,
 )
+from pipeline.stages.fleet.statuses import histories_of, restated
 from pipeline.stages.options import check_options
 
 CRUMBS = ".work"
@@ -104,12 +105,13 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
     findings = tuple(
         sorted({*found.findings, *(f for r in results for f in r.finished.findings)}, key=_order)
     )
-    with watch.stage("fleet"):
-        datasheets = datasheets_of(output, results)
-        files, removed = publish(settings, results, datasheets, findings)
-        outcome = outcome_of(datasheets, findings, found, report=settings.report)
     with watch.stage("registry"):
         registered = _register(registry, output, results)
+        results, statuses = restated(output, results, histories_of(registry))
+    with watch.stage("fleet"):
+        datasheets = datasheets_of(output, results)
+        files, removed = publish(settings, results, datasheets, findings, statuses)
+        outcome = outcome_of(datasheets, findings, found, statuses, report=settings.report)
     batch = _batch_key(settings, plain, found, registry)
     if not died and registered.code == 0 and _revocations(registry) == revoked:
         made = (file for result in results for file in result.finished.files)

@@ -92,6 +92,20 @@ def note_motor(output: Path, motor_id: str, key: str, finished: Finished) -> Non
     )
 
 
+def note_files(output: Path, motor_id: str, files: Files) -> None:
+    """Notes that some files of a motor that is done have other bytes; nothing where none is noted.
+
+    A note that cannot be written is no failure: the motor is done anew then.
+    """
+    path = motor_note(output, motor_id)
+    said = read_sealed(path)
+    if said is None:
+        return
+    changed = dict(files)
+    said["files"] = [[name, changed.get(name, sha256)] for name, sha256 in said["files"]]
+    keep_sealed(path, said)
+
+
 class Keeping:
     """The notes of one output folder on one input folder; `on` False neither reads nor writes."""
 
@@ -158,7 +172,7 @@ class Keeping:
         files = tuple((name, sha256) for name, sha256 in said["files"])
         if not all(self._outputs.holds(name, sha256) for name, sha256 in files):
             return None
-        return Finished(tuple(_finding(f) for f in said["findings"]), files)
+        return Finished(tuple(Finding.of(f) for f in said["findings"]), files)
 
     def outcome(self, key: str) -> Batch | None:
         """The batch of this key, if all its files are whole."""
@@ -218,7 +232,7 @@ def _answer_note(key: str, answer: Answer) -> dict[str, Any]:
 def _answer(
     path: str, sha256: str, note: Mapping[str, Any], sources: Mapping[str, SourceMap]
 ) -> Answer:
-    findings = tuple(_finding(said) for said in note["findings"])
+    findings = tuple(Finding.of(said) for said in note["findings"])
     said = note["entry"]
     if said is None:
         return Answer(path, sha256, None, findings)
@@ -226,15 +240,3 @@ def _answer(
     metadata = tuple((key, value) for key, value in said["metadata"])
     entry = Entry(path, sha256, said["form"], source, metadata, said["recovered"])
     return Answer(path, sha256, entry, findings)
-
-
-def _finding(said: Mapping[str, Any]) -> Finding:
-    rows = said["rows"]
-    return Finding(
-        said["file"],
-        said["severity"],
-        said["code"],
-        said["message"],
-        said["remedy"],
-        None if rows is None else (rows[0], rows[1]),
-    )

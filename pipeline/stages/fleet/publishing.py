@@ -21,6 +21,7 @@ from pipeline.report.console import COLUMNS, nothing_usable, summary
 from pipeline.report.words import KEY_CONSTANTS
 from pipeline.settings import RunSettings
 from pipeline.stages.fleet.jobs import Files, MotorResult
+from pipeline.stages.fleet.statuses import Statuses
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"
@@ -52,9 +53,11 @@ def publish(
     results: Sequence[MotorResult],
     datasheets: Sequence[Datasheet],
     findings: Sequence[Finding],
+    statuses: Statuses,
 ) -> tuple[Files, tuple[str, ...]]:
     """Writes what belongs to the batch, then takes away what an earlier run left behind.
 
+    `statuses` are the current ones by motor.
     Returns every file of the batch, and the names of those that were taken away.
     """
     output = Path(settings.output)
@@ -70,7 +73,7 @@ def publish(
     if settings.report:
         from pipeline.report.fleet_page import render_fleet
 
-        write("report/index.html", render_fleet(datasheets, tuple(findings)).encode())
+        write("report/index.html", render_fleet(datasheets, tuple(findings), statuses).encode())
     names = sorted(name for name, _ in files)
     removed = _sweep(output, names)
     write(MANIFEST, canonical_json({"schema": "outputs/1", "files": names}))
@@ -133,23 +136,25 @@ def outcome_of(
     datasheets: Sequence[Datasheet],
     findings: Sequence[Finding],
     found: Survey,
+    statuses: Statuses,
     *,
     report: bool,
 ) -> Outcome:
     """What the command says, with its exit code; `placed` names the folders in it."""
-    statuses = [{check.status for check in sheet.checks} for sheet in datasheets]
+    seen = [{check.status for check in sheet.checks} for sheet in datasheets]
     refused = any(finding.severity == "refused" for finding in findings)
     code = first_that_applies(
-        1 if any("fail" in seen for seen in statuses) else 0,
+        1 if any("fail" in one for one in seen) else 0,
         3 if refused else 0,
-        4 if not datasheets or any(seen == {"not_evaluated"} for seen in statuses) else 0,
+        4 if not datasheets or any(one == {"not_evaluated"} for one in seen) else 0,
     )
     lines = tuple(finding.line() for finding in findings)
     if not datasheets:
         lines = (*lines, nothing_usable(INPUT, refused=refused))
     if found.note:
         lines = (*lines, f"note: {found.note}")
-    return Outcome(code, summary(datasheets, findings, OUTPUT, report=report), lines)
+    told = summary(datasheets, findings, OUTPUT, report=report, statuses=statuses)
+    return Outcome(code, told, lines)
 
 
 def placed(outcome: Outcome, settings: RunSettings) -> Outcome:

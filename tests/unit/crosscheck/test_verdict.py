@@ -78,7 +78,7 @@ def released_with(model: ModelVerdict, release: str = "auto") -> tuple[str, tupl
     [
         (OVER, "misses vd_v of drive_0.mcap by 76 noise floors and 2 more; `diagnose motor=m`"),
         (BELOW, "lacks an effect that shows below the noise floors; found: windage; `diagnose"),
-        (NOTHING, "could be held against the captures: record a torque map"),
+        (NOTHING, "model: record a torque map"),
         (OFF, "was held against the captures: residual_test=false"),
     ],
 )

@@ -1,0 +1,48 @@
+"""The current status of a datasheet in words: the same on a page, a terminal, in an export."""
+
+from __future__ import annotations
+
+from pipeline.records.current_status import CurrentStatus
+from pipeline.records.ledger import Version
+from pipeline.report.registry_text import decision
+
+WORDS = {
+    "released": "Every capture verified, every check holds, approved.",
+    "provisional": "Usable, with something missing, unverified or not explained.",
+    "refused": "Do not use: a check failed.",
+    "revoked": "Do not use: it was released, and revoked.",
+}
+IN_SPITE = "Approved in spite of what its model leaves."
+
+
+def status_words(current: CurrentStatus) -> str:
+    """What the status means, in a sentence."""
+    if current.status == "released" and current.why:
+        return IN_SPITE
+    return WORDS[current.status]
+
+
+def status_lines(current: CurrentStatus) -> tuple[str, ...]:
+    """Who decided what, and which version an export takes where it is not this one.
+
+    Empty for a version on which nothing was decided and beside which nothing else is released.
+    """
+    lines = []
+    if current.decision is not None and current.version is not None:
+        lines.append(f"revision {current.version.revision}, {decision(current.decision)}")
+    if current.in_force is not None and not current.exported:
+        lines.append(f"export writes {exported(current.in_force)}, not this one")
+    return tuple(lines)
+
+
+def exported(version: Version) -> str:
+    """Which version an export writes, and since when it counts: `revision 1, approved by ...`."""
+    since = decision(version.decisions[-1]) if version.decisions else "released as published"
+    return f"revision {version.revision}, {since}"
+
+
+def not_exported(last: Version) -> str:
+    """That a newer version than the exported one is there, and what it is."""
+    points = "; ".join(last.published.reasons[:3])
+    why = f" ({points})" if points else ""
+    return f"revision {last.revision} is newer and {last.status}{why}; it is not exported"
