@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,17 +11,18 @@ import numpy as np
 from pipeline.criticism.asked import fit_of
 from pipeline.criticism.captured import at_ambient, unused
 from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.determined import combinations_told, parameters_told
 from pipeline.criticism.held_out import effective, run_errors, simulate, traces
-from pipeline.criticism.judge import HeldOut, in_common, leave_out, uncertainties
+from pipeline.criticism.judge import HeldOut, in_common, leave_out
 from pipeline.criticism.mains import told_hum
 from pipeline.criticism.maps import all_maps, unit_of
-from pipeline.criticism.model import BASE, PHYSICAL, Model
+from pipeline.criticism.model import Model
 from pipeline.criticism.optional import trimmed
 from pipeline.criticism.segment import Segment, told_signal
 from pipeline.criticism.segments import segments
 from pipeline.criticism.size import PAIRLESS, machine_of
 from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, own_columns
+from pipeline.criticism.system import Fitted, System, own_columns, system
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import (
     Comparison,
@@ -53,12 +54,13 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         return _nothing(campaign, model, names, _IDLE)
     begun = fit_of(found, asked)
     found = begun.segments
-    fitted, around = trimmed(found, begun.fitted, begun.around, names)
+    fitted, _ = trimmed(found, begun.fitted, begun.around, names)
+    around = system(found, fitted)
     held = leave_out(around, len(own_columns(fitted.model)), found)
     simulated = simulate(found, fitted, around, held)
     residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
     maps = all_maps(found, around, residual, fitted)
-    parameters = _parameters(fitted, around, held)
+    parameters = parameters_told(fitted, around, held)
     without = model_of(model.bare(), machine)
     bare, total, moved = _bare(found, fitted, without, parameters, (around, held))
     return Comparison(
@@ -79,32 +81,13 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         moved,
         bare,
         tuple(traces(found, fitted, simulated)),
+        combinations_told(found, fitted, around, held),
     )
 
 
 def _nothing(campaign: Campaign, model: ModelSpec, names: tuple[str, ...], note: str) -> Comparison:
     """No errors, and why there are none."""
     return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
-
-
-def _parameters(fitted: Fitted, around: System, held: HeldOut) -> dict[str, ModelParameter]:
-    model = fitted.model
-    own = own_columns(model)
-    spread = uncertainties(around, held, len(own)).tolist()
-    u = {column.name: one for column, one in zip(own, spread, strict=True)}
-    heard = {c.name for n, c in enumerate(around.columns) if np.any(around.matrix[:, n] != 0.0)}
-    told = {
-        c.name: ModelParameter(fitted.values[c.name], u[c.name], c.unit)
-        for c in BASE
-        if c.name in PHYSICAL and c.name in heard
-    }
-    for name, (_, p) in model.parameters().items():
-        scale, value = model.machine.scale(p), fitted.values[name]
-        edge = 1e-9 * max(abs(p.typical), 1e-30) * scale
-        bound = min(abs(value - p.low * scale), abs(value - p.high * scale)) <= edge
-        bound = bound and not p.choice
-        told[name] = ModelParameter(value, u.get(name, p.u), p.unit, bound)
-    return told
 
 
 def _bare(
@@ -126,15 +109,24 @@ def _bare(
     gone = [e.name for e in fitted.model.effects if e.name not in names]
     values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
     begun = replace(fitted, model=without, values=values, tolerance=())
-    plain, around = gauss_newton(found, begun)
+    plain, _ = gauss_newton(found, begun)
+    around = system(found, plain)
     held = leave_out(around, len(own_columns(without)), found)
-    before = _parameters(plain, around, held)
-    moved = tuple(
-        Move(name, one.unit, one.value, one.u, after[name].value, after[name].u)
-        for name, one in before.items()
-    )
+    moved = _moves(parameters_told(plain, around, held), after)
     less, full = in_common((around, whole[0]), (held, whole[1]))
     return less.total, full.total, moved
+
+
+def _moves(
+    before: Mapping[str, ModelParameter], after: Mapping[str, ModelParameter]
+) -> tuple[Move, ...]:
+    """The parameters that are determined both before and after."""
+    return tuple(
+        Move(name, one.unit, one.value, one.u, there.value, there.u)
+        for name, one, there in ((name, one, after[name]) for name, one in before.items())
+        if one.value is not None and one.u is not None
+        if there.value is not None and there.u is not None
+    )
 
 
 def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[SignalError]:

@@ -36,6 +36,7 @@ from pipeline.records.diagnosis import (
     Diagnosis,
     RankedEffect,
     Remainder,
+    ToldParameter,
     Unexcited,
     Verdict,
 )
@@ -256,6 +257,6 @@ def _p_value(fall: float, dof: int) -> float:
     return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
 
 
-def _parameters(rung: Rung, effect: Effect, held: HeldOut) -> dict[str, tuple[float, float, str]]:
+def _parameters(rung: Rung, effect: Effect, held: HeldOut) -> dict[str, ToldParameter]:
     told, start = parameters_of(rung, held), f"{effect.name}."
     return {name.removeprefix(start): one for name, one in told.items() if name.startswith(start)}

@@ -52,8 +52,9 @@ class Parameter:
     for an amplitude. A `choice` takes one of these values and is never fitted. `optional`: the
     parameters of one number above 0 form a term that the effect can do without; without it they
     are zero. `u`: standard uncertainty, in its own unit, of a value that a closer look told.
-    `at_least`: another amplitude of the effect; if this one stays below half of it, captures speak
-    against the effect.
+    `usual`: what handbooks say of the material, and its standard uncertainty, in its own unit: a
+    prior of every fit. `at_least`: another amplitude of the effect; if this one stays below half of
+    it, captures speak against the effect.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Parameter:
     optional: int = 0
     u: float = 0.0
     at_least: str = ""
+    usual: tuple[float, float] | None = None
 
     @property
     def amplitude(self) -> bool:

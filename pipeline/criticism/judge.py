@@ -87,24 +87,6 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
     return HeldOut(left, math.sqrt(float((told**2).mean())), steps)
 
 
-def uncertainties(around: System, held: HeldOut, own: int) -> Array:
-    """Standard uncertainty [own] of a fit's parameters: from the samples' noise, or from leaving
-    out one capture at a time, whichever is larger.
-
-    A form that is a little wrong, or noise that is not white, disturbs every capture in its own
-    way; a covariance from samples does not know that. References: [1] Efron & Stein, Ann.
-    Stat. 9 (1981), jackknife variance (K − 1)/K Σ (θ_k − mean)².
-    """
-    noise = np.sqrt(np.maximum(np.diag(around.covariance(np.arange(own))), 0.0))
-    count = len(held.steps)
-    if count < 2:
-        return noise
-    steps = np.array(list(held.steps.values()))
-    between = np.sqrt((count - 1) / count * ((steps - steps.mean(axis=0)) ** 2).sum(axis=0))
-    wider: Array = np.maximum(noise, between)
-    return wider
-
-
 def in_common(fits: Sequence[System], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
     """The same rows held out of several fits to the same captures, so that their errors compare.
 

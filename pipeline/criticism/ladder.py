@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.criticism.judge import HeldOut, signal_errors, uncertainties
+from pipeline.criticism.determined import parameters_told
+from pipeline.criticism.judge import HeldOut, signal_errors
 from pipeline.criticism.maps import (
     angle_maps,
     histograms,
@@ -17,8 +18,7 @@ from pipeline.criticism.maps import (
 )
 from pipeline.criticism.segment import Segment
 from pipeline.criticism.selection import Rung
-from pipeline.criticism.system import own_columns
-from pipeline.records.diagnosis import LadderRung, RungError
+from pipeline.records.diagnosis import LadderRung, RungError, ToldParameter
 
 
 def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRung:
@@ -40,15 +40,11 @@ def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRu
     )
 
 
-def parameters_of(rung: Rung, held: HeldOut) -> dict[str, tuple[float, float, str]]:
+def parameters_of(rung: Rung, held: HeldOut) -> dict[str, ToldParameter]:
     """Value, standard uncertainty and unit of every effect's parameters on a rung."""
-    own = own_columns(rung.fitted.model)
-    spread = uncertainties(rung.around, held, len(own)).tolist()
-    u = {column.name: one for column, one in zip(own, spread, strict=True)}
-    return {
-        name: (float(rung.fitted.values[name]), u.get(name, p.u), p.unit)
-        for name, (_, p) in rung.fitted.model.parameters().items()
-    }
+    told = parameters_told(rung.fitted, rung.around, held)
+    own = rung.fitted.model.parameters()
+    return {name: (told[name].value, told[name].u, told[name].unit) for name in own}
 
 
 def _rms(values: np.ndarray) -> float:

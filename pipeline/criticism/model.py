@@ -94,10 +94,11 @@ class Model:
 
     def priors(self) -> dict[str, tuple[float, float]]:
         """Centre and standard uncertainty of every nuisance: what the station states of its own
-        instruments, else the constant's own.
+        instruments, else the constant's own; and of what handbooks say of materials.
         """
         stated = self.machine.stated_u
-        return {c.name: (c.center, stated.get(c.name, c.prior)) for c in BASE if c.prior != _FREE}
+        own = {c.name: (c.center, stated.get(c.name, c.prior)) for c in BASE if c.prior != _FREE}
+        return own | {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
 
     def with_effects(self, *effects: Effect) -> Model:
         """This model and further effects."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.choices import reconsidered
 from pipeline.criticism.closer import renamed
 from pipeline.criticism.descent import clipped, first_fit, gauss_newton, rough_anew
+from pipeline.criticism.determined import surely_there
 from pipeline.criticism.effect import Array, Effect, Machine
 from pipeline.criticism.floors import form_tolerance
 from pipeline.criticism.grams import Grams
@@ -21,7 +22,6 @@ from pipeline.criticism.judge import (
     leave_out,
     predicted_spreads,
     told_groups,
-    uncertainties,
 )
 from pipeline.criticism.optional import trimmed, whole
 from pipeline.criticism.scores import (
@@ -152,7 +152,8 @@ def _chosen(
             named = [effect.name for effect in best[0].model.effects]
             near = gauss_newton(segments, whole(best[0]), before=best[1])
             finished = trimmed(segments, *near, named)
-            if _sure(*finished, leave_out(finished[1], len(finished[1].columns), segments)):
+            anew = system(segments, finished[0])
+            if _sure(finished[0], anew, leave_out(anew, len(anew.columns), segments)):
                 return finished
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
     return None
@@ -234,12 +235,7 @@ def _sure(fitted: Fitted, around: System, held: HeldOut) -> bool:
     sense at a reversal, while its own size is not known at all.
     """
     effect = fitted.model.effects[-1]
-    spread = uncertainties(around, held, len(around.columns)).tolist()
-    sure = {
-        column.name
-        for column, u in zip(around.columns, spread, strict=True)
-        if abs(fitted.values[column.name]) > _SURELY * u
-    }
+    sure = surely_there(around, held, _SURELY)
     known = effect.parameters_of(fitted.model.machine)
     told = [p for p in known if f"{effect.name}.{p.name}" in sure]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]

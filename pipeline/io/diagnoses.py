@@ -40,12 +40,12 @@ def _read(path: Path) -> DiagnosisSummary:
 def _summary(document: Mapping[str, Any]) -> DiagnosisSummary:
     if document["schema"] != SCHEMA or document["verdict"] not in get_args(Verdict):
         raise ValueError(f"{document['schema']!r} with verdict {document['verdict']!r}")
+    sizes = {ranked["effect"]: ranked.get("parameters", {}) for ranked in document["ranking"]}
+    # of an effect whose numbers are not all determined, none is its size
     parameters = {
-        ranked["effect"]: {
-            name: (float(said["value"]), str(said["unit"]))
-            for name, said in ranked.get("parameters", {}).items()
-        }
-        for ranked in document["ranking"]
+        effect: {name: (float(one["value"]), str(one["unit"])) for name, one in said.items()}
+        for effect, said in sizes.items()
+        if all(one["value"] is not None for one in said.values())
     }
     return DiagnosisSummary(
         str(document["motor_id"]),

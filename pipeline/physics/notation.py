@@ -98,6 +98,13 @@ def reading(value: float, u: float, unit: str, scale: Scale | None = None) -> Re
     )
 
 
+def number_text(value: float | None, u: float | None, unit: str) -> str:
+    """A reading as one line of text, or that there is none."""
+    if value is None:
+        return "not identifiable"
+    return reading(value, 0.0 if u is None else u, unit).text()
+
+
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """A number without uncertainty in engineering notation, to some significant digits."""
     if not math.isfinite(value):

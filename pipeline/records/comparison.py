@@ -41,16 +41,57 @@ class ModelSpec:
 
 @dataclass(frozen=True, slots=True)
 class ModelParameter:
-    """One fitted parameter with its standard uncertainty from scatter [unit]."""
+    """One fitted parameter with its standard uncertainty [unit]; both are None where the captures
+    and the station's priors do not determine it.
+    """
 
-    value: float
-    u: float
+    value: float | None
+    u: float | None
     unit: str
     at_bound: bool = False
 
+    @property
+    def known(self) -> bool:
+        """Whether there is a value."""
+        return self.value is not None
+
+    @property
+    def status(self) -> Literal["measured", "not_identifiable"]:
+        """As in a datasheet."""
+        return "measured" if self.known else "not_identifiable"
+
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
-        return {"value": self.value, "u": self.u, "unit": self.unit, "at_bound": self.at_bound}
+        return {
+            "value": self.value,
+            "u": self.u,
+            "unit": self.unit,
+            "at_bound": self.at_bound,
+            "status": self.status,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class KnownCombination:
+    """What is determined of parameters that are not, one by one: a ratio, a product or a sum, with
+    its standard uncertainty [unit]. `of` are the parameters in it.
+    """
+
+    expression: str
+    value: float
+    u: float
+    unit: str
+    of: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {
+            "expression": self.expression,
+            "value": self.value,
+            "u": self.u,
+            "unit": self.unit,
+            "of": list(self.of),
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +197,8 @@ class Comparison:
     """One model of one motor: parameters, errors, and where the error lives.
 
     `moved` tells parameters with and without the effects that were added; `bare` the held-out
-    error without them, None where none were. `traces` are for looking, not for the document.
+    error without them, None where none were. `combinations` are known where their parameters are
+    not. `traces` are for looking, not for the document.
     """
 
     motor_id: str
@@ -171,6 +213,7 @@ class Comparison:
     moved: tuple[Move, ...] = field(default=())
     bare: float | None = None
     traces: tuple[Trace, ...] = field(default=())
+    combinations: tuple[KnownCombination, ...] = field(default=())
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema model-comparison/1.
@@ -186,6 +229,7 @@ class Comparison:
                 "name": self.name,
                 "effects": list(self.effects),
                 "parameters": {n: p.document() for n, p in self.parameters.items()},
+                "combinations": [one.document() for one in self.combinations],
             },
             "errors": [one for named, one in errors if named],
             "errors_other": [one for named, one in errors if not named],

@@ -9,6 +9,9 @@ from typing import Any, Literal
 from pipeline.records.error_map import ErrorMap, Histogram
 
 Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
+ToldParameter = tuple[float | None, float | None, str]
+"""Value and standard uncertainty of a parameter, and their unit; None where the captures and the
+station's priors do not determine it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class RankedEffect:
     confused_with: tuple[str, ...]
     explanation: str
     experiment: str
-    parameters: Mapping[str, tuple[float, float, str]]
+    parameters: Mapping[str, ToldParameter]
     separation: tuple[Separation, ...] = ()
     size: float | None = None
     shortfall: str = ""
@@ -98,7 +101,7 @@ class LadderRung:
     held_out: float
     signals: Mapping[str, float]
     errors: Mapping[str, RungError] = field(default_factory=dict)
-    parameters: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
+    parameters: Mapping[str, ToldParameter] = field(default_factory=dict)
     maps: tuple[ErrorMap, ...] = field(default=())
     histograms: tuple[Histogram, ...] = field(default=())
 

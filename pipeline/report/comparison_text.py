@@ -31,7 +31,8 @@ def comparison_text(result: Comparison) -> str:
     lines = [head, *(f"  note: {note}" for note in result.notes)]
     if result.bare is not None:
         lines.append(f"  without what was added: {result.bare:.4g}")
-    return "\n".join([*lines, *_errors(result), *_places(result), *_moves(result)])
+    told = [*_errors(result), *_places(result), *_undetermined(result), *_moves(result)]
+    return "\n".join([*lines, *told])
 
 
 def _errors(result: Comparison) -> list[str]:
@@ -102,6 +103,14 @@ def _worst(one: ErrorMap) -> str:
         f"; worst at {speed[0]:.3g} to {speed[1]:.3g} rad/s, {current[0]:.3g} to "
         f"{current[1]:.3g} A: {quantity(float(one.mean[row, column]), one.unit, 2)}"
     )
+
+
+def _undetermined(result: Comparison) -> list[str]:
+    """Parameters that these captures do not determine, and what they tell of them together."""
+    unknown = [name for name, one in result.parameters.items() if not one.known]
+    lines = [f"  not identifiable from these captures: {', '.join(unknown)}"] if unknown else []
+    known = [(one.expression, reading(one.value, one.u, one.unit)) for one in result.combinations]
+    return lines + [f"  but {expression} = {shown.text()}" for expression, shown in known]
 
 
 def _moves(result: Comparison) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from pipeline.physics.notation import MINUS, quantity, reading, significant
+from pipeline.physics.notation import MINUS, number_text, quantity, significant
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect
 from pipeline.report.axis import quantity_words, unit_of
 from pipeline.report.curve_chart import curve_chart
@@ -138,7 +138,7 @@ def _view(
     gone = [e for e in below.effects if e not in rung.effects] if below is not None else []
     title = " ".join([*(f"+ {e}" for e in came), *(f"{MINUS} {e}" for e in gone)])
     told = {one.effect: one.explanation for one in result.ranking}
-    shown = [(n, reading(*v).text()) for n, v in rung.parameters.items()]
+    shown = [(n, number_text(*v)) for n, v in rung.parameters.items()]
     own = tuple(one for one in shown if one[0].split(".")[0] in came)
     return RungView(
         number,

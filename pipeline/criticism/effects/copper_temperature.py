@@ -17,7 +17,10 @@ EFFECT = Effect(
     tests=("heat_run",),
     experiment="a heat run: current on a locked rotor until the winding is 40 K warmer",
     reference="IEC 60228; conventions: 1/259.5 per kelvin at 25 °C for copper",
-    parameters=(Parameter("alpha_1_k", "1/K", 0.0039, 0.0002, low=-0.001, high=0.01),),
+    # Copper and aluminium are within a few per cent of each other; alloys of heaters are not.
+    parameters=(
+        Parameter("alpha_1_k", "1/K", 0.0039, 2e-4, low=-0.001, high=0.01, usual=(0.003854, 1e-4)),
+    ),
     signals=("temp_winding_degc",),
     rivals={"skin_effect": "a heat run at standstill has no speed in it"},
     drop=_drop,

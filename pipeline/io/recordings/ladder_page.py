@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.io.recordings.datasheet_page import plain
-from pipeline.physics.notation import MINUS, quantity, reading
+from pipeline.physics.notation import MINUS, number_text, quantity
 from pipeline.records.diagnosis import Diagnosis
 
 _VERDICTS = {
@@ -27,7 +27,7 @@ def rung_markdown(result: Diagnosis, place: int) -> str:
     own = [n for n in rung.parameters if n.split(".")[0] in came]
     if own:
         lines += ["| parameter | value ± U (k = 2) |", "| --- | --- |"]
-        lines += [f"| {plain(n)} | {_value(rung.parameters[n])} |" for n in own] + [""]
+        lines += [f"| {plain(n)} | {number_text(*rung.parameters[n])} |" for n in own] + [""]
     lines += _table(result, place)
     if place == len(result.ladder) - 1:
         lines += ["", f"**{result.verdict}**: {_VERDICTS[result.verdict]}"]
@@ -71,10 +71,6 @@ def _change(result: Diagnosis, number: int) -> str:
     before = result.ladder[number - 1].held_out
     change = 100.0 * (now / before - 1.0) if before > 0 else 0.0
     return f"{now:.3g} ({change:+.0f} %)".replace("-", MINUS)
-
-
-def _value(told: tuple[float, float, str]) -> str:
-    return reading(*told).text()
 
 
 def _doubts(result: Diagnosis) -> list[str]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.determined import rows_of, uncertainties
 from pipeline.criticism.diagnosis import _as_told
 from pipeline.criticism.judge import (
     in_common,
@@ -15,11 +16,11 @@ from pipeline.criticism.judge import (
     material_size,
     over_floor,
     remainder,
-    uncertainties,
 )
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
 from pipeline.criticism.system import Fitted, System, own_columns, system
+from pipeline.numerics.identifiability import identify
 from tests.unit.criticism.machines import BASE, fitted, log, machine
 
 ROWS = 400
@@ -48,11 +49,13 @@ def captures(levels: list[float], seed: int = 4) -> System:
     )
 
 
+def u(around: System) -> float:
+    found = identify(rows_of(around, 1), np.ones(1))
+    return float(uncertainties(leave_out(around, 1), found)[0])
+
+
 def test_captures_that_agree_are_as_sure_as_their_samples():
-    found = [
-        float(uncertainties(one, leave_out(one, 1), 1)[0])
-        for one in (captures([0.0] * 6, seed) for seed in range(30))
-    ]
+    found = [float(u(one)) for one in (captures([0.0] * 6, seed) for seed in range(30))]
     assert np.median(found) == pytest.approx((6 * ROWS) ** -0.5, rel=0.25)
 
 
@@ -61,12 +64,12 @@ def test_captures_that_disagree_are_not_surer_than_their_scatter():
     levels = [0.3, -0.3, 0.1, -0.2, 0.25, -0.15]
     around = captures(levels)
     scatter = np.std(levels, ddof=1) / 6**0.5
-    assert uncertainties(around, leave_out(around, 1), 1)[0] == pytest.approx(scatter, rel=0.3)
+    assert u(around) == pytest.approx(scatter, rel=0.3)
 
 
 def test_one_capture_alone_has_its_noise():
     around = captures([0.0])
-    assert uncertainties(around, leave_out(around, 1), 1)[0] == pytest.approx(ROWS**-0.5, rel=0.1)
+    assert u(around) == pytest.approx(ROWS**-0.5, rel=0.1)
 
 
 def test_a_column_that_one_capture_carries_predicts_nothing_better():

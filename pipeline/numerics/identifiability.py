@@ -1,0 +1,257 @@
+"""Which numbers the data determine, and which only together.
+
+A least squares problem with whitened rows A [n, p], the priors that are honest among them, knows a
+function g of the parameters where its gradient has no part along the directions that A sends to
+nothing; its variance is then gᵀ (AᵀA)⁺ g, whichever generalised inverse is taken [1]. Along such a
+direction every value fits as well, and what a minimum-norm solution makes of it is a number of the
+algorithm. A number may also be known, but not to its own size: its likelihood then has no end on a
+logarithmic scale [2].
+
+The columns of A are scaled to unit length, whose singular values are Belsley's condition indices
+[3], so that units do not matter; and A is decomposed, not AᵀA, which would lose half of the digits.
+
+References: [1] Rao & Mitra, Generalized Inverse of Matrices (1971), 7.2; Walter & Pronzato,
+Identification of Parametric Models (1997), 2.6. [2] Raue et al., Bioinformatics 25 (2009),
+doi:10.1093/bioinformatics/btp358. [3] Belsley, Kuh & Welsch, Regression Diagnostics (1980), ch. 3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_TIED = 1e-10
+"""Singular value, over the largest, of unit columns that are taken for tied. By judgement: exact
+ties of columns from finite differences come out at 1e-14."""
+_UNHEARD = 1e-6
+"""Standard deviations of the data that a parameter must make when it moves by its own size."""
+_TOUCHED = 0.1
+"""Standard uncertainties by which a direction without information moves what it leaves alone."""
+REACH = 1.959964
+"""Standard uncertainties to either end of a 95 % interval."""
+_COARSE = 1e-2
+"""Part of a gradient along a direction without information that a column may be wrong by: a
+difference quotient of 1/x with a step of a thousandth of x is a thousandth off."""
+_OTHER = 1e-3
+"""Part of a combination's gradient that must be none of those found before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """What rows say of p parameters.
+
+    `sizes` [p] are magnitudes at which the parameters matter, in their own units, `null` [p, k] the
+    directions without information, each of which moves some parameter by its size, and `covariance`
+    [p, p] that of everything that no such direction moves.
+    """
+
+    sizes: Array
+    null: Array
+    covariance: Array
+
+    def u_of(self, gradient: Array) -> float:
+        """Standard uncertainty of a function with this gradient [p], infinite where directions
+        without information move it.
+        """
+        u = self.noise_of(gradient)
+        moved = float(np.linalg.norm(gradient @ self.null))
+        unknown = not np.any(gradient) or moved > _TOUCHED * u
+        return math.inf if unknown else u
+
+    def noise_of(self, gradient: Array) -> float:
+        """Standard uncertainty of such a function as far as directions without information do not
+        move it.
+        """
+        return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+
+    def stays(self, gradient: Array) -> bool:
+        """Whether directions without information leave such a function, as far as columns from
+        finite differences can tell.
+        """
+        there = float(np.linalg.norm(gradient * self.sizes))
+        return float(np.linalg.norm(gradient @ self.null)) < _COARSE * there
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainty [p] of every parameter, infinite where it is not identifiable."""
+        return np.array([self.u_of(one) for one in np.eye(self.sizes.size)])
+
+    @property
+    def determined(self) -> NDArray[np.bool_]:
+        """Which parameters [p] are known at all, and better than to their own size: the 95 %
+        interval is not as wide to either side.
+        """
+        return within(self.u, self.sizes)
+
+
+def within(u: Array, sizes: Array) -> NDArray[np.bool_]:
+    """Whether numbers with standard uncertainties `u` are known better than to their `sizes`."""
+    known: NDArray[np.bool_] = REACH * u < sizes
+    return known
+
+
+def identify(rows: Array, sizes: Array) -> Identified:
+    """What whitened rows [n, p] of data and priors say of parameters with these `sizes` [p] > 0."""
+    if not (sizes > 0.0).all():
+        raise ValueError("every parameter needs a size above zero")
+    length = np.linalg.norm(rows, axis=0)
+    heard = length * sizes > _UNHEARD
+    count = sizes.size
+    covariance = np.zeros((count, count))
+    null = [np.eye(count)[:, ~heard]]
+    if heard.any():
+        scale = length[heard]
+        triangle = np.linalg.qr(rows[:, heard] / scale, mode="r")
+        _, singular, right = np.linalg.svd(triangle, full_matrices=False)
+        told = singular > _TIED * singular[0]
+        axes = right[told] / scale
+        inside = np.ix_(heard, heard)
+        covariance[inside] = (axes.T / singular[told] ** 2) @ axes
+        # fewer rows than columns leave directions that the decomposition does not give
+        tied = np.zeros((count, int(heard.sum()) - int(told.sum())))
+        tied[heard] = _complement(right[told]) / (scale * sizes[heard])[:, None]
+        null.append(tied)
+    free = np.column_stack(null)
+    axes_of_sizes, _ = np.linalg.qr(free)
+    return Identified(sizes, _one_size(axes_of_sizes) * sizes[:, None], covariance)
+
+
+def _complement(rows: Array) -> Array:
+    """Orthonormal columns [p, p − r] of the directions that r orthonormal rows [r, p] leave."""
+    _, _, right = np.linalg.svd(rows, full_matrices=True)
+    left: Array = right[rows.shape[0] :].T
+    return left
+
+
+def _one_size(directions: Array) -> Array:
+    """Directions [p, k] in sizes, each scaled so that its largest part is one."""
+    largest = np.abs(directions).max(axis=0, initial=0.0)
+    scaled: Array = directions / np.where(largest > 0.0, largest, 1.0)
+    return scaled
+
+
+@dataclass(frozen=True, slots=True)
+class Combination:
+    """A function of parameters that is known where they are not.
+
+    A `product` is Π x^w with `weights` of ±1 by the parameter's place, a sum Σ w x. `value`,
+    `gradient` [p] by the parameters, `size` at which it matters, standard uncertainty `u`.
+    """
+
+    product: bool
+    weights: tuple[tuple[int, float], ...]
+    value: float
+    gradient: Array
+    size: float
+    u: float
+
+
+def known_combinations(
+    found: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
+) -> tuple[Combination, ...]:
+    """The simplest functions of the parameters at `places` that are known, independent of each
+    other: ratios and products first, then sums.
+
+    What stands below a fraction is one of the `positive`, the first that serves. Sums have two
+    terms.
+    """
+    kept: list[Combination] = []
+    for one in (*_products(found, values, places, positive), *_sums(found, values, places)):
+        told = [*(other.gradient * found.sizes for other in kept), one.gradient * found.sizes]
+        if within(np.array(one.u), np.array(one.size)) and _new(told):
+            kept.append(one)
+    return tuple(kept)
+
+
+def _new(gradients: Sequence[Array]) -> bool:
+    """Whether the last of some gradients is no combination of the others."""
+    unit = np.column_stack([one / np.linalg.norm(one) for one in gradients])
+    _, triangle = np.linalg.qr(unit)
+    return abs(float(triangle[-1, -1])) > _OTHER
+
+
+def _products(
+    found: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
+) -> Iterator[Combination]:
+    """Ratios, products of two, and what three parameters make, the simplest first."""
+    places = [n for n in places if np.isinf(found.u[n])]
+    below = [n for n in positive if n in places]
+    for j in below:
+        yield from (_product(found, values, {i: 1, j: -1}) for i in places if i != j)
+    for pair in combinations(places, 2):
+        yield _product(found, values, dict.fromkeys(pair, 1))
+    for j in below:
+        others = [n for n in places if n != j]
+        for one, two in combinations(others, 2):
+            yield _product(found, values, {one: 1, two: 1, j: -1})
+    for one, two in combinations(below, 2):
+        for i in (n for n in places if n not in (one, two)):
+            yield _product(found, values, {i: 1, one: -1, two: -1})
+
+
+def _product(found: Identified, values: Array, powers: dict[int, int]) -> Combination:
+    """Π x^w, its gradient also where a factor of the numerator is zero."""
+    gradient = np.zeros(values.size)
+    for place, power in powers.items():
+        rest = [values[n] ** w for n, w in powers.items() if n != place]
+        gradient[place] = power * values[place] ** (power - 1) * float(np.prod(rest))
+    value = float(np.prod([values[n] ** w for n, w in powers.items()]))
+    size = float(np.prod([(found.sizes if w > 0 else values)[n] ** w for n, w in powers.items()]))
+    u = found.noise_of(gradient) if found.stays(gradient) else math.inf
+    return Combination(True, tuple(powers.items()), value, gradient, abs(size), u)
+
+
+def _sums(found: Identified, values: Array, places: Sequence[int]) -> Iterator[Combination]:
+    """X + w y of every two parameters that one direction without information moves together, or
+    that are known poorly, with the w that is known best.
+    """
+    for one, two in combinations(places, 2):
+        pair = [one, two]
+        sizes = found.sizes[pair]
+        null = found.null[pair] / sizes[:, None]
+        spread = found.covariance[np.ix_(pair, pair)] / np.outer(sizes, sizes)
+        _, axes = np.linalg.eigh(null @ null.T if null.any() else spread)
+        weight = axes[:, 0] / sizes
+        if not weight.all():
+            continue
+        gradient = np.zeros(values.size)
+        gradient[pair] = weight / weight[0]
+        weights = ((one, 1.0), (two, float(gradient[two])))
+        size = float(np.max(np.abs(gradient[pair]) * sizes))
+        u = found.u_of(gradient)
+        yield Combination(False, weights, float(gradient @ values), gradient, size, u)
+
+
+def walked(
+    found: Identified, values: Array, combinations_: Sequence[Combination], far: float
+) -> Iterator[tuple[NDArray[np.bool_], Array]]:
+    """Values [p] at either end of every direction without information along which the combinations
+    stay as they are, and which parameters [p] it moves.
+
+    What is in a product goes up or down by a common factor's power, exp(`far`) at the most, what
+    is not by `far` of its size.
+    """
+    factors = np.zeros((values.size, 0))
+    inside = np.zeros(values.size, dtype=bool)
+    for one in combinations_:
+        if one.product:
+            powers = np.zeros(values.size)
+            for place, power in one.weights:
+                powers[place], inside[place] = power, True
+            factors = np.column_stack([factors, powers])
+    inside &= values != 0.0
+    axes, _ = np.linalg.qr(factors)
+    for direction in found.null.T:
+        logs = np.where(inside, direction / np.where(inside, values, 1.0), 0.0)
+        logs -= axes @ (axes.T @ logs)
+        logs /= max(float(np.abs(logs).max()), 1.0)
+        for way in (far, -far):
+            moved = values * np.exp(way * logs) + np.where(inside, 0.0, way * direction)
+            yield direction != 0.0, moved
