@@ -233,6 +233,12 @@ def _error_map() -> Schema:
     )
 
 
+def _combination() -> Schema:
+    return _object(
+        {"expression": NAME, "value": NUMBER, "u": SPREAD, "unit": NAME, "of": _list(NAME)}
+    )
+
+
 def comparison_schema() -> Schema:
     """`comparison/MOTOR.json`."""
     signals = ["vd_v", "vq_v", "torque_shaft_nm", "omega_mech_rad_s", "iq_a", "psi_d_wb"]
@@ -243,7 +249,8 @@ def comparison_schema() -> Schema:
             "u": _or_null(SPREAD),
             "unit": NAME,
             "at_bound": {"type": "boolean"},
-        }
+        },
+        {"status": {"enum": ["measured", "not_identifiable"]}},
     )
     error = _object(
         {
@@ -273,7 +280,10 @@ def comparison_schema() -> Schema:
     body = _object(
         {
             "motor_id": NAME,
-            "model": _object({"name": NAME, "effects": _list(NAME), "parameters": _map(parameter)}),
+            "model": _object(
+                {"name": NAME, "effects": _list(NAME), "parameters": _map(parameter)},
+                {"combinations": _list(_combination())},
+            ),
             "errors": _list(error),
             "total": _object({"held_out": _or_null(SPREAD)}),
             "where": _list(where),
@@ -285,6 +295,7 @@ def comparison_schema() -> Schema:
 
 def diagnosis_schema() -> Schema:
     """`diagnosis/MOTOR.json`."""
+    told = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": NAME})
     rank = _object(
         {
             "effect": NAME,
@@ -294,7 +305,8 @@ def diagnosis_schema() -> Schema:
             "confused_with": _list(NAME),
             "explanation": TEXT,
             "experiment": TEXT,
-        }
+        },
+        {"parameters": _map(told)},
     )
     step = _object(
         {
@@ -304,7 +316,7 @@ def diagnosis_schema() -> Schema:
         },
         {
             "errors": _map(_object({"rmse": SPREAD, "noise_floor": SPREAD, "unit": TEXT})),
-            "parameters": _map(_object({"value": NUMBER, "u": SPREAD, "unit": NAME})),
+            "parameters": _map(told),
             "maps": _list(_error_map()),
         },
     )
@@ -322,7 +334,7 @@ def diagnosis_schema() -> Schema:
             "ladder": _list(step),
             "unknown": _or_null(unknown),
         },
-        {"asked": _list(NAME)},
+        {"asked": _list(NAME), "combinations": _list(_combination())},
     )
     return _document("model-diagnosis/1", "What a model of a motor leaves out", body)
 

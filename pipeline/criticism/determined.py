@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,47 +41,59 @@ _RISE = 1.0
 uncertainties make."""
 
 
-def identified(around: System, own: int) -> Identified:
-    """What the rows of a system and the priors of the station say of a fit's first `own` columns.
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What a fit knows of its `own` parameters.
+
+    `found` is what the rows and the priors of the station say of them, `steps` [K, own] how far
+    they move without each capture that can be left out, `rest` [own] the step that the equations
+    still ask for where a bound or the end of the iterations keeps it from being done.
+    """
+
+    found: Identified
+    steps: Array
+    rest: Array
+
+    def u_of(self, gradient: Array, bent: bool = False) -> float:
+        """Standard uncertainty of a function with this gradient [own], `bent` where it is not
+        linear: from the samples' noise, or from leaving out one capture at a time, whichever is
+        larger, and from the rest; infinite where it is not identifiable.
+
+        A form that is a little wrong, or noise that is not white, disturbs every capture in its
+        own way; a covariance from samples does not know that. References: [1] Efron & Stein, Ann.
+        Stat. 9 (1981), jackknife variance (K − 1)/K Σ (θ_k − mean)².
+        """
+        noise = self.found.u_of_bent(gradient) if bent else self.found.u_of(gradient)
+        count, moves = len(self.steps), self.steps @ gradient
+        between = 0.0
+        if count > 1:
+            between = math.sqrt((count - 1) * float(np.var(moves)))
+        return math.hypot(max(noise, between), float(self.rest @ gradient))
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainty [own] of every parameter."""
+        return np.array([self.u_of(one) for one in np.eye(self.rest.size)])
+
+
+def known(around: System, held: HeldOut, own: int) -> Known:
+    """What a system and its priors say of a fit's first `own` columns.
 
     Nothing that only keeps steps short, or where the fit began, is in it. The columns are those of
     the fit itself: one that stayed from a near fit would tell apart what nothing tells apart.
     """
-    return identify(rows_of(around, own), _sizes(around.around, around.columns[:own]))
+    return known_by(around, held, own, _sizes(around.around, around.columns[:own]))
 
 
-def rows_of(around: System, own: int) -> Array:
-    """The whitened rows [R + own, own] of a system's first columns, as they count, and of their
-    priors.
-    """
-    weight = np.sqrt(around.weights(around.spreads(around.residual)))
-    priors = np.diag(np.sqrt(around.penalty[:own]))
-    return np.vstack([around.matrix[:, :own] * weight[:, None], priors])
-
-
-def uncertainties(held: HeldOut, found: Identified) -> Array:
-    """Standard uncertainty [own] of a fit's parameters: from the samples' noise, or from leaving
-    out one capture at a time, whichever is larger; infinite where they are not identifiable.
-
-    A form that is a little wrong, or noise that is not white, disturbs every capture in its own
-    way; a covariance from samples does not know that. References: [1] Efron & Stein, Ann.
-    Stat. 9 (1981), jackknife variance (K − 1)/K Σ (θ_k − mean)².
-    """
-    return np.array([_wider(found, held, one) for one in np.eye(found.sizes.size)])
-
-
-def _wider(found: Identified, held: HeldOut, gradient: Array) -> float:
-    """Standard uncertainty of a function of the parameters with this gradient [own]."""
-    return max(found.u_of(gradient), _between(held, gradient))
-
-
-def _between(held: HeldOut, gradient: Array) -> float:
-    """The same from leaving out one capture at a time; 0 where there are none to leave out."""
-    count = len(held.steps)
-    if count < 2:
-        return 0.0
-    steps = np.array(list(held.steps.values())) @ gradient
-    return math.sqrt((count - 1) / count * float(((steps - steps.mean()) ** 2).sum()))
+def known_by(around: System, held: HeldOut, own: int, sizes: Array) -> Known:
+    """The same with the parameters' `sizes` [own] given."""
+    weight = around.weights(around.spreads(around.residual))
+    matrix, penalty = around.matrix[:, :own], around.penalty[:own]
+    rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(penalty))])
+    found = identify(rows, sizes)
+    slope = matrix.T @ (weight * around.residual) + around.pull[:own]
+    steps = np.array(list(held.steps.values())).reshape(-1, own)
+    return Known(found, steps, -found.root @ (found.root.T @ slope))
 
 
 def surely_there(around: System, held: HeldOut, least: float) -> set[str]:
@@ -91,15 +103,15 @@ def surely_there(around: System, held: HeldOut, least: float) -> set[str]:
     A coast tells that there is windage though it tells no more than windage over inertia.
     """
     own = len(around.columns)
-    found = identified(around, own)
+    fit = known(around, held, own)
     values = np.array([around.around.values[c.name] for c in around.columns])
     below = [n for n, c in enumerate(around.columns) if c.name in POSITIVE and values[n] > 0.0]
     sure = set()
     for n, column in enumerate(around.columns):
-        gradients = [np.eye(own)[n], *(_over(values, n, j) for j in below if j != n)]
-        sizes = [abs(values[n]), *(abs(values[n] / values[j]) for j in below if j != n)]
-        told = (_wider(found, held, one) for one in gradients)
-        if any(size > least * u for size, u in zip(sizes, told, strict=True)):
+        over = {j: fit.u_of(_over(values, n, j), bent=True) for j in below if j != n}
+        told = [(values[n] / values[j], u) for j, u in over.items()]
+        told.append((values[n], fit.u_of(np.eye(own)[n])))
+        if any(abs(size) > least * u for size, u in told):
             sure.add(column.name)
     return sure
 
@@ -121,11 +133,10 @@ def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, 
     told by a closer look, is determined where an amplitude of its effect is.
     """
     model, own = fitted.model, own_columns(fitted.model)
-    found = identified(around, len(own))
-    spread = uncertainties(held, found)
-    u = dict(zip((c.name for c in own), spread.tolist(), strict=True))
-    told = within(_beyond(spread, around.penalty[: len(own)]), found.sizes)
-    known = dict(zip(u, told.tolist(), strict=True))
+    fit = known(around, held, len(own))
+    u = dict(zip((c.name for c in own), fit.u.tolist(), strict=True))
+    told = within(_beyond(fit.u, around.penalty[: len(own)]), fit.found.sizes)
+    sized = dict(zip(u, told.tolist(), strict=True))
     limits = limits_of(model)
     made = {}
     for c in BASE:
@@ -133,11 +144,11 @@ def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, 
             value = fitted.values[c.name]
             bound = _at(value, limits.get(c.name))
             sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
-            made[c.name] = _told(value, u[c.name], c.unit, known[c.name] and sure, bound)
+            made[c.name] = _told(value, u[c.name], c.unit, sized[c.name] and sure, bound)
     for name, (effect, p) in model.parameters().items():
         value = fitted.values[name]
         beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
-        sure = known[name] if name in u else any(known.get(one, False) for one in beside)
+        sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
         bound = not p.choice and _at(value, limits[name])
         made[name] = _told(value, u.get(name, p.u), p.unit, sure, bound)
     return made
@@ -173,7 +184,8 @@ def combinations_told(
     is told must be all there is to know far from here as well.
     """
     names = [c.name for c in around.columns[: len(own_columns(fitted.model))]]
-    found = identified(around, len(names))
+    fit = known(around, held, len(names))
+    found = fit.found
     values = np.array([fitted.values[name] for name in names])
     physical = {**dict.fromkeys(PHYSICAL), **fitted.model.parameters()}
     heard = np.any(around.matrix[:, : len(names)] != 0.0, axis=0)
@@ -187,7 +199,7 @@ def combinations_told(
         misfit = system(segments, at, before=around, chord=True).misfit
         if not abs(misfit - around.misfit) < _RISE:
             moving |= moved
-    wide = [(one, max(one.u, _between(held, one.gradient))) for one in made]
+    wide = [(one, fit.u_of(one.gradient, bent=one.product)) for one in made]
     return tuple(
         _combined(one, u, names, fitted.model)
         for one, u in wide
@@ -209,9 +221,7 @@ def _combined(one: Combination, u: float, names: Sequence[str], model: Model) ->
             tuple(weights),
         )
     (first, _), (second, factor) = weights.items()
-    sign = "+" if factor > 0.0 else "-"
-    unit = f"({units[first]})/({units[second]})"
-    words = f"{first} {sign} {abs(factor):.6g} {unit} * {second}"
+    words = f"{first} {'+' if factor > 0.0 else '-'} {abs(factor):.9g}*{second}"
     return KnownCombination(words, one.value, u, units[first], tuple(weights))
 
 

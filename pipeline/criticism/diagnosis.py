@@ -12,6 +12,7 @@ from pipeline.criticism.asked import fit_of
 from pipeline.criticism.captured import at_ambient, unexcited, unused
 from pipeline.criticism.climb import End, ended
 from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.determined import combinations_told
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.experiments import separations
 from pipeline.criticism.judge import (
@@ -29,8 +30,9 @@ from pipeline.criticism.selection import Rung, loss_without
 from pipeline.criticism.size import PAIRLESS, machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import System
+from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign
-from pipeline.records.comparison import ModelSpec
+from pipeline.records.comparison import KnownCombination, ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import (
     Diagnosis,
@@ -76,6 +78,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
     ranking = _ranking(ladder.rungs, ladder.held, offered, library, found, ladder.cut)
     unseen = not_shown(campaign, library, end)
     verdict = verdict_of(end, unseen)
+    together = combinations_told(found, last.fitted, last.around, ladder.held[-1])
     stateless = verdict == "unknown" and end.sketch is None
     return Diagnosis(
         campaign.motor_id,
@@ -91,12 +94,24 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
             *at_ambient(found, last.fitted.model),
             *told_hum(ladder.begun.hum),
             *end.notes,
+            *_together(together, last.added),
             *(note for note in ladder.cut.values() if note),
             *((_STATELESS,) if stateless else ()),
             *ladder.held[0].notes,
         ),
         unseen,
         model.effects,
+        together,
+    )
+
+
+def _together(known: Sequence[KnownCombination], added: Sequence[str]) -> tuple[str, ...]:
+    """Notes of the sizes of effects that are known over another constant alone."""
+    return tuple(
+        f"{one.expression} = {number_text(one.value, one.u, one.unit)}, of which these captures "
+        "tell no more"
+        for one in known
+        if any(name.split(".")[0] in added for name in one.of)
     )
 
 

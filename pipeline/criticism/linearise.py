@@ -28,7 +28,14 @@ from pipeline.criticism.model import (
     zero,
 )
 from pipeline.criticism.operate import operate
-from pipeline.criticism.residuals import RIPPLES, TORQUE_RIPPLES, measured, predicted, residual
+from pipeline.criticism.residuals import (
+    RIPPLES,
+    TORQUE_RIPPLES,
+    measured,
+    over_inertia,
+    predicted,
+    residual,
+)
 from pipeline.criticism.segment import RECORDER, Segment, projected, row_index
 
 _CHUNK = 8
@@ -199,6 +206,9 @@ class _Sampler:
         if column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved)
         there = predicted(self.segment, x, pieces, self.model, moved)
+        if column.name == "j_kgm2" and over_inertia(self.segment, self.segment.channels[-1]):
+            # the slope of 1/J, not of its chord: friction over inertia is known better than 1e-3
+            step *= self.values[column.name] / moved[column.name]
         return -(there - self.start) / step
 
     def _gain(self, column: Column) -> Array | None:

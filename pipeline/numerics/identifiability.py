@@ -47,36 +47,40 @@ _OTHER = 1e-3
 class Identified:
     """What rows say of p parameters.
 
-    `sizes` [p] are magnitudes at which the parameters matter, in their own units, `null` [p, k] the
-    directions without information, each of which moves some parameter by its size, and `covariance`
-    [p, p] that of everything that no such direction moves.
+    `sizes` [p] are magnitudes at which the parameters matter, in their own units. `null` [p, k] are
+    the directions without information, each of which moves some parameter by its size, and `root`
+    [p, p] is a root of the covariance, root rootᵀ, of everything that no such direction moves.
     """
 
     sizes: Array
     null: Array
-    covariance: Array
+    root: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance [p, p] of everything that no direction without information moves."""
+        return self.root @ self.root.T
 
     def u_of(self, gradient: Array) -> float:
         """Standard uncertainty of a function with this gradient [p], infinite where directions
         without information move it.
         """
-        u = self.noise_of(gradient)
+        u = self._noise_of(gradient)
         moved = float(np.linalg.norm(gradient @ self.null))
         unknown = not np.any(gradient) or moved > _TOUCHED * u
         return math.inf if unknown else u
 
-    def noise_of(self, gradient: Array) -> float:
-        """Standard uncertainty of such a function as far as directions without information do not
-        move it.
-        """
-        return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
-
-    def stays(self, gradient: Array) -> bool:
-        """Whether directions without information leave such a function, as far as columns from
-        finite differences can tell.
+    def u_of_bent(self, gradient: Array) -> float:
+        """The same for a function that is not linear, whose gradient is orthogonal to directions
+        without information as far as columns from finite differences can tell.
         """
         there = float(np.linalg.norm(gradient * self.sizes))
-        return float(np.linalg.norm(gradient @ self.null)) < _COARSE * there
+        moved = float(np.linalg.norm(gradient @ self.null))
+        return self._noise_of(gradient) if moved < _COARSE * there else math.inf
+
+    def _noise_of(self, gradient: Array) -> float:
+        # by the root: in the covariance, what two nearly tied numbers are together is lost
+        return float(np.linalg.norm(gradient @ self.root))
 
     @property
     def u(self) -> Array:
@@ -104,23 +108,21 @@ def identify(rows: Array, sizes: Array) -> Identified:
     length = np.linalg.norm(rows, axis=0)
     heard = length * sizes > _UNHEARD
     count = sizes.size
-    covariance = np.zeros((count, count))
+    root = np.zeros((count, count))
     null = [np.eye(count)[:, ~heard]]
     if heard.any():
         scale = length[heard]
         triangle = np.linalg.qr(rows[:, heard] / scale, mode="r")
         _, singular, right = np.linalg.svd(triangle, full_matrices=False)
         told = singular > _TIED * singular[0]
-        axes = right[told] / scale
-        inside = np.ix_(heard, heard)
-        covariance[inside] = (axes.T / singular[told] ** 2) @ axes
+        root[heard, : int(told.sum())] = (right[told] / scale).T / singular[told]
         # fewer rows than columns leave directions that the decomposition does not give
         tied = np.zeros((count, int(heard.sum()) - int(told.sum())))
         tied[heard] = _complement(right[told]) / (scale * sizes[heard])[:, None]
         null.append(tied)
     free = np.column_stack(null)
     axes_of_sizes, _ = np.linalg.qr(free)
-    return Identified(sizes, _one_size(axes_of_sizes) * sizes[:, None], covariance)
+    return Identified(sizes, _one_size(axes_of_sizes) * sizes[:, None], root)
 
 
 def _complement(rows: Array) -> Array:
@@ -204,7 +206,7 @@ def _product(found: Identified, values: Array, powers: dict[int, int]) -> Combin
         gradient[place] = power * values[place] ** (power - 1) * float(np.prod(rest))
     value = float(np.prod([values[n] ** w for n, w in powers.items()]))
     size = float(np.prod([(found.sizes if w > 0 else values)[n] ** w for n, w in powers.items()]))
-    u = found.noise_of(gradient) if found.stays(gradient) else math.inf
+    u = found.u_of_bent(gradient)
     return Combination(True, tuple(powers.items()), value, gradient, abs(size), u)
 
 
@@ -215,10 +217,9 @@ def _sums(found: Identified, values: Array, places: Sequence[int]) -> Iterator[C
     for one, two in combinations(places, 2):
         pair = [one, two]
         sizes = found.sizes[pair]
-        null = found.null[pair] / sizes[:, None]
-        spread = found.covariance[np.ix_(pair, pair)] / np.outer(sizes, sizes)
-        _, axes = np.linalg.eigh(null @ null.T if null.any() else spread)
-        weight = axes[:, 0] / sizes
+        open_ = found.null if found.null[pair].any() else found.root
+        axes, _, _ = np.linalg.svd(open_[pair] / sizes[:, None])
+        weight = axes[:, -1] / sizes
         if not weight.all():
             continue
         gradient = np.zeros(values.size)

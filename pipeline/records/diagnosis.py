@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from pipeline.records.comparison import KnownCombination
 from pipeline.records.error_map import ErrorMap, Histogram
 
 Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
@@ -242,6 +243,7 @@ class Diagnosis:
     """The verdict on one motor's model, with the ladder that leads to it.
 
     `asked`: effects that were asked for beside the `model`'s own; the first rung holds them.
+    `combinations` are known where their parameters, on the last rung, are not.
     """
 
     motor_id: str
@@ -255,6 +257,7 @@ class Diagnosis:
     notes: tuple[str, ...]
     unexcited: tuple[Unexcited, ...] = ()
     asked: tuple[str, ...] = ()
+    combinations: tuple[KnownCombination, ...] = ()
 
     @property
     def whole_model(self) -> str:
@@ -276,5 +279,6 @@ class Diagnosis:
             "unknown": None if self.unknown is None else self.unknown.document(),
             "remainder": [left.document() for left in self.remainder],
             "unexcited": [one.document() for one in self.unexcited],
+            "combinations": [one.document() for one in self.combinations],
             "notes": [*self.notes, *(one.words for one in self.unexcited)],
         }

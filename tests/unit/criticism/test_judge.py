@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.determined import rows_of, uncertainties
+from pipeline.criticism.determined import known_by
 from pipeline.criticism.diagnosis import _as_told
 from pipeline.criticism.judge import (
     in_common,
@@ -20,7 +20,6 @@ from pipeline.criticism.judge import (
 from pipeline.criticism.linearise import Column
 from pipeline.criticism.model import Model
 from pipeline.criticism.system import Fitted, System, own_columns, system
-from pipeline.numerics.identifiability import identify
 from tests.unit.criticism.machines import BASE, fitted, log, machine
 
 ROWS = 400
@@ -50,8 +49,7 @@ def captures(levels: list[float], seed: int = 4) -> System:
 
 
 def u(around: System) -> float:
-    found = identify(rows_of(around, 1), np.ones(1))
-    return float(uncertainties(leave_out(around, 1), found)[0])
+    return float(known_by(around, leave_out(around, 1), 1, np.ones(1)).u[0])
 
 
 def test_captures_that_agree_are_as_sure_as_their_samples():

@@ -13,7 +13,7 @@ from pipeline.criticism.climb import climbed
 from pipeline.criticism.diagnosis import _drop, _ranking
 from pipeline.criticism.judge import HeldOut
 from pipeline.criticism.linearise import Column
-from pipeline.criticism.model import Model
+from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.scores import Candidate, Score
 from pipeline.criticism.selection import Rung, _holds, _refitted, _sure, search
@@ -178,7 +178,8 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
     """Two captures, without the one or the other of which the parameters move so far."""
     plain = missing_by(torque_shaft_nm=1.0).around
     full = {f"{name}.{key}": value for key, value in values.items()}
-    fitted = Fitted(Model(machine(), (effects()[name],)), full, (), {})
+    model = Model(machine(), (effects()[name],))
+    fitted = Fitted(model, {**BASE, **zero(effects()[name], model), **full}, (), {})
     random = np.random.default_rng(4)
     around = replace(
         plain,
