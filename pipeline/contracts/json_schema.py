@@ -128,7 +128,7 @@ def _check() -> Schema:
 
 def _model() -> Schema:
     """The residual test of a datasheet: numbers where a model was fitted."""
-    quantity = _object({"value": NUMBER, "u": SPREAD, "unit": TEXT})
+    quantity = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": TEXT})
     excess = {"capture": NAME, "signal": NAME, "order": SPREAD, "floors": SPREAD, "size": SPREAD}
     return _object(
         {

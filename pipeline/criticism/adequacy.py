@@ -29,6 +29,7 @@ from pipeline.criticism.wander import wandering
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from pipeline.records.diagnosis import ToldParameter
 from pipeline.records.model_verdict import Excess, ModelVerdict
 
 _NAME = "unknown"
@@ -123,7 +124,7 @@ def _largest(begun: Begun, residual: Array) -> float:
     return math.sqrt(float(np.max(spreads, initial=0.0)))
 
 
-def _named(end: End) -> dict[str, dict[str, tuple[float, float, str]]]:
+def _named(end: End) -> dict[str, dict[str, ToldParameter]]:
     """Effects at the end of the ladder: value, standard uncertainty and unit of each parameter."""
     last, held = end.ladder.rungs[-1], end.ladder.held[-1]
     told = parameters_of(last, held)

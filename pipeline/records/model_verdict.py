@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from pipeline.records.diagnosis import ToldParameter
+
 ModelState = Literal["adequate", "missing", "unknown", "insufficient", "not_tested"]
 MODEL_REASON = "model: "
 """How a reason in `why` begins that is about the model: a person may approve in spite of it."""
@@ -57,7 +59,7 @@ class ModelVerdict:
     verdict: ModelState
     model: str = "standard"
     effects: tuple[str, ...] = ()
-    missing: Mapping[str, Mapping[str, tuple[float, float, str]]] = field(default_factory=dict)
+    missing: Mapping[str, Mapping[str, ToldParameter]] = field(default_factory=dict)
     held_out: float | None = None
     residual: float | None = None
     worst: Excess | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.physics.notation import quantity
+from pipeline.physics.notation import number_text, quantity
 from pipeline.records.model_verdict import ModelVerdict, number
 from pipeline.report.words import sentence
 
@@ -60,10 +60,7 @@ def _rows(said: ModelVerdict) -> list[tuple[str, str]]:
         rows.append(("where", f"{said.worst.description}, {size} beyond the noise"))
         rows.append(("places over their floor", str(said.over)))
     for effect, parameters in said.missing.items():
-        sizes = (
-            f"{name} {quantity(value, unit, 3)} ± {quantity(2.0 * u, unit, 2)}"
-            for name, (value, u, unit) in parameters.items()
-        )
+        sizes = (f"{name} {number_text(*told)}" for name, told in parameters.items())
         rows.append((effect.replace("_", " "), "; ".join(sizes)))
     if said.note:
         rows.append(("cannot be shown", said.note))
