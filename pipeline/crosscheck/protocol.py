@@ -18,9 +18,12 @@ class Rule:
 
     With too little to judge it returns a Check of status not_evaluated that says what is missing.
     `tests`: the captures that the check rests on, the one to repeat first when it fails first.
+    `quantities`: those of `records.agreement` that it takes for one motor's; where captures
+    disagree on one of them the check fails before it is made.
     """
 
     name: str
     check: RuleFunction
     options: Mapping[str, float] = field(default_factory=dict)
     tests: tuple[str, ...] = ()
+    quantities: tuple[str, ...] = ()

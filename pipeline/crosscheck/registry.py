@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 
+from pipeline.crosscheck.agreement import failing
 from pipeline.crosscheck.judge import not_evaluated
 from pipeline.crosscheck.protocol import Rule
 from pipeline.plugins import discover
+from pipeline.records.agreement import Disagreement
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
@@ -23,14 +25,22 @@ def rules() -> tuple[Rule, ...]:
 
 
 def check_all(
-    constants: Constants, campaign: Campaign, options: Mapping[str, Mapping[str, float]]
+    constants: Constants,
+    campaign: Campaign,
+    options: Mapping[str, Mapping[str, float]],
+    apart: Sequence[Disagreement] = (),
 ) -> tuple[Check, ...]:
     """Every check of one motor, in the order of their names.
 
-    A rule that breaks on this data has judged nothing: its check is not evaluated and says so.
+    A check that rests on a quantity in `apart` fails with the files that are of another motor: no
+    convention is told of two motors. A rule that breaks on this data has judged nothing: its check
+    is not evaluated and says so.
     """
     checks = []
     for rule in rules():
+        if concerned := [one for one in apart if one.quantity in rule.quantities]:
+            checks.append(failing(rule.name, concerned))
+            continue
         chosen = {**rule.options, **options.get(rule.name, {})}
         try:
             checks.append(_finite(rule.check(constants, campaign, chosen)))

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from pipeline.contracts.motor import agree
+from pipeline.crosscheck import agreement
 from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.verdict import verdict
+from pipeline.fit import alone
 from pipeline.fit.registry import estimators, fit_all
 from pipeline.io.code_version import code_version
 from pipeline.io.publish import canonical_json, together
+from pipeline.records.agreement import Disagreement
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.content import content_digest
@@ -60,7 +63,9 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
             recall.save()
     findings.extend(Finding(job.motor_id, "warning", *failure) for failure in failures)
     with watch.stage("crosscheck"):
-        checks = check_all(constants, campaign, job.crosscheck)
+        apart = captures_apart(campaign, job.fit)
+        findings.extend(agreement.findings(apart))
+        checks = check_all(constants, campaign, job.crosscheck, apart)
     with watch.stage("residual test"):
         recalled = None if job.key is None else ModelMemory(job, readings, version)
         model, broken = judged_model(campaign, job.model, constants, recalled)
@@ -70,6 +75,17 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     )
     files = _write(job, campaign, datasheet, evidence, (*job.findings, *findings), watch)
     return Finished(tuple(findings), files)
+
+
+def captures_apart(
+    campaign: Campaign, options: Mapping[str, Mapping[str, float]]
+) -> tuple[Disagreement, ...]:
+    """Where the captures are not of one motor; those that stand alone tell which motor is usual."""
+    for captures in (alone.repeated(campaign), campaign.captures):
+        apart = agreement.disagreements(alone.readings(campaign.motor_id, captures, options))
+        if not apart:
+            return ()
+    return apart
 
 
 def assemble(

@@ -30,8 +30,10 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
         "torque per peak q ampere over 1.5 p psi from the back-EMF",
         "coupling",
         None if pairs is None else round(pairs.number),
-        "gain of the torque, current or voltage sensor, or the time base",
+        "gain of the torque, current or voltage sensor, the time base, or captures of two motors",
     )
 
 
-RULE = Rule(NAME, check, {"allowance": 0.01}, tests=("torque_map", "open_circuit"))
+RULE = Rule(
+    NAME, check, {"allowance": 0.01}, tests=("torque_map", "open_circuit"), quantities=("p·psi",)
+)

@@ -37,4 +37,6 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     )
 
 
-RULE = Rule(NAME, check, {"allowance": 0.05}, tests=("lcr", "current_step"))
+RULE = Rule(
+    NAME, check, {"allowance": 0.05}, tests=("lcr", "current_step"), quantities=("ld_h", "lq_h")
+)

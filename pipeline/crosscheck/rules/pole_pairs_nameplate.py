@@ -43,4 +43,4 @@ def _suspect(counted: Estimate, wrong: list[int], campaign: Campaign) -> str:
     return "a gear between the shaft and the angle sensor, or another motor's nameplate"
 
 
-RULE = Rule(NAME, check, tests=("open_circuit", "hand_turn"))
+RULE = Rule(NAME, check, tests=("open_circuit", "hand_turn"), quantities=("pole_pairs",))

@@ -33,4 +33,4 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     return Check(NAME, status, words, imbalance.number, limit, "1", suspect)
 
 
-RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("resistance",))
+RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("resistance",), quantities=("r_phase_ohm",))

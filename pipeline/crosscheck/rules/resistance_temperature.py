@@ -44,4 +44,10 @@ def _missing(constants: Constants) -> str:
     return "needs a heat_run over some tens of kelvin"
 
 
-RULE = Rule(NAME, check, {"allowance": 0.05}, tests=("heat_run", "resistance"))
+RULE = Rule(
+    NAME,
+    check,
+    {"allowance": 0.05},
+    tests=("heat_run", "resistance"),
+    quantities=("r_phase_ohm",),
+)

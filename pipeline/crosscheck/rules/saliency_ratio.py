@@ -47,4 +47,10 @@ def _status(
     return "fail", "d and q exchanged: theta_elec_deg is a quarter period off"
 
 
-RULE = Rule(NAME, check, {"largest": 10.0}, tests=("current_step", "lcr"))
+RULE = Rule(
+    NAME,
+    check,
+    {"largest": 10.0},
+    tests=("current_step", "lcr"),
+    quantities=("ld_h", "lq_h"),
+)

@@ -139,4 +139,10 @@ def _expected_s(capture: Capture, ld_h: float, lq_h: float, r_phase_ohm: float) 
     return l_h / (2.0 * float(copper_resistance_ohm(r_phase_ohm, temp_degc, 25.0)))
 
 
-RULE = Rule(NAME, check, {"allowance": 0.04}, tests=("current_step", "resistance"))
+RULE = Rule(
+    NAME,
+    check,
+    {"allowance": 0.04},
+    tests=("current_step", "resistance"),
+    quantities=("ld_h", "lq_h", "r_phase_ohm"),
+)

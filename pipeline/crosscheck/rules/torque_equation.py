@@ -73,4 +73,10 @@ def _ratio(found: Mapping[str, Estimate], pairs: int, id_a: float) -> Ratio:
     return Ratio.of(ratio, propagate(terms))
 
 
-RULE = Rule(NAME, check, {"allowance": 0.02}, tests=("torque_map", "open_circuit", "current_step"))
+RULE = Rule(
+    NAME,
+    check,
+    {"allowance": 0.02},
+    tests=("torque_map", "open_circuit", "current_step"),
+    quantities=("p·psi", "ld_h", "lq_h"),
+)

@@ -42,6 +42,7 @@ Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]
 
 def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
     """The captures that hold, by path, and what was refused or doubtful."""
+    from pipeline.contracts.duplicates import once
     from pipeline.contracts.validate import validate
     from pipeline.io.ingest import read_capture
 
@@ -63,4 +64,5 @@ def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
         else:
             captures.append(capture)
             findings.extend(found)
-    return tuple(sorted(captures, key=lambda capture: capture.path)), tuple(findings)
+    single, doubles = once(sorted(captures, key=lambda capture: capture.path))
+    return single, (*findings, *doubles)
