@@ -1,83 +1,307 @@
-"""What code made a result, without asking git: a release wheel has no history."""
+"""What code made a result, without asking git: a release wheel has no history.
+
+A module's digest is made of what its source says (`syntax`) and of the digests of the modules of
+the package that it imports, by the names that it takes from them. So comments, docstrings, layout,
+the order of imports and the places of files change nothing, and code that is not imported counts as
+little. A package that a module is in counts where it holds code. A text that is the name of a
+module counts as its import; one that is the name of a package, whose plug-ins are found by it, as
+the import of all its modules; one that is the name of a folder of data beside the module counts
+every file in that. What is only for type checkers counts not at all.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
+import os
+import platform
 import re
-from collections.abc import Iterable
-from functools import cache
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import astuple
+from functools import cache, cached_property
 from pathlib import Path
+from typing import Any
 
 import pipeline
+from pipeline.io import syntax
+from pipeline.io.identity import notes_folder
+from pipeline.io.sealed import keep_sealed, read_sealed
+from pipeline.io.syntax import BY_TEXT, Import, Syntax, syntax_of
+from pipeline.plugins import outside_version
 
-# `from x import a, b` and `import x`, names in brackets over several lines; a whole parse of
-# every source would cost more than many a fit
-_HOME = rf"{pipeline.__name__}[\w.]*"
-_IMPORT = re.compile(
-    rf"^\s*(?:from ({_HOME}) import (\([^)]*\)|[^\n#]*)|import ({_HOME}))", re.MULTILINE
-)
+DISTRIBUTIONS: Mapping[str, str] = {
+    "google": "protobuf",
+    "hydra": "hydra-core",
+    "rerun": "rerun-sdk",
+    "yaml": "PyYAML",
+}
+"""Distributions that bear another name than what is imported of them."""
+OPTIONAL = ("asammdf", "h5py", "nptdms")
+"""Libraries that readers import by name, where they are installed."""
+EMPTY = syntax_of(b"", "").digest
+MOST_KEPT = 5000
+
+
+class Code:
+    """The sources of one package below `root`; what they say is kept in the file `notes`."""
+
+    def __init__(self, root: Path, notes: Path | None = None) -> None:
+        self.root = root
+        self._notes = notes
+        self._digests: dict[str, str] = {}
+        self._sources: dict[Path, tuple[bytes, Syntax]] = {}
+        self._kept = _kept(notes)
+        self._new: dict[str, Any] = {}
+
+    def digest(self, *modules: str) -> str:
+        """sha256 of what modules compute; raises LookupError where one of them is not there."""
+        found = [self._digest(module) for module in modules]
+        self._keep()
+        return _sha256(found)
+
+    def closure(self, *modules: str) -> frozenset[str]:
+        """The modules and all of the package that they import, directly or not."""
+        left, found = list(modules), set[str]()
+        while left:
+            module = left.pop()
+            if module not in found:
+                found.add(module)
+                left += [target for _, _, target in self._targets(module)]
+                left += [*self._found_by(module), *self._above(module)]
+        return frozenset(found)
+
+    def libraries(self, *modules: str) -> tuple[str, ...]:
+        """Top names of what is imported, directly or not, of other packages than Python's own."""
+        found = (self._source(module)[1].libraries for module in self.closure(*modules))
+        return tuple(sorted({name for names in found for name in names}))
+
+    def _digest(self, module: str) -> str:
+        known = self._digests.get(module)
+        if known is not None:
+            return known
+        content, own = self._source(module)
+        # stands in where a circle of imports comes back to it
+        self._digests[module] = own.digest
+        taken = {
+            (bound, name, self._digest(target)) for bound, name, target in self._targets(module)
+        }
+        plug_ins = {self._digest(found) for found in self._found_by(module)}
+        above = {self._digest(package) for package in self._above(module)}
+        digest = _sha256(
+            [
+                own.digest,
+                sorted(taken),
+                sorted(plug_ins),
+                sorted(above),
+                self._texts(module),
+                self._data(module, content),
+            ]
+        )
+        self._digests[module] = digest
+        return digest
+
+    def _targets(self, module: str) -> list[tuple[str, str, str]]:
+        """What a module takes of its package: bound to which name, which name of which module.
+
+        The package itself holds public names and the release, which no result hangs on.
+        """
+        found = []
+        for one in self._source(module)[1].imports:
+            if one.bound == BY_TEXT:
+                found.append((BY_TEXT, "", one.home))
+                continue
+            home = self._home(module, one)
+            inner = f"{home}.{one.name}"
+            if one.name and self._path(inner) is not None:
+                found.append((one.bound, "", inner))
+            elif home != self.root.name:
+                found.append((one.bound, one.name, home))
+        return [(b, n, target) for b, n, target in found if self._path(target) is not None]
+
+    def _home(self, module: str, one: Import) -> str:
+        if not one.level:
+            return one.home
+        parts = module.split(".") if self._is_package(module) else module.split(".")[:-1]
+        parts = parts[: len(parts) - one.level + 1]
+        return ".".join([*parts, *filter(None, [one.home])])
+
+    def _above(self, module: str) -> list[str]:
+        """The packages that a module is in, where they hold more than a docstring."""
+        parts = module.split(".")
+        packages = (".".join(parts[:n]) for n in range(2, len(parts)))
+        return [p for p in packages if self._source(p)[1].digest != EMPTY]
+
+    def _texts(self, module: str) -> list[str]:
+        """Texts that could name a module, but name none."""
+        named = (one for one in self._source(module)[1].imports if one.bound == BY_TEXT)
+        return sorted(one.home for one in named if self._path(one.home) is None)
+
+    def _found_by(self, module: str) -> list[str]:
+        """The modules of the packages that a module names in a text."""
+        named = (one for one in self._source(module)[1].imports if one.bound == BY_TEXT)
+        homes = sorted({f"{one.home}." for one in named if self._is_package(one.home)})
+        return [
+            name
+            for home in homes
+            for name in sorted(self._files)
+            if name.startswith(home) and "." not in name.removeprefix(home)
+        ]
+
+    def _is_package(self, module: str) -> bool:
+        path = self._path(module)
+        return path is not None and path.name == "__init__.py"
+
+    def _data(self, module: str, content: bytes) -> list[tuple[str, str]]:
+        """Name and digest of the files in folders of data beside a module that it names."""
+        home = self._files[module].parent
+        named = (f for f in self._walked[1].get(home, ()) if f'"{f.name}"'.encode() in content)
+        return sorted(
+            (file.relative_to(home).as_posix(), hashlib.sha256(file.read_bytes()).hexdigest())
+            for folder in named
+            for file in folder.rglob("*")
+            if file.is_file()
+        )
+
+    def _source(self, module: str) -> tuple[bytes, Syntax]:
+        path = self._path(module)
+        if path is None:
+            raise LookupError(f"there is no module {module} in {self.root}")
+        if path not in self._sources:
+            content = path.read_bytes()
+            self._sources[path] = content, self._syntax(content)
+        return self._sources[path]
+
+    def _syntax(self, content: bytes) -> Syntax:
+        sha256 = hashlib.sha256(content).hexdigest()
+        said = self._kept.get(sha256)
+        if said is not None:
+            digest, imports, libraries = said
+            return Syntax(digest, tuple(Import(*i) for i in imports), tuple(libraries))
+        found = syntax_of(content, self.root.name)
+        self._new[sha256] = astuple(found)
+        return found
+
+    def _keep(self) -> None:
+        """Keeps what sources say for the next start; without a place it is found out again."""
+        if self._notes is not None and self._new:
+            kept = [*self._kept.items(), *self._new.items()][-MOST_KEPT:]
+            keep_sealed(self._notes, {"form": _form(), "syntax": dict(kept)})
+        self._kept |= self._new
+        self._new = {}
+
+    def _path(self, module: str) -> Path | None:
+        """The file of a module of the package; None where the name is of none."""
+        return self._files.get(module)
+
+    @property
+    def _files(self) -> Mapping[str, Path]:
+        """Every module of the package with its file."""
+        return self._walked[0]
+
+    @cached_property
+    def _walked(self) -> tuple[Mapping[str, Path], Mapping[Path, list[Path]]]:
+        """The modules with their files, and the folders without modules by the folder above."""
+        modules: dict[str, Path] = {}
+        data: dict[Path, list[Path]] = {}
+        for folder, folders, files in os.walk(self.root):
+            place = Path(folder)
+            folders[:] = sorted(name for name in folders if name != "__pycache__")
+            home = ".".join([self.root.name, *place.relative_to(self.root).parts])
+            sources = [place / name for name in files if name.endswith(".py")]
+            for file in sources:
+                modules[home if file.stem == "__init__" else f"{home}.{file.stem}"] = file
+            if not sources:
+                data.setdefault(place.parent, []).append(place)
+                folders.clear()
+        return modules, data
+
+
+def _kept(notes: Path | None) -> dict[str, Any]:
+    """What is known of sources by the sha256 of their bytes."""
+    kept = None if notes is None else read_sealed(notes)
+    if not isinstance(kept, dict) or kept.get("form") != _form():
+        return {}
+    return dict(kept["syntax"])
 
 
 @cache
-def code_version() -> str:
-    """The release and a digest of every Python source of the package, e.g. `0.1.0+1a2b3c4d5e6f`."""
-    root = Path(pipeline.__file__).parent
-    digest = hashlib.sha256()
-    for source in sorted(root.rglob("*.py"), key=lambda path: path.relative_to(root).as_posix()):
-        digest.update(source.relative_to(root).as_posix().encode() + b"\0")
-        digest.update(source.read_bytes() + b"\0")
-    return f"{pipeline.__version__}+{digest.hexdigest()[:12]}"
+def _form() -> str:
+    """What says what sources say: this release of Python, and `syntax` as it stands."""
+    content = Path(syntax.__file__).read_bytes()
+    return f"{platform.python_version()} {hashlib.sha256(content).hexdigest()}"
+
+
+def _sha256(parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 @cache
-def rooms_digest(rooms: tuple[str, ...]) -> str:
-    """sha256 of every source of some rooms of the package."""
-    root = Path(pipeline.__file__).parent
-    return _digest(path for room in rooms for path in sorted((root / room).rglob("*.py")))
+def own_code() -> Code:
+    """The sources of this package."""
+    home = notes_folder()
+    return Code(
+        Path(pipeline.__file__).parent, None if home is None else home / "syntax" / "kept.json"
+    )
+
+
+@cache
+def code_version(*modules: str) -> str:
+    """The release and a digest of what modules of the package compute: `0.1.0+1a2b3c4d5e6f`."""
+    return f"{pipeline.__version__}+{own_code().digest(*modules)[:12]}"
 
 
 @cache
 def closure_digest(module: str) -> str:
-    """sha256 of a module's source and of all of the package that it imports, directly or not."""
-    root = Path(pipeline.__file__).parent
-    left, found = [module], set[Path]()
-    while left:
-        path = _source(root, left.pop())
-        if path is not None and path not in found:
-            found.add(path)
-            left += _imported(path)
-    return _digest(sorted(found))
+    """sha256 of what a module computes, with all of the package that it imports.
 
-
-def _digest(sources: Iterable[Path]) -> str:
-    digest = hashlib.sha256()
-    for source in sources:
-        digest.update(
-            source.relative_to(Path(pipeline.__file__).parent).as_posix().encode()
-            + b"\0"
-            + source.read_bytes()
-            + b"\0"
-        )
-    return digest.hexdigest()
-
-
-def _source(root: Path, module: str) -> Path | None:
-    """The file of a module of the package; None where the name is none."""
-    parts = module.split(".")
-    if parts[0] != pipeline.__name__:
-        return None
-    place = root.joinpath(*parts[1:])
-    for path in (place / "__init__.py", place.with_suffix(".py")):
-        if path.is_file():
-            return path
-    return None
+    Modules of other packages have one digest for all: they count in `libraries_version`.
+    """
+    return own_code().digest(*_own(module))
 
 
 @cache
-def _imported(path: Path) -> tuple[str, ...]:
-    """Names that may be modules: of every import, and of every name that is taken from one."""
-    names = []
-    for home, taken, plain in _IMPORT.findall(path.read_text(encoding="utf-8")):
-        names.append(home or plain)
-        names += [f"{home}.{name}" for name in re.findall(r"\w+", taken)]
-    return tuple(names)
+def libraries_version(*modules: str) -> str:
+    """Versions of Python, the kind of machine, of all libraries that modules import, directly or
+    not (`-` for one that is not installed), and of plug-ins of other packages.
+    """
+    names = {DISTRIBUTIONS.get(name, name) for name in own_code().libraries(*_own(*modules))}
+    versions = _versions({*names, *OPTIONAL})
+    machine = [f"python {platform.python_version()}", platform.machine()]
+    return "; ".join(filter(None, [*machine, *versions, outside_version()]))
+
+
+def _own(*modules: str) -> list[str]:
+    """Those of the modules that are of this package."""
+    return [module for module in modules if module.split(".")[0] == pipeline.__name__]
+
+
+def _versions(names: Iterable[str]) -> list[str]:
+    """`name version` of distributions, and of those that are named after them (`polars-...`)."""
+    there = installed()
+    found = []
+    for name in sorted({_plain(name) for name in names}):
+        own = [n for n in there if n == name or n.startswith(f"{name}-")]
+        found += [f"{n} {there[n]}" for n in sorted(own)] if name in there else [f"{name} -"]
+    return found
+
+
+def installed() -> dict[str, str]:
+    """The versions of all installed distributions, by name.
+
+    Read from the names of their folders, in a hundredth of the time that their metadata takes.
+    """
+    found: dict[str, str] = {}
+    for place in reversed(sys.path):
+        with suppress(OSError):
+            for folder in os.scandir(place or "."):
+                if folder.name.endswith(".dist-info"):
+                    name, _, version = folder.name.removesuffix(".dist-info").partition("-")
+                    found[_plain(name)] = version
+    return found
+
+
+def _plain(name: str) -> str:
+    """The normal form of a distribution's name (PEP 503)."""
+    return re.sub("[-_.]+", "-", name).lower()

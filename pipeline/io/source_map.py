@@ -260,7 +260,14 @@ def _layout(section: _Section) -> CsvDialect:
             raise section.fault(key, "is not one character", "write one, `tab` or `space`")
     if values["separator"] == values["decimal"]:
         raise section.fault("decimal", "is the separator too", "write two different characters")
-    return CsvDialect(**values)
+    return _readable(section, CsvDialect(**values))
+
+
+def _readable(section: _Section, layout: CsvDialect) -> CsvDialect:
+    """The layout; refuses one whose units row is among the rows."""
+    if layout.units_row and not layout.skip_after_header:
+        raise section.fault("units_row", "is not skipped", "write `skip_after_header: 1` or more")
+    return layout
 
 
 def _whole(section: _Section, key: str, default: int) -> int:

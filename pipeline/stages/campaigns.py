@@ -27,7 +27,7 @@ from pipeline.stages.fleet.looking import look_with
 from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
 
 if TYPE_CHECKING:
-    from pipeline.records.constants import Constants
+    pass
 
 
 class Gathered(NamedTuple):
@@ -92,16 +92,3 @@ def outcome_of(folder: str, found: Gathered, told: Sequence[str], *, undecided: 
         lines.append(f"note: {found.note}")
     code = first_that_applies(3 if refused else 0, 4 if undecided else 0)
     return Outcome(code, "\n".join(told), tuple(lines))
-
-
-def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Constants:
-    """Constants to start criticism from: none where a nameplate or a spin tells the pole pairs,
-    else those that are `fitted` already, or are now.
-    """
-    from pipeline.criticism.size import counted_pole_pairs
-    from pipeline.fit.registry import fit_all
-    from pipeline.records.constants import Constants
-
-    if campaign.nameplate("pole_pairs") is not None or counted_pole_pairs(campaign) is not None:
-        return Constants()
-    return fit_all(campaign, {})[0] if fitted is None else fitted

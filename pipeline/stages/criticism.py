@@ -17,7 +17,8 @@ from pipeline.records.constants import Constants
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import CompareSettings
-from pipeline.stages.campaigns import campaigns, outcome_of, start_constants
+from pipeline.stages.campaigns import campaigns, outcome_of
+from pipeline.stages.fleet.start import start_constants
 from pipeline.stages.mate import mate
 
 

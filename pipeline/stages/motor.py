@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.contracts.motor import agree
-from pipeline.crosscheck import agreement
-from pipeline.crosscheck.registry import check_all
-from pipeline.crosscheck.verdict import verdict
-from pipeline.fit import alone
-from pipeline.fit.registry import estimators, fit_all
-from pipeline.io.code_version import code_version
-from pipeline.io.publish import canonical_json, together
-from pipeline.records.agreement import Disagreement
+from pipeline.fit.registry import estimators
+from pipeline.io.publish import together
 from pipeline.records.capture import Campaign
-from pipeline.records.constants import Constants
 from pipeline.records.content import content_digest
-from pipeline.records.datasheet import CaptureReference, Check, Datasheet, Superseded
+from pipeline.records.datasheet import Datasheet, Superseded
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
-from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
-from pipeline.stages.fleet.captures import ReadTask, usable_captures
+from pipeline.stages.fleet import work
 from pipeline.stages.fleet.fits import FitMemory
 from pipeline.stages.fleet.jobs import Files, Finished, MotorJob, MotorResult
-from pipeline.stages.fleet.keeping import libraries_version, note_motor
+from pipeline.stages.fleet.keeping import note_motor
 from pipeline.stages.fleet.keys import key_of, superseding_parts, version_parts
-from pipeline.stages.fleet.model_tests import ModelMemory, judged_model
+from pipeline.stages.fleet.model_memory import ModelMemory
+from pipeline.stages.fleet.versions import datasheet_code, datasheet_libraries
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -43,97 +35,33 @@ def process_motor(job: MotorJob) -> MotorResult:
     finished = _finish(job, watch)
     if job.key is not None and not job.refused:
         note_motor(Path(job.output), job.motor_id, job.key, finished)
-    return MotorResult(job.motor_id, finished, watch.seconds)
+    return MotorResult(job.motor_id, finished, watch.seconds, lasting=not job.refused)
 
 
 def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
-    task = ReadTask(job.motor_id, job.input, job.entries, job.limits, job.gates, job.refused)
-    captures, found = usable_captures(task, watch)
-    findings = list(found)
+    captures, findings = work.read(job, watch)
     if not captures:
-        return Finished(found, ())
+        return Finished(findings, ())
     campaign = Campaign(job.motor_id, captures)
-    findings.extend(agree(campaign))
-    readings = tuple(content_digest(capture) for capture in captures)
-    version = _version(job, readings)
-    with watch.stage("fit"):
-        recall = None if job.key is None else FitMemory(job, readings, version)
-        constants, evidence, failures = fit_all(campaign, job.fit, recall)
-        if recall is not None:
-            recall.save()
-    findings.extend(Finding(job.motor_id, "warning", *failure) for failure in failures)
-    with watch.stage("crosscheck"):
-        apart = captures_apart(campaign, job.fit)
-        findings.extend(agreement.findings(apart))
-        checks = check_all(constants, campaign, job.crosscheck, apart)
-    with watch.stage("residual test"):
-        recalled = None if job.key is None else ModelMemory(job, readings, version)
-        model, broken = judged_model(campaign, job.model, constants, recalled)
-    findings.extend(broken)
-    datasheet = superseding(
-        assemble(job, campaign, readings, version, constants, checks, model), job.revoked
-    )
-    files = _write(job, campaign, datasheet, evidence, (*job.findings, *findings), watch)
-    return Finished(tuple(findings), files)
+    stamp = stamp_of(job, campaign)
+    recall = None if job.key is None else FitMemory(job, stamp)
+    verdicts = None if job.key is None else ModelMemory(job, stamp)
+    found = work.judge(job, campaign, recall, verdicts, watch)
+    if recall is not None:
+        recall.save()
+    findings = (*findings, *found.findings)
+    datasheet = superseding(work.assemble(job, campaign, found, stamp), job.revoked)
+    said = (*job.findings, *findings)
+    files = _write(job, campaign, datasheet, found.evidence, said, watch)
+    return Finished(findings, files)
 
 
-def captures_apart(
-    campaign: Campaign, options: Mapping[str, Mapping[str, float]]
-) -> tuple[Disagreement, ...]:
-    """Where the captures are not of one motor; those that stand alone tell which motor is usual."""
-    for captures in (alone.repeated(campaign), campaign.captures):
-        apart = agreement.disagreements(alone.readings(campaign.motor_id, captures, options))
-        if not apart:
-            return ()
-    return apart
-
-
-def assemble(
-    job: MotorJob,
-    campaign: Campaign,
-    readings: Sequence[str],
-    version: str,
-    constants: Constants,
-    checks: tuple[Check, ...],
-    model: ModelVerdict,
-) -> Datasheet:
-    """The datasheet of one motor; `readings` are the digests of its captures as read."""
-    references = tuple(
-        CaptureReference(
-            c.path, c.sha256, c.meta.test, c.integrity, c.meta.station, c.meta.started_at, read
-        )
-        for c, read in zip(campaign.captures, readings, strict=True)
-    )
-    chosen = constants.chosen()
-    status, why = verdict(
-        chosen, checks, references, job.required, job.release, model, campaign.motor_id
-    )
-    motor_type, lot = campaign.nameplate("motor_type"), campaign.nameplate("lot")
-    return Datasheet(
-        motor_id=campaign.motor_id,
-        motor_type=None if motor_type is None else str(motor_type),
-        lot=None if lot is None else str(lot),
-        version=version,
-        status=status,
-        why=why,
-        captures=references,
-        config_sha256=job.config_sha256,
-        code_version=code_version(),
-        constants=chosen,
-        alternatives=constants.rest(),
-        checks=checks,
-        libraries=libraries_version(),
-        model=model,
-    )
-
-
-def _version(job: MotorJob, readings: Sequence[str]) -> str:
-    """Digest of the captures as read, the configuration, the code and its libraries."""
-    return key_of(
-        version_parts(
-            code_version(), libraries_version(), [job.motor_id, *readings], job.config_sha256
-        )
-    )
+def stamp_of(job: MotorJob, campaign: Campaign) -> work.Stamp:
+    """The version of a motor's datasheet, with all that it is a digest of."""
+    readings = tuple(content_digest(capture) for capture in campaign.captures)
+    code, libraries = datasheet_code(), datasheet_libraries()
+    parts = version_parts(code, libraries, [job.motor_id, *readings], job.config_sha256)
+    return work.Stamp(key_of(parts), readings, job.config_sha256, code, libraries)
 
 
 def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
@@ -144,8 +72,7 @@ def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
     """
     known = {revocation.version: revocation for revocation in revoked}
     while (old := known.get(sheet.version)) is not None:
-        content = canonical_json(sheet.document())
-        if hashlib.sha256(content).hexdigest() == old.content_sha256:
+        if hashlib.sha256(work.content_of(sheet)).hexdigest() == old.content_sha256:
             return sheet
         place = Superseded(old.version, old.by, old.why)
         version = key_of(superseding_parts(sheet.version, place))
@@ -172,7 +99,7 @@ def _write(
             return files[-1][1]
 
         with watch.stage("datasheet"):
-            write(f"datasheets/{stem}.json", canonical_json(datasheet.document()))
+            write(f"datasheets/{stem}.json", work.content_of(datasheet))
         if job.report:
             from pipeline.report.motor_page import render_motor
 

@@ -30,7 +30,7 @@ from pipeline.settings import RunSettings, configuration_folder, result_document
 from pipeline.stages.criticism import known_effects
 from pipeline.stages.fleet.crew import Crew
 from pipeline.stages.fleet.jobs import MotorJob, MotorResult
-from pipeline.stages.fleet.keeping import Batch, Keeping, tools_version
+from pipeline.stages.fleet.keeping import Batch, Keeping
 from pipeline.stages.fleet.keys import batch_parts, key_of, motor_parts
 from pipeline.stages.fleet.looking import look_with
 from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
@@ -42,6 +42,7 @@ from pipeline.stages.fleet.publishing import (
     removed_note,
 )
 from pipeline.stages.fleet.statuses import histories_of, restated
+from pipeline.stages.fleet.versions import RUN, tools
 from pipeline.stages.options import check_options
 
 CRUMBS = ".work"
@@ -107,13 +108,15 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
     )
     with watch.stage("registry"):
         registered = _register(registry, output, results)
+        # before the statuses are read: a later decision is not in them
+        batch = _batch_key(settings, plain, found, registry)
         results, statuses = restated(output, results, histories_of(registry))
     with watch.stage("fleet"):
         datasheets = datasheets_of(output, results)
         files, removed = publish(settings, results, datasheets, findings, statuses)
         outcome = outcome_of(datasheets, findings, found, statuses, report=settings.report)
-    batch = _batch_key(settings, plain, found, registry)
-    if not died and registered.code == 0 and _revocations(registry) == revoked:
+    lasting = not died and all(result.lasting for result in results)
+    if lasting and registered.code == 0 and _revocations(registry) == revoked:
         made = (file for result in results for file in result.finished.files)
         digests = [sha256 for name, sha256 in made if name.startswith("datasheets/")]
         contents = tuple(
@@ -246,7 +249,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
 
 
 def _keyed(job: MotorJob) -> MotorJob:
-    return replace(job, key=key_of(motor_parts(tools_version(), job)))
+    return replace(job, key=key_of(motor_parts(tools(RUN), job)))
 
 
 def _batch_key(
@@ -255,7 +258,7 @@ def _batch_key(
     """Digest of all that the outcome of a batch is made from, but for where it lies."""
     commit = None if registry is None else registry.last_commit()
     keys = [job.key for job in jobs]
-    return key_of(batch_parts(tools_version(), settings, keys, found, commit))
+    return key_of(batch_parts(tools(RUN), settings, keys, found, commit))
 
 
 def _revocations(registry: Registry | None) -> Revocations:

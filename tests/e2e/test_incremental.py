@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.stages.fleet import fits, keeping
+from pipeline.stages import run
+from pipeline.stages.fleet import fits
 from pipeline.stages.fleet.crew import Crew
 
 WORDS = ("report=true", "recordings=false")
@@ -193,7 +194,7 @@ def test_a_changed_estimator_is_fitted_again_with_those_that_use_it(
             return digest(module) + (f"{number}" if module.endswith(module_end) else "")
 
         monkeypatch.setattr(fits, "closure_digest", changed)
-        monkeypatch.setattr(keeping, "code_version", lambda: f"edit {number}")
+        monkeypatch.setattr(run, "tools", lambda _: f"edit {number}")
         main(words)
 
     edit(1)

@@ -119,5 +119,5 @@ def test_what_is_kept_hangs_on_the_sources_of_outside_plug_ins(tmp_path: Path) -
     after = python(tmp_path, "-c", code).stdout
     assert after != before
     assert python(ROOT, "-c", code).stdout == "\n"
-    whole = "from pipeline.stages.fleet.keeping import libraries_version as v; print(v())"
+    whole = "from pipeline.stages.fleet.versions import datasheet_libraries as v; print(v())"
     assert after.strip() in python(tmp_path, "-c", whole).stdout

@@ -22,7 +22,7 @@ def product(campaign: Campaign, model: str) -> dict[str, Any]:
     """What `python -m pipeline diagnose` writes for a campaign."""
     from pipeline.criticism.diagnosis import diagnose
     from pipeline.records.comparison import ModelSpec
-    from pipeline.stages.campaigns import start_constants
+    from pipeline.stages.fleet.start import start_constants
 
     document: dict[str, Any] = diagnose(
         campaign, ModelSpec(model), start_constants(campaign)

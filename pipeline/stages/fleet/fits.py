@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.fit.registry import homes
-from pipeline.io.code_version import closure_digest
+from pipeline.io.code_version import closure_digest, libraries_version
 from pipeline.io.publish import write_whole
 from pipeline.records.constants import Constants
 from pipeline.records.errors import PipelineError
@@ -31,8 +31,9 @@ from pipeline.records.evidence import Evidence, Series
 from pipeline.records.naming import file_stem
 from pipeline.records.uncertainty import Contribution
 from pipeline.stages.fleet.jobs import MotorJob
-from pipeline.stages.fleet.keeping import FOLDER, libraries_version
+from pipeline.stages.fleet.keeping import FOLDER
 from pipeline.stages.fleet.keys import fit_parts, key_of
+from pipeline.stages.fleet.work import Stamp
 
 _MAX_BYTES = 2**30
 
@@ -40,16 +41,16 @@ _MAX_BYTES = 2**30
 class FitMemory:
     """The fits of one motor, kept in one file."""
 
-    def __init__(self, job: MotorJob, readings: Sequence[str], version: str) -> None:
-        """`readings` are digests of the motor's captures as read; `version` is to be made of the
-        fits: where it was revoked, what is kept from before is doubted with it.
+    def __init__(self, job: MotorJob, stamp: Stamp) -> None:
+        """`stamp` is of the datasheet to be made: where that version was revoked, what is kept from
+        before is doubted with it.
         """
         self._path = Path(job.output) / FOLDER / "fits" / f"{file_stem(job.motor_id)}.fits"
         self._kept = _load(self._path)
         self._homes = homes()
         self._used: dict[str, tuple[str, bytes, bytes]] = {}
-        self._campaign = [job.motor_id, *readings]
-        self._doubt = [revoked for revoked in job.revoked if revoked.version == version]
+        self._campaign = [job.motor_id, *stamp.readings]
+        self._doubt = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def __call__(
         self,
@@ -59,11 +60,11 @@ class FitMemory:
         fit: Callable[[], Fit],
     ) -> Fit:
         """The fit that is kept, or a new one."""
-        code = closure_digest(self._homes.get(estimator.name, estimator.fit.__module__))
+        home = self._homes.get(estimator.name, estimator.fit.__module__)
         key = key_of(
             fit_parts(
-                code,
-                libraries_version(),
+                closure_digest(home),
+                libraries_version(home),
                 self._campaign,
                 options,
                 known.estimates,

@@ -65,8 +65,12 @@ class MotorJob:
 
 @dataclass(frozen=True, slots=True)
 class MotorResult:
-    """What comes back: findings, files (none if no capture was usable) and the times taken [s]."""
+    """What comes back: findings, files (none if no capture was usable) and the times taken [s].
+
+    `lasting` is False where a file killed its reader, which it may not do again: nothing is kept.
+    """
 
     motor_id: str
     finished: Finished
     seconds: Mapping[str, float]
+    lasting: bool = True

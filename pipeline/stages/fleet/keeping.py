@@ -8,60 +8,25 @@ note names the files of the output folder with their digests, and counts only wh
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
-import platform
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pipeline.io.code_version import code_version
 from pipeline.io.guard import ReadLimits
 from pipeline.io.identity import Identities, Identity, identity, notes_folder
 from pipeline.io.sealed import keep_sealed, read_sealed
 from pipeline.io.source_map import SourceMap
 from pipeline.io.survey import Answer, Entry, Question
-from pipeline.plugins import outside_version
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
 from pipeline.stages.fleet.jobs import Files, Finished
 from pipeline.stages.fleet.keys import answer_parts, key_of
+from pipeline.stages.fleet.versions import LOOK, tools
 
 FOLDER = ".cache"
-LIBRARIES = (
-    "numpy",
-    "scipy",
-    "polars",
-    "pandera",
-    "numba",
-    "rerun-sdk",
-    "deltalake",
-    "zstandard",
-    "lz4",
-    "isal",
-    "protobuf",
-    "pyyaml",
-)
-OPTIONAL_LIBRARIES = ("h5py", "asammdf", "nptdms")
-
-
-@cache
-def libraries_version() -> str:
-    """The versions of Python, of the libraries that results hang on, and of outside plug-ins."""
-    libraries = [f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES]
-    for name in OPTIONAL_LIBRARIES:
-        with suppress(importlib.metadata.PackageNotFoundError):
-            libraries.append(f"{name} {importlib.metadata.version(name)}")
-    machine = platform.python_version(), platform.machine()
-    return "; ".join([*machine, *libraries, outside_version()])
-
-
-def tools_version() -> str:
-    """The code, with all that it runs on."""
-    return f"{code_version()}; {libraries_version()}"
 
 
 def motor_note(output: Path, motor_id: str) -> Path:
@@ -129,7 +94,7 @@ class Keeping:
         """Answers by the number of the question, for files that have not changed."""
         said = (read_sealed(self._notes / "survey.json") if self.on else None) or {}
         self._context = partial(
-            answer_parts, tools_version(), sources=sources, limits=limits, recover=recover
+            answer_parts, tools(LOOK), sources=sources, limits=limits, recover=recover
         )
         known = {}
         for number, question in enumerate(questions):
