@@ -102,6 +102,43 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
     return found
 
 
+def rounded_levels(name: str, solution: Solution) -> float:
+    """Standard uncertainty by the rounding of a voltage that drives the model as it was sampled.
+
+    What rounding leaves in the mean of a level, one error between two of the edges that move;
+    where the voltage is a supply's, its samples' weights hold it already.
+    """
+    model = solution.model
+    lever, now = _lever(name, solution), _weighted(solution, model)
+    total = 0.0
+    for k, record in enumerate(model.records):
+        wave, rounding = record.wave, record.voltage_noise.rounding
+        if wave.has_supply or rounding < 1e-9 * float(np.max(np.abs(wave.levels_v))):
+            continue
+        edges = np.flatnonzero(wave.moves.any(axis=1) & ~wave.moves.all(axis=1))
+        for cells in np.split(np.arange(wave.levels_v.size), edges):
+            levels = wave.levels_v.copy()
+            levels[cells] += rounding
+            records = list(model.records)
+            records[k] = replace(record, wave=replace(wave, levels_v=levels))
+            moved = _weighted(solution, StepModel(records)) - now
+            total += float(lever @ moved) ** 2
+    return math.sqrt(total)
+
+
+def unexplained(solution: Solution) -> dict[str, float]:
+    """Of each capture what the fit leaves of its current, rms over the span, without its noise."""
+    found, first = {}, 0
+    for record, weight in zip(solution.model.records, solution.weights, strict=True):
+        rows = slice(first, first + record.i_a.size)
+        first = rows.stop + record.i_a.size
+        left = solution.fit.residuals[rows] / weight[0]
+        noise = record.current_noise.sigma**2 / record.count
+        excess = max(float(np.mean(left**2)) - float(np.mean(noise)), 0.0)
+        found[record.capture.path] = math.sqrt(excess) / max(float(np.ptp(record.i_a)), 1e-300)
+    return found
+
+
 def birge_ratio(solution: Solution) -> float:
     """How far the captures disagree on L beyond their own scatter, at least 1.
 

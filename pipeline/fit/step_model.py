@@ -164,6 +164,15 @@ def _polynomial(terms: Array, flux: Array) -> Array:
     return value
 
 
+def _covered(time: Array) -> Array:
+    """Share of the way to its goal [m] after a time [m, in time constants].
+
+    Negative where two edges of a trial cross; so far back as to overflow no trial is worth it.
+    """
+    covered: Array = -np.expm1(-np.maximum(time, -30.0))
+    return covered
+
+
 def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
     """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0."""
     one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
@@ -265,12 +274,12 @@ class StepModel:
                 goal = goal - drop / r * np.clip(current / knee, -1.0, 1.0)
             l_d, l_q = axis_inductances(shared, flux_d, flux_q)
             here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
-            rise = SPACE * (goal - current) * -np.expm1(-0.5 * width[k] * r / here)
+            rise = SPACE * (goal - current) * _covered(0.5 * width[k] * r / here)
             l_d, l_q = axis_inductances(
                 shared, flux_d + l_d * cos_g * rise, flux_q + l_q * sin_g * rise
             )
             here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
-            step = (goal - current) * -np.expm1(-width[k] * r / here)
+            step = (goal - current) * _covered(width[k] * r / here)
             flux_d = flux_d + l_d * cos_g * SPACE * step
             flux_q = flux_q + l_q * sin_g * SPACE * step
             current = current + step

@@ -18,6 +18,7 @@ from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
 MOST_BINS = 3000
+SPIKE = 8.0
 MOST_APART = 100.0
 """Most that saliency and iron's bend together part the inductances of one rotor's steps."""
 
@@ -71,8 +72,9 @@ def read_step(capture: Capture) -> StepRecord | None:
     if pair is None or angle is None:
         raise KeyError(f"{capture.path}: pair or theta_elec_deg is not stated")
     data = pair_signals(capture, pair)
-    t, v, i = data["t_s"] - data["t_s"][:1], data["v_v"], data["i_a"]
-    noise = noise_of(i)
+    whole = ~(_spikes(data["v_v"]) | _spikes(data["i_a"]))
+    t, v, i = (data[name][whole] for name in ("t_s", "v_v", "i_a"))
+    t, noise = t - t[:1], noise_of(i)
     if t.size < 50 or float(np.ptp(i)) < 10.0 * noise.sigma:
         return None
     commanded = capture.meta.voltage_kind == "commanded"
@@ -100,6 +102,21 @@ def read_step(capture: Capture) -> StepRecord | None:
         current_noise=noise,
         voltage_noise=noise_of(v),
     )
+
+
+def _spikes(signal: Array) -> NDArray[np.bool_]:
+    """Samples [n] that stand more than `SPIKE` of the noise from the median of five around them.
+
+    A signal that rises or falls through the five is its own median, an edge too. Reference: Hampel,
+    J. Am. Stat. Assoc. 69, 1974, 383 (the median as the estimator that outliers move least).
+    """
+    if signal.size < 5:
+        return np.zeros(signal.size, dtype=bool)
+    padded = np.pad(signal, 2, mode="edge")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    noise = noise_of(signal)
+    found: NDArray[np.bool_] = np.abs(signal - middle) > SPIKE * max(noise.sigma, noise.step)
+    return found
 
 
 def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] | None:

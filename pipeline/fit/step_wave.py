@@ -149,40 +149,53 @@ def _sampled(
     With edges, each parts the two samples around it and moves between them; the rest is straight
     lines. Without, the voltage moves as a whole.
     """
+    free: list[list[int]] = []
     if groups:
         edges, means, free = _lines_and_edges(t_s, v_v, groups)
     elif timing == "held":
-        edges, means, free = np.append(t_s, t_s[-1] + period_s), v_v, []
+        edges, means = np.append(t_s, t_s[-1] + period_s), v_v
     elif timing == "centred":
         middle = 0.5 * (t_s[1:] + t_s[:-1])
-        ends = (t_s[0] - 0.5 * period_s, t_s[-1] + 0.5 * period_s)
-        edges, means, free = np.concatenate([ends[:1], middle, ends[1:]]), v_v, []
+        first, last = t_s[:1] - 0.5 * period_s, t_s[-1:] + 0.5 * period_s
+        edges, means = np.concatenate([first, middle, last]), v_v
     else:
-        edges, means, free = t_s, 0.5 * (v_v[1:] + v_v[:-1]), []
+        edges, means = t_s, 0.5 * (v_v[1:] + v_v[:-1])
     group = -(-means.size // MOST_CELLS)
-    around = [k + d for k in free for d in (-1, 0, 1)]
-    cuts = np.unique([*np.arange(0, means.size, group), *around, means.size]).astype(np.intp)
+    near = {k + d for together in free for k in together for d in (-1, 0, 1)}
+    cuts = np.array(sorted({*range(0, means.size, group), *near, means.size}), dtype=np.intp)
     areas = np.add.reduceat(means * np.diff(edges), cuts[:-1])
-    kept = edges[cuts]
-    moves = np.eye(edges.size)[cuts][:, free] if free else np.ones((cuts.size, 1))
+    moves = np.ones((cuts.size, 1))
+    if free:
+        moves = np.column_stack([np.isin(cuts, own) for own in free]).astype(np.float64)
+    kept_s = edges[cuts]
     none = np.zeros(0, dtype=np.intp)
-    return Waveform(kept, areas / np.diff(kept), moves, period_s, 0.0, none)
+    return Waveform(kept_s, areas / np.diff(kept_s), moves, period_s, 0.0, none)
 
 
-def _lines_and_edges(t_s: Array, v_v: Array, groups: list[Index]) -> tuple[Array, Array, list[int]]:
-    """Edges and means of straight lines between samples but across the jumps, and those' places."""
+def _lines_and_edges(
+    t_s: Array, v_v: Array, groups: list[Index]
+) -> tuple[Array, Array, list[list[int]]]:
+    """Edges and means of straight lines between samples, and which of the edges move together.
+
+    A jump of up to two sampling intervals is an edge between the two samples around it; a rise
+    that takes longer moves as it was sampled.
+    """
     edges, means, free = [float(t_s[0])], [], []
-    ends = {int(g[0]): int(g[-1]) + 1 for g in groups}
+    ends = {int(g[0]): int(g[-1]) + 1 for g in groups if g.size <= 2}
+    slow = {int(g[0]): g.size for g in groups if g.size > 2}
     k = 0
     while k < t_s.size - 1:
         after = ends.get(k)
+        if k in slow:
+            free.append([len(edges) - 1 + d for d in range(slow[k] + 1) if len(edges) - 1 + d > 0])
         if after is None:
             after = k + 1
             means.append(0.5 * float(v_v[k] + v_v[after]))
         else:
-            free.append(len(edges))
+            free.append([len(edges)])
             edges.append(0.5 * float(t_s[k] + t_s[after]))
             means += [float(v_v[k]), float(v_v[after])]
         edges.append(float(t_s[after]))
         k = after
-    return np.array(edges), np.array(means), free
+    last = len(edges) - 1
+    return np.array(edges), np.array(means), [[k for k in own if k < last] for own in free]

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from pipeline.fit.instruments import budget_of, unstated_note
 from pipeline.fit.protocol import Estimator, Fit
-from pipeline.fit.step_budget import birge_ratio, gains, rotor_angles
+from pipeline.fit.step_budget import (
+    birge_ratio,
+    gains,
+    rotor_angles,
+    rounded_levels,
+    unexplained,
+)
 from pipeline.fit.step_fit import AXES, Offer, Solution, between_models, offers_of, solve
 from pipeline.fit.step_model import SHARED, SPACE, Drive, StepModel, along_ramp, drive_of
 from pipeline.fit.step_record import StepRecord, disagreement, read_step
@@ -48,6 +54,11 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
         return Fit(tuple(not_identifiable(n, "H", NAME, reason) for n in GIVES))
     model = StepModel(records)
     solution = solve(model, axes)
+    limit = options["most_unexplained"]
+    bad = [f"{path} ({x:.0%})" for path, x in unexplained(solution).items() if not x <= limit]
+    if bad:
+        words = f"the current of {', '.join(bad)} is no step on a locked rotor; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, "H", NAME, words) for n in GIVES))
     used = tuple(r.capture for r in records)
     notes.append(unstated_note(used, ("voltage", "current")))
     offers = offers_of(solution, axes, solution.sigmas)
@@ -103,6 +114,8 @@ def _estimate(
     parts = [Contribution(f"scatter:{NAME}:{name}", scatter, "A")]
     between = between_models(solution, offers)
     parts.append(Contribution(f"scatter:{NAME}:saturation:{name}", between, "A"))
+    rounding = rounded_levels(name, solution)
+    parts.append(Contribution(f"scatter:{NAME}:rounding:{name}", rounding, "A"))
     parts += gains(name, solution)
     parts += rotor_angles(name, solution, math.radians(options["u_theta_elec_deg"]))
     largest = max(SPACE * r.largest_a * abs(_share(r, name)) for r in solution.model.records)
@@ -208,6 +221,8 @@ ESTIMATOR = Estimator(
     clock_powers=dict.fromkeys(GIVES, 1),
     options={
         "least_share": 0.2,
+        # Rms over the current's span: lag in iron and a warming winding leave a tenth of this.
+        "most_unexplained": 0.02,
         # A rotor that current aligned stops short by asin(friction / holding torque).
         "u_theta_elec_deg": 0.5,
     },

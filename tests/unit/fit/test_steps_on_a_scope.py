@@ -9,9 +9,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from pipeline.fit.estimators import current_step
@@ -174,15 +176,68 @@ def sagging_capacitor(t, l_ll, volts, source, edges):
     return np.where((t > edges[0]) & ~off, volts * (1.0 - loss * x), 0.0), current
 
 
-@pytest.mark.parametrize("shape", [rounded_step, sagging_capacitor])
+def ramped_supply(t, l_ll, volts, source, edges):
+    """An ideal supply whose edges take six samples, wherever they begin."""
+    del source
+    tau, width = l_ll / R, 6.0 * (t[1] - t[0])
+
+    def ramp(start):
+        x = np.maximum(t - start, 0.0)
+        return x / width, (x - tau * -np.expm1(-x / tau)) / width
+
+    up, down = (
+        [a - b for a, b in zip(ramp(edge), ramp(edge + width), strict=True)] for edge in edges
+    )
+    return volts * (up[0] - down[0]), volts / R * (up[1] - down[1])
+
+
+@pytest.mark.parametrize("shape", [rounded_step, sagging_capacitor, ramped_supply])
 def test_a_voltage_that_no_supply_makes_is_taken_as_it_was_measured(shape) -> None:
     """Sample by sample, along straight lines but for the edges, each placed by the current."""
-    record = read_step(on_a_scope("q", 12.0, 3, shape=shape))
+    record = read_step(on_a_scope("q", 12.0, 3, shape=shape, rate_hz=2e4))
     assert record is not None
     assert not record.wave.has_supply
-    found = found_in(5, shape=shape)
+    found = found_in(5, shape=shape, rate_hz=2e4)
     assert found["ld_h"].number == pytest.approx(LD, rel=1.5e-3)
     assert found["lq_h"].number == pytest.approx(LQ, rel=1.5e-3)
+
+
+def test_lq_95_per_cent_low_because_of_ten_spikes_in_the_current() -> None:
+    """Ten samples of 1,200 are 5 A high: lq read 95 % low, u a tenth of a per cent."""
+    steps = []
+    for k, (axis, volts) in enumerate([("d", 2.4), ("d", 12.0), ("q", 2.4), ("q", 12.0)]):
+        clean = on_a_scope(axis, volts, k)
+        amps = clean.tables[0]["ia_a"].to_numpy().copy()
+        amps[np.random.default_rng(k).choice(amps.size, 10, replace=False)] += 5.0
+        steps.append(
+            replace(clean, tables=(clean.tables[0].with_columns(pl.Series("ia_a", amps)),))
+        )
+    found = estimates(current_step.ESTIMATOR, *steps)
+    assert near(found["ld_h"], LD)
+    assert near(found["lq_h"], LQ)
+
+
+def test_a_current_that_no_locked_rotor_makes_gives_no_number() -> None:
+    """The rotor turns away and its back-EMF swings: ten times the noise of any step."""
+    sound = [on_a_scope(axis, 12.0, k, rate_hz=2e4) for k, axis in enumerate("dq")]
+    table = sound[1].tables[0]
+    swing = 1.5 * np.sin(2.0 * math.pi * 300.0 * table["t_s"].to_numpy())
+    turning = replace(sound[1], tables=(table.with_columns(pl.col("ia_a") + swing),))
+    found = estimates(current_step.ESTIMATOR, sound[0], turning)
+    for estimate in found.values():
+        assert estimate.status == "not_identifiable"
+        assert turning.path in estimate.note and sound[0].path not in estimate.note
+
+
+@pytest.mark.parametrize("bits", [8, 14])
+def test_rounding_of_a_voltage_taken_as_it_was_measured_is_in_u(bits: int) -> None:
+    """A capacitor's voltage at 8 bits without noise: each level is off by part of a step."""
+    found = found_in(9, shape=sagging_capacitor, bits=bits, noise=0.05, rate_hz=2e4)
+    parts = {p.source: p.u for p in found["lq_h"].budget}
+    rounding = parts.get("scatter:current_step:rounding:lq_h", 0.0)
+    expected = 1.1 * LQ / 2.0**bits / math.sqrt(6.0)
+    assert 0.2 * expected < rounding < 3.0 * expected
+    assert near(found["lq_h"], LQ)
 
 
 def test_a_rotor_half_a_degree_off_its_stated_angle() -> None:
