@@ -22,11 +22,13 @@ from pipeline.physics.suspects import (
 from pipeline.records.datasheet import Check, CheckStatus
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import (
+    METHODS,
     Budget,
     coverage_factor,
     effective_dof,
     propagate,
     standard_uncertainty,
+    without_between,
 )
 
 RESOLUTION = 5.0
@@ -46,9 +48,10 @@ class Ratio(NamedTuple):
 
 
 def ratio_of(top: Estimate, bottom: Estimate) -> Ratio:
-    """The ratio of two estimates, correlations included."""
+    """The ratio of two estimates, correlations included, without what methods disagree by."""
     ratio = top.number / bottom.number
-    terms = [(1.0 / bottom.number, top.budget), (-ratio / bottom.number, bottom.budget)]
+    upper, lower = (without_between(e.budget, METHODS) for e in (top, bottom))
+    terms = [(1.0 / bottom.number, upper), (-ratio / bottom.number, lower)]
     return Ratio.of(ratio, propagate(terms))
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.fit.agreement import reconciled
 from pipeline.fit.instruments import with_clock
 from pipeline.fit.protocol import Estimator, Fit
 from pipeline.physics.glossary import CONSTANTS, Term
@@ -90,7 +91,8 @@ def fit_all(
             result = Fit(_missing(estimator, estimator.experiment))
         found.append((estimator.rank, order, _possible(estimator, result)))
         ranked = sorted(found, key=lambda item: item[:2])
-        known = Constants(tuple(e for _, _, fit in ranked for e in fit.estimates))
+        known = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
+    known = Constants(tuple(_untorn(e) for e in known.estimates))
     evidence = tuple(e for _, _, fit in found for e in fit.evidence)
     return known, evidence, tuple(failures)
 
@@ -148,12 +150,6 @@ def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
     elif term is not None and not _in_range(estimate.number, term):
         low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
         wrong = f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}"
-    elif _torn(estimate):
-        note = (
-            f"came out as {estimate.number:.4g} {estimate.unit}, and what it rests on disagrees "
-            f"beyond use: {estimate.note}; diagnose tells what the model lacks"
-        )
-        return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
     elif term is not None and _unknown_size(estimate, term):
         wrong = (
             f"came out as {estimate.number:.3g} ± {estimate.u:.2g} {estimate.unit}, no known size"
@@ -171,6 +167,17 @@ def _beyond(estimate: Estimate, term: Term | None) -> bool:
         return False
     three = 3.0 * estimate.u
     return not any(_in_range(estimate.number + part, term) for part in (-three, 0.0, three))
+
+
+def _untorn(estimate: Estimate) -> Estimate:
+    """The estimate, or the reason why what disagrees leaves no use in it."""
+    if not estimate.known or not _torn(estimate):
+        return estimate
+    note = (
+        f"came out as {estimate.number:.4g} {estimate.unit}, and what it rests on disagrees beyond "
+        f"use: {estimate.note}; diagnose tells what the model lacks"
+    )
+    return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
 
 
 def _torn(estimate: Estimate) -> bool:

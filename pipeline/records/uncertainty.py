@@ -68,9 +68,17 @@ def standard_uncertainty(budget: Budget, kind: Kind | None = None) -> float:
     return math.sqrt(sum(part.u**2 for part in budget if kind in (None, part.kind)))
 
 
-def without_between(budget: Budget) -> Budget:
-    """The budget as it was before the scatter between equations, captures and methods joined."""
-    return tuple(part for part in budget if not part.source.startswith(BETWEEN))
+METHODS = f"{BETWEEN}methods:"
+"""Begins the source of what different methods of one constant scatter."""
+
+
+def without_between(budget: Budget, source: str = BETWEEN) -> Budget:
+    """The budget as it was before the scatter between equations, captures and methods joined.
+
+    With `METHODS` only that between methods goes: what a check must see, as a disagreement does
+    not excuse itself.
+    """
+    return tuple(part for part in budget if not part.source.startswith(source))
 
 
 def covariance(one: Budget, other: Budget) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from pipeline.fit.magnet_coefficient import magnet_coefficient
 from pipeline.fit.nuisances import allowed_for
 from pipeline.fit.operating_points import pole_pairs_of
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.fit.regimes import Disagreement, Partition, Regression, disagreement, halves, signs
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import decimated
@@ -95,8 +97,25 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
     ones = np.ones(rows.voltage_v.size)
     covariance, dof = cluster_covariance(design, found.residuals, ones, rows.cluster)
-    estimates = _estimates(rows, found, covariance, dof, (magnet, magnet_parts), chosen)
+    regression = Regression(design, rows.voltage_v, ones, rows.cluster)
+    split = partial(_partitions, rows)
+    doubts = [disagreement(regression, k, split, options["level"]) for k in range(len(GIVES))]
+    estimates = _estimates(rows, found, covariance, dof, (magnet, magnet_parts), chosen, doubts)
     return Fit(estimates, _evidence(rows, found))
+
+
+def _partitions(rows: VoltageRows, information: Array) -> list[Partition]:
+    """Regimes of the rows by speed, senses, current and capture."""
+    every = np.ones(rows.voltage_v.size, dtype=bool)
+    speed, current = rows.speed_rad_s, rows.current_a
+    files = tuple(f"in {capture.path}" for capture in rows.captures)
+    return [
+        halves("speed", np.abs(speed), "slow", "fast", information, every),
+        halves("current", np.abs(current), "small", "large", information, every),
+        signs("sense of rotation", speed, "backward", "forward", every),
+        signs("sense of torque", current, "negative", "positive", every),
+        Partition("capture", rows.capture, files),
+    ]
 
 
 def _rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | None:
@@ -246,6 +265,7 @@ def _estimates(
     dof: int,
     coefficient: tuple[float, Budget],
     chosen: Sequence[str],
+    doubts: Sequence[Disagreement | None],
 ) -> tuple[Estimate, ...]:
     magnet, magnet_parts = coefficient
 
@@ -274,7 +294,10 @@ def _estimates(
             continue
         parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof), *type_b[i]]
         parts += propagate([(float(per_alpha[i]), magnet_parts)])
-        note = "; ".join(words)
+        doubt = doubts[i]
+        parts += [] if doubt is None else [doubt.part(f"{NAME}:{name}", value)]
+        told = [] if doubt is None else [doubt.words("the value")]
+        note = "; ".join([*told, *words])
         if not all(c.has(place[name]) for c in rows.captures):
             unsure = value * per_kelvin[name] * U_UNKNOWN_K
             parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))

@@ -1,0 +1,80 @@
+"""Whether several methods find one value of a constant, and what it means for u where they do not.
+
+The same constant from a second test with other equations is the strongest check of the first. What
+both share (a gain, a torque constant) cancels in their difference; what is left is judged by the
+generalised chi-square, and what goes beyond chance belongs to the uncertainty of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.numerics.random_effects import between
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import METHODS, Contribution, covariance
+
+Array = NDArray[np.float64]
+
+# Beyond the 99 % interval. In a hundred sound comparisons one is widened for nothing.
+LEVEL = 0.01
+# A method whose u is this many times the root of the number of methods times another's tells
+# nothing of that one (Particle Data Group, Review of Particle Physics, 2024, 5.2.2, scale factors).
+PRECISE = 3.0
+# Drag at creep speed and at full speed are two quantities where friction bends.
+SPEEDS_APART = 10.0
+# One coupling: torque per ampere is 1.5 p psi at small current, whatever the motor.
+SAME = {"kt_peak_nm_a": ("kt_from_ke_nm_a",)}
+
+
+def reconciled(constants: Constants) -> Constants:
+    """The constants, each with the scatter between methods in its budget where they disagree.
+
+    A measured value is judged by the other methods that hold for like conditions and are precise
+    enough to tell something of it. What they scatter beyond chance joins its budget with k - 1
+    degrees of freedom, and its note names methods and values.
+    """
+    judged = tuple(
+        _widened(e, judges(constants, e)) if e.known and e.status == "measured" else e
+        for e in constants.estimates
+    )
+    return Constants(judged)
+
+
+def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
+    """Other methods' estimates of the same constant that can be held against this one."""
+    names = (estimate.name, *SAME.get(estimate.name, ()))
+    others: list[Estimate] = []
+    for one in (e for name in names for e in constants.all_of(name)):
+        new = one.method not in {estimate.method, *(e.method for e in others)}
+        if one.known and one.status in ("measured", "derived") and new and _alike(one, estimate):
+            others.append(one)
+    limit = PRECISE * np.sqrt(len(others) + 1.0) * estimate.u
+    return [e for e in others if e.u <= limit]
+
+
+def _alike(one: Estimate, other: Estimate) -> bool:
+    """Whether two estimates hold for speeds of one order of magnitude, as far as they say."""
+    speeds = [e.at.get("omega_mech_rad_s") for e in (one, other)]
+    known = [abs(float(s)) for s in speeds if isinstance(s, int | float) and s != 0]
+    return len(known) < 2 or max(known) <= SPEEDS_APART * min(known)
+
+
+def _widened(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
+    methods = [estimate, *others]
+    if estimate.u == 0.0 or not others:
+        return estimate
+    values = np.array([e.number for e in methods])
+    matrix = np.array([[covariance(a.budget, b.budget) for b in methods] for a in methods])
+    found = between(values, matrix, min(e.dof for e in methods))
+    if found.p_value >= LEVEL or found.sd == 0.0:
+        return estimate
+    each = ", ".join(f"{e.method} {e.number:.5g} ± {e.u:.2g}" for e in methods)
+    words = f"methods disagree beyond chance ({each} {estimate.unit})"
+    part = Contribution(f"{METHODS}{estimate.name}", found.sd, "A", found.dof)
+    note = "; ".join(w for w in (words, estimate.note) if w)
+    return replace(estimate, budget=(*estimate.budget, part), note=note)
