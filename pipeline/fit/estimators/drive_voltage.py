@@ -276,6 +276,7 @@ def _estimates(
 
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
+    moved = _moved(rows, found.coefficients[:2], magnet, chosen)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = tuple(sorted(c.path for c in rows.captures))
     words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
@@ -294,6 +295,7 @@ def _estimates(
             continue
         parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof), *type_b[i]]
         parts += propagate([(float(per_alpha[i]), magnet_parts)])
+        parts.append(Contribution(f"assumed:{NAME}:nuisances", float(moved[i]), "B"))
         doubt = doubts[i]
         parts += [] if doubt is None else [doubt.part(f"{NAME}:{name}", value)]
         told = [] if doubt is None else [doubt.words("the value")]
@@ -309,6 +311,21 @@ def _estimates(
             Estimate(name, value, _unit(name), "measured", NAME, budget_of(parts), at, paths, note)
         )
     return tuple(estimates)
+
+
+def _moved(rows: VoltageRows, values: Array, magnet: float, chosen: Sequence[str]) -> Array:
+    """How far Ke and R [2] move with one of the nuisances left out, at most.
+
+    On a free shaft q current goes with acceleration, and R with the lateness of the voltage: what
+    little parts them is also what any other error of the model follows.
+    """
+    moved = np.zeros(2)
+    for left in chosen:
+        design = _design(rows, magnet, [n for n in chosen if n != left], {})
+        moved = np.maximum(
+            moved, np.abs(linear_fit(design, rows.voltage_v).coefficients[:2] - values)
+        )
+    return moved
 
 
 def _evidence(rows: VoltageRows, found: LinearFit) -> tuple[Evidence, ...]:
