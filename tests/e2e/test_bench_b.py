@@ -22,10 +22,9 @@ ASIDE = {
         "lq_rated_h": "apparent at rated current, the truth is that at none",
     },
     "iron_eddy": {"b_visc_nm_s_rad": "drag in iron grows with speed as well"},
-    "dead_time": {},
-    "cogging": {},
 }
 """Constants that a hidden effect has no single value for, and why."""
+MECHANICAL = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
 INDUCTANCES = ("ld_h", "lq_h", "ld_rated_h", "lq_rated_h")
 
 
@@ -48,20 +47,21 @@ def motors() -> list[str]:
     return sorted(path.name for path in BENCH.iterdir() if (path / "truth.json").is_file())
 
 
+def published(folder: Path, output: Path) -> dict[str, dict[str, Any]]:
+    """Constants of each motor under a folder, by motor."""
+    words = [f"input={folder}", f"output={output}"]
+    words += [f"{key}=false" for key in ("report", "recordings", "residual_test")]
+    assert main(["run", *words]) in (0, 1)
+    sheets = [json.loads(p.read_bytes()) for p in sorted((output / "datasheets").iterdir())]
+    return {sheet["motor_id"].split("-")[-1]: sheet["constants"] for sheet in sheets}
+
+
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[Row]:
     """Every measured constant of every motor that the truth knows."""
-    output = tmp_path_factory.mktemp("bench_b")
-    words = [f"input={BENCH}", f"output={output}"]
-    words += [f"{key}=false" for key in ("report", "recordings", "residual_test")]
-    assert main(["run", *words]) in (0, 1)
-    found: list[Row] = []
-    for path in sorted((output / "datasheets").iterdir()):
-        sheet = json.loads(path.read_bytes())
-        motor = sheet["provenance"]["captures"][0]["path"].split("/")[0]
-        found += judged(motor, sheet["constants"])
-    assert {row.motor for row in found} == set(motors())
-    return found
+    found = published(BENCH, tmp_path_factory.mktemp("bench_b"))
+    assert set(found) == set(motors())
+    return [row for motor, constants in found.items() for row in judged(motor, constants)]
 
 
 def judged(motor: str, constants: dict[str, Any]) -> list[Row]:
@@ -89,22 +89,35 @@ def judge(kept: list[Row]) -> None:
     assert share >= 0.95 or chance > 0.01, "\n".join(row.words() for row in outside)
 
 
+def test_what_nobody_knows_is_in_the_uncertainty_of_inertia_and_drag(tmp_path: Path) -> None:
+    """L4: a torque of an order of 1.73 a turn. Before: J, T_c, b 3.5 % off at u 1.9 %."""
+    ((motor, constants),) = published(BENCH / "L4", tmp_path).items()
+    kept = [row for row in judged(motor, constants) if row.name in MECHANICAL]
+    assert len(kept) == 3
+    for row in kept:
+        assert row.inside, row.words()
+        assert 0.5 < abs(row.value - row.true) / row.u < 1.5
+        assert "follows neither current nor load" in constants[row.name]["note"]
+
+
+@pytest.mark.slow
 def test_95_of_100_lie_inside_their_intervals_beside_the_inductances(rows: list[Row]) -> None:
-    """R, psi, Kt, J, Tc, b, coefficients of temperature; before: 51 of 53, J, b up to z 281."""
+    """R, psi, Kt, J, T_c, b, coefficients of temperature; before, Kt of L3 at z 3.2 as well."""
     kept = [row for row in rows if not row.aside and row.name not in INDUCTANCES]
     assert len(kept) >= 45
     judge(kept)
 
 
+@pytest.mark.slow
 def test_constants_of_motors_that_hide_nothing_stay_narrow(rows: list[Row]) -> None:
     """Doubt costs nothing where there is none: the largest u of J, Tc, b stay under 2 %."""
     plain = [r for r in rows if r.motor in ("L0", "M0", "M1")]
-    names = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
-    mechanical = [row for row in plain if row.name in names]
+    mechanical = [row for row in plain if row.name in MECHANICAL]
     assert len(mechanical) == 9
     assert max(row.u / row.true for row in mechanical) < 0.02
 
 
+@pytest.mark.slow
 def test_most_constants_are_published(rows: list[Row]) -> None:
     """Nothing is bought by silence: 63 or more measured numbers of nine motors."""
     assert len(rows) >= 63
