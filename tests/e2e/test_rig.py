@@ -86,7 +86,7 @@ def test_every_check_of_a_sound_motor_holds(sheets: dict[str, dict[str, Any]]) -
     statuses = {check["name"]: check["status"] for check in sheets["P0"]["checks"]}
     assert statuses.pop("cogging_order_vs_slots") == "not_evaluated"
     assert set(statuses.values()) == {"pass"}
-    assert len(statuses) == 9
+    assert len(statuses) == 10
 
 
 def test_the_motor_with_nothing_hidden_leaves_nothing_over_the_noise(
