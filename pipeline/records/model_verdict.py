@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -85,11 +86,15 @@ class ModelVerdict:
         words += f" with {' and '.join(more)}" if more else ""
         return words + (f" without {' and '.join(less)}" if less else "")
 
-    def command(self, motor_id: str) -> str:
-        """The command that says what is missing."""
+    def command(self, motor_id: str, folder: str = "FOLDER") -> str:
+        """The command that says what is missing in the captures of a `folder`.
+
+        A datasheet does not know its folder: the same captures give the same bytes anywhere.
+        """
         effects = f" model.effects=[{','.join(self.effects)}]" if self.effects else ""
         model = "" if self.model == "standard" else f" model={self.model}"
-        return f"diagnose motor={motor_id}{model}{effects}"
+        where = f"input={shlex.quote(folder)} motor={shlex.quote(motor_id)}"
+        return f"diagnose {where}{model}{effects}"
 
     def headline(self) -> str:
         """What the test came to, in one sentence without a full stop."""

@@ -33,11 +33,13 @@ def summary(
     output: str,
     *,
     report: bool,
+    folder: str = "FOLDER",
     statuses: Mapping[str, CurrentStatus] | None = None,
 ) -> str:
     """The text for a terminal: a table of motors, the failed checks, the counts, the way in.
 
-    `statuses` are the current ones, by motor; what a datasheet says of itself without.
+    `statuses` are the current ones, by motor; what a datasheet says of itself without. `folder` is
+    where the captures lie.
     """
     now = {s.motor_id: (statuses or {}).get(s.motor_id, current_status(s)) for s in datasheets}
     lines: list[str] = []
@@ -50,11 +52,7 @@ def summary(
             for c in sheet.checks
             if c.status in ("fail", "marginal")
         ]
-    lines += [
-        f"{printable(sheet.motor_id)}: {printable(words.sentence)}; {words.command} tells more"
-        for sheet in datasheets
-        if (words := model_words(sheet.model, sheet.motor_id)).command
-    ]
+    lines += _unexplained(datasheets, folder)
     lines += [
         f"{printable(motor_id)}: {printable(line)}"
         for motor_id, current in now.items()
@@ -71,6 +69,19 @@ def summary(
     if report and datasheets:
         lines.append(f"open {output}/report/index.html")
     return "\n".join(lines)
+
+
+def _unexplained(datasheets: Sequence[Datasheet], folder: str) -> list[str]:
+    """A line on the motors whose model misses something, with the one it misses most of."""
+    told = [s for s in datasheets if s.model is not None and s.model.tested and not s.model.passed]
+    if not told:
+        return []
+    worst = max(told, key=lambda sheet: (sheet.model and sheet.model.residual) or 0.0)
+    words = model_words(worst.model, worst.motor_id, folder)
+    who = printable(worst.motor_id)
+    if len(told) > 1:
+        who = f"{len(told)} motors are not explained down to the noise, {who} least"
+    return [f"{who}: {printable(words.sentence)}; `{printable(words.command)}` tells more"]
 
 
 def nothing_usable(folder: str, *, refused: bool) -> str:

@@ -20,11 +20,14 @@ OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual 
 
 @dataclass(frozen=True, slots=True)
 class ModelWords:
-    """Verdict and residual in `short`, one sentence without a full stop, the command that tells
-    more (empty where there is none), `rows` of name and text, and a number to `sort` by.
+    """Verdict and residual in `short`, and each by itself; one sentence without a full stop; the
+    command that tells more (empty where there is none); `rows` of name and text; a number to
+    `sort` by.
     """
 
     short: str
+    verdict: str
+    floors: str
     tone: str
     sentence: str
     command: str
@@ -33,15 +36,18 @@ class ModelWords:
     passed: bool
 
 
-def model_words(model: ModelVerdict | None, motor_id: str) -> ModelWords:
+def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER") -> ModelWords:
     """What the residual test of a motor came to; None is a datasheet of before there was one."""
     said = model or OLD
-    floors = "" if said.residual is None else f", {number(said.residual)} floors"
+    verdict = said.verdict.replace("_", " ")
+    floors = "" if said.residual is None else f"{number(said.residual)} floors"
     return ModelWords(
-        short=said.verdict.replace("_", " ") + floors,
+        short=", ".join(filter(None, (verdict, floors))),
+        verdict=verdict,
+        floors=floors,
         tone=TONES[said.verdict],
         sentence=sentence(said.headline()),
-        command=said.command(motor_id) if said.tested and not said.passed else "",
+        command=said.command(motor_id, folder) if said.tested and not said.passed else "",
         rows=tuple(_rows(said)),
         sort=repr(said.residual or 0.0),
         passed=said.passed,

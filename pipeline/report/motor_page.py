@@ -85,6 +85,7 @@ def render_motor(
         key_rows=[rows[n] for n in KEY_CONSTANTS if n in rows and rows[n].reading],
         groups=[(title, [rows[n] for n in names]) for title, names in grouped(rows)],
         checks=_ordered(datasheet.checks),
+        doubted=counts["fail"] + counts["marginal"],
         check_counts=[(status, counts[status]) for status in CHECK_ORDER if counts[status]],
         check_number=check_number,
         model=model_words(datasheet.model, datasheet.motor_id),

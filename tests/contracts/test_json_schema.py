@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -16,6 +17,7 @@ from pipeline.records.datasheet import CaptureReference, Check, Datasheet
 from pipeline.records.errors import CaptureError
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.finding import Finding
+from pipeline.records.model_verdict import Excess, ModelVerdict
 from pipeline.records.uncertainty import type_a, type_b
 from pipeline.stages.schemas import build
 from tests.unit.ladders import make_diagnosis, make_map
@@ -87,6 +89,18 @@ def test_schemas_are_schemas() -> None:
         jsonschema.Draft202012Validator.check_schema(schema)
         number = schema["properties"]["schema"]["const"]
         assert number == f"{stem}/1", stem
+
+
+@pytest.mark.parametrize("worst", [None, Excess("a.mcap", "vd_v", 84, 76.0, 0.1, "V")])
+def test_a_datasheet_with_its_model_passes(datasheet: Datasheet, worst: Excess | None) -> None:
+    """One of before the residual test has none, and passes as well."""
+    found = ModelVerdict("missing", held_out=31.0, residual=76.0, worst=worst, over=1)
+    document = json.loads(canonical_json(replace(datasheet, model=found).document()))
+    assert complaints("motor-datasheet", document) == []
+    document["model"]["verdict"] = "fine"
+    assert "$.model.verdict" in complaints("motor-datasheet", document)
+    del document["model"]
+    assert complaints("motor-datasheet", document) == []
 
 
 def test_datasheet_passes(datasheet: Datasheet) -> None:

@@ -104,7 +104,9 @@ def test_a_motor_with_hidden_effects_says_where_they_show(
     model, why = sheets["P1"]["model"], sheets["P1"]["why"]
     assert (model["verdict"], model["missing"]) == ("missing", [])
     assert model["residual"] == model["worst"]["floors"] > 10.0
-    assert any(model["worst"]["capture"] in one and "`diagnose motor=" in one for one in why)
+    (said,) = [one for one in why if one.startswith("model: ")]
+    assert model["worst"]["capture"] in said
+    assert "`diagnose input=FOLDER motor=" in said
 
 
 @pytest.mark.slow

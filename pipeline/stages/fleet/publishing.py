@@ -153,7 +153,7 @@ def outcome_of(
         lines = (*lines, nothing_usable(INPUT, refused=refused))
     if found.note:
         lines = (*lines, f"note: {found.note}")
-    told = summary(datasheets, findings, OUTPUT, report=report, statuses=statuses)
+    told = summary(datasheets, findings, OUTPUT, report=report, folder=INPUT, statuses=statuses)
     return Outcome(code, told, lines)
 
 

@@ -76,7 +76,10 @@ def released_with(model: ModelVerdict, release: str = "auto") -> tuple[str, tupl
 @pytest.mark.parametrize(
     ("model", "said"),
     [
-        (OVER, "misses vd_v of drive_0.mcap by 76 noise floors and 2 more; `diagnose motor=m`"),
+        (
+            OVER,
+            "misses vd_v of drive_0.mcap by 76 noise floors and 2 more; `diagnose input=FOLDER",
+        ),
         (BELOW, "lacks an effect that shows below the noise floors; found: windage; `diagnose"),
         (NOTHING, "model: record a torque map"),
         (OFF, "was held against the captures: residual_test=false"),
