@@ -125,7 +125,7 @@ def test_notes_are_not_believed_blindly(folder: Folder) -> None:
     """Every note replaced by another of its kind, or by noise: the work is done again."""
     folder.run()
     notes = [p for p in (folder.output / ".cache").rglob("*") if p.is_file()]
-    assert len(notes) == 6
+    assert len(notes) == 8  # survey, batch, and of each motor: it, its fits, its model
     for note in notes:
         note.write_bytes(note.read_bytes().replace(b"gimbal", b"gimbol"))
     assert folder.run() == [LOOK, ONE, TWO]
