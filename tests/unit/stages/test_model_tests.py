@@ -16,7 +16,9 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Revocation
 from pipeline.records.model_verdict import Excess, ModelVerdict
 from pipeline.stages.fleet.jobs import MotorJob
-from pipeline.stages.fleet.model_tests import ModelMemory, judged_model
+from pipeline.stages.fleet.model_memory import ModelMemory
+from pipeline.stages.fleet.model_tests import judged_model
+from pipeline.stages.fleet.work import Stamp
 
 CAMPAIGN = Campaign("m", (Capture("a.csv", "0", "verified", CaptureMeta("m", "drive"), ()),))
 FOUND = ModelVerdict(
@@ -57,7 +59,7 @@ def test_a_verdict_is_kept_while_nothing_that_it_hangs_on_changes(
     def tested(of: MotorJob = job, reading: str = "r", model: ModelSpec = spec) -> int:
         before = len(made)
         known = KNOWN if reading != "other constants" else Constants()
-        memory = ModelMemory(of, [reading], "v")
+        memory = ModelMemory(of, Stamp("v", (reading,), "c" * 64, "0.1.0", ""))
         assert judged_model(CAMPAIGN, model, known, memory) == (FOUND, ())
         return len(made) - before
 
