@@ -55,9 +55,11 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
     voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, LINES_V)
     voltage = voltage or _largest(tables, ("vq_v",))
     speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
-    current = current or 1.0
     flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
-    voltage = voltage or flux * pole_pairs * speed or 1.0
+    voltage = voltage or flux * pole_pairs * speed
+    # without a winding on record the torque's own size is all there is
+    shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
+    current, voltage = current or 1.0, voltage or 1.0
     psi = voltage / (pole_pairs * speed)
     known = start.best("psi_pm_wb")
     psi = known.number if known is not None else psi
@@ -67,7 +69,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
         "voltage_v": voltage,
         "speed_rad_s": speed,
         "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
-        "torque_nm": 1.5 * pole_pairs * psi * current,
+        "torque_nm": shaft or 1.5 * pole_pairs * psi * current,
         "period_s": period,
         "flux_wb": psi,
     }

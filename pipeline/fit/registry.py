@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.fit.agreement import reconciled
 from pipeline.fit.instruments import with_clock
 from pipeline.fit.protocol import Estimator, Fit
+from pipeline.numerics.identifiability import within
 from pipeline.physics.glossary import CONSTANTS, Term
 from pipeline.plugins import PlugIn, discover
 from pipeline.records.capture import Campaign
@@ -192,8 +193,10 @@ def _torn(estimate: Estimate) -> bool:
 
 
 def _unknown_size(estimate: Estimate, term: Term) -> bool:
-    """Whether what no motor is without has a u as large as its value; a zero friction is found."""
-    return term.low is not None and term.low > 0.0 and estimate.u >= abs(estimate.number)
+    """Whether the 95 % interval of what no motor is without holds zero; zero friction is found."""
+    if term.low is None or term.low <= 0.0:
+        return False
+    return not within(np.array(estimate.u), np.array(abs(estimate.number)))
 
 
 def _in_range(value: float, term: Term) -> bool:

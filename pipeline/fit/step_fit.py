@@ -42,10 +42,14 @@ class Solution:
     scatter: Array
 
     def covariance(self) -> Array:
-        """Covariance over all parameters [k, k], zero where one was held."""
+        """Covariance over all parameters [k, k], zero where one was held, of infinite variance
+        where the steps do not determine one.
+        """
         full = np.zeros((self.free.size, self.free.size))
         where = np.flatnonzero(self.free)
         full[np.ix_(where, where)] = self.fit.covariance
+        unknown = where[~np.isfinite(self.fit.known.u)]
+        full[unknown, unknown] = np.inf
         return full
 
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_TIED = 1e-10
+TIED = 1e-10
 """Singular value, over the largest, of unit columns that are taken for tied. By judgement: exact
 ties of columns from finite differences come out at 1e-14."""
 _UNHEARD = 1e-6
@@ -114,7 +114,7 @@ def identify(rows: Array, sizes: Array) -> Identified:
         scale = length[heard]
         triangle = np.linalg.qr(rows[:, heard] / scale, mode="r")
         _, singular, right = np.linalg.svd(triangle, full_matrices=False)
-        told = singular > _TIED * singular[0]
+        told = singular > TIED * singular[0]
         root[heard, : int(told.sum())] = (right[told] / scale).T / singular[told]
         # fewer rows than columns leave directions that the decomposition does not give
         tied = np.zeros((count, int(heard.sum()) - int(told.sum())))

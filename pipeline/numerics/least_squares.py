@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.numerics.identifiability import TIED, Identified, identify
+
 Array = NDArray[np.float64]
-RANK_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +23,9 @@ class LinearFit:
     """Coefficients [k], their covariance [k, k], residuals [n] and degrees of freedom.
 
     `rank` below k means that the data do not part the coefficients; the covariance is then that
-    of the minimum-norm solution and says nothing of the missing directions. `chi2_dof` is the
-    weighted residual variance: 1 where `sigma` was right.
+    of the minimum-norm solution and says nothing of the missing directions: ask `u`. `chi2_dof`
+    is the weighted residual variance: 1 where `sigma` was right. `rows` [n, k] are the whitened
+    rows, `sizes` [k] the coefficients at which a column alone would be as large as y.
     """
 
     coefficients: Array
@@ -32,14 +34,23 @@ class LinearFit:
     dof: int
     rank: int
     chi2_dof: float
+    rows: Array
+    sizes: Array
 
     @property
     def full_rank(self) -> bool:
         """Whether every coefficient is determined."""
         return self.rank == self.coefficients.size
 
+    @property
+    def known(self) -> Identified:
+        """What the rows say of the coefficients."""
+        return identify(self.rows, self.sizes)
+
     def u(self, index: int) -> float:
-        """Standard uncertainty of one coefficient."""
+        """Standard uncertainty of one coefficient, infinite where the data do not determine it."""
+        if not (self.full_rank or math.isfinite(self.known.u[index])):
+            return math.inf
         return math.sqrt(max(float(self.covariance[index, index]), 0.0))
 
 
@@ -55,7 +66,7 @@ def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> L
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0.0] = 1.0
     left, singular, right = np.linalg.svd(rows / scale, full_matrices=False)
-    keep = singular > RANK_TOLERANCE * max(singular.max(initial=0.0), 1e-300)
+    keep = singular > TIED * max(singular.max(initial=0.0), 1e-300)
     inverse = np.where(keep, 1.0 / np.where(keep, singular, 1.0), 0.0)
     coefficients = (right.T * inverse) @ (left.T @ (y * weight)) / scale
     residuals = y - design @ coefficients
@@ -64,7 +75,9 @@ def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> L
     covariance = (right.T * inverse**2) @ right / np.outer(scale, scale)
     if sigma is None:
         covariance = covariance * chi2_dof if dof > 0 else np.full_like(covariance, math.inf)
-    return LinearFit(coefficients, covariance, residuals, dof, int(keep.sum()), chi2_dof)
+    sizes = max(float(np.linalg.norm(y * weight)), 1e-300) / scale
+    rank = int(keep.sum())
+    return LinearFit(coefficients, covariance, residuals, dof, rank, chi2_dof, rows, sizes)
 
 
 def autocorrelation_time(residuals: Array, longest: int | None = None) -> float:
@@ -93,7 +106,11 @@ def autocorrelation_time(residuals: Array, longest: int | None = None) -> float:
 
 @dataclass(frozen=True, slots=True)
 class NonlinearFit:
-    """Parameters [k] at the minimum, covariance [k, k], residuals and Jacobian there."""
+    """Parameters [k] at the minimum, covariance [k, k], residuals and Jacobian there.
+
+    The covariance is that of the minimum-norm step where the data do not part the parameters: ask
+    `u`.
+    """
 
     parameters: Array
     covariance: Array
@@ -102,9 +119,24 @@ class NonlinearFit:
     cost: float
     converged: bool
 
+    @property
+    def known(self) -> Identified:
+        """What the residuals say of the parameters, near where they are."""
+        length = np.linalg.norm(self.jacobian, axis=0)
+        one = 1.0 / np.where(length > 0.0, length, 1.0)
+        return identify(self.jacobian, np.maximum(np.abs(self.parameters), one))
+
+    def u_of(self, gradient: Array) -> float:
+        """Standard uncertainty of a function of the parameters with this gradient [k], infinite
+        where the data do not determine it.
+        """
+        if math.isinf(self.known.u_of(gradient)):
+            return math.inf
+        return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+
     def u(self, index: int) -> float:
-        """Standard uncertainty of one parameter."""
-        return math.sqrt(max(float(self.covariance[index, index]), 0.0))
+        """Standard uncertainty of one parameter, infinite where the data do not determine it."""
+        return self.u_of(np.eye(self.parameters.size)[index])
 
 
 Model = Callable[[Array], tuple[Array, Array]]

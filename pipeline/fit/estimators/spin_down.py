@@ -124,6 +124,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
             break
         found = _solve(wider, coasts, _carry(motion, wider, found.parameters, len(coasts)))
         motion = wider
+    if not np.isfinite([found.u(0), found.u(1)]).all():
+        note = f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(t.name, t.unit, NAME, note) for t in TERMS))
     return Fit(_estimates(motion, coasts, found), _evidence(motion, coasts, found))
 
 

@@ -204,7 +204,9 @@ def _two_nodes(
     halves = fit.residuals[: t.size], fit.residuals[t.size :]
     tau = max(autocorrelation_time(half) for half in halves)
     spread = fit.cost / max(fit.residuals.size - int(free.sum()), 1) * tau
-    u = math.sqrt(max(float(slope[free] @ fit.covariance @ slope[free]) * spread, 0.0))
+    u = fit.u_of(slope[free]) * math.sqrt(spread)
+    if not math.isfinite(u):
+        return None
     words = f"winding {1.0 / (a + b):.3g} s and body {1.0 / (c + d):.3g} s, two nodes"
     dof = max((fit.residuals.size - int(free.sum())) / tau, 1.0)
     covered = float(t[-1] - t[0]) * (a + b)

@@ -46,7 +46,7 @@ def test_no_estimate_with_a_number_that_is_not_finite_passes(
     [
         ("j_rotor_kgm2", 4.8e-3, 1.1e-2, "not_identifiable"),
         ("r_phase_ohm", 0.3, 0.3, "not_identifiable"),
-        ("r_phase_ohm", 0.3, 0.2, "measured"),
+        ("r_phase_ohm", 0.3, 0.15, "measured"),
         ("torque_coulomb_nm", 1e-5, 2e-5, "measured"),
         ("b_visc_nm_s_rad", 1e-6, 2e-6, "measured"),
         ("resistance_imbalance", 1e-5, 1e-4, "measured"),

@@ -217,3 +217,27 @@ def test_central_differences_are_exact_on_parabolas():
 
     jacobian = central_jacobian(function, np.array([2.0, -5.0]), np.array([0.5, 0.25]))
     assert np.allclose(jacobian, [[4.0, 3.0], [-5.0, 2.0], [0.0, 0.0]], atol=1e-12)
+
+
+def test_a_coefficient_that_no_row_tells_has_no_uncertainty_of_the_minimum_norm():
+    """Two columns that coincide and one that is told by itself."""
+    rng = np.random.default_rng(3)
+    common, alone = rng.standard_normal((2, 200))
+    fit = linear_fit(np.column_stack([common, common, alone]), common + alone, 1e-3)
+    assert [fit.u(index) for index in (0, 1)] == [np.inf, np.inf]
+    assert fit.u(2) == pytest.approx(1e-3 / np.linalg.norm(alone), rel=0.05)
+    assert np.sqrt(fit.covariance[0, 0]) < 1e-3
+
+
+def test_a_nonlinear_fit_knows_a_product_and_neither_factor():
+    t = np.linspace(0.0, 1.0, 50)
+
+    def model(p):
+        slopes = np.column_stack([p[1] * t, p[0] * t])
+        return (p[0] * p[1] * t - 6.0 * t) / 1e-3, slopes / 1e-3
+
+    fit = gauss_newton(model, np.array([1.0, 5.0]))
+    assert fit.parameters.prod() == pytest.approx(6.0)
+    assert [fit.u(0), fit.u(1)] == [np.inf, np.inf]
+    product = fit.u_of(np.array([fit.parameters[1], fit.parameters[0]]))
+    assert product == pytest.approx(1e-3 / np.linalg.norm(t), rel=1e-6)
