@@ -116,6 +116,9 @@ class RunSettings(ReadingSettings):
     )
     model: ModelSettings = field(default_factory=ModelSettings)
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
+    constants: dict[str, Any] = key(
+        {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
+    )
     gates: dict[str, Any] = key({}, "options of a gate: gates.GATE.OPTION=number")
     crosscheck: dict[str, Any] = key({}, "options of a check: crosscheck.CHECK.OPTION=number")
 

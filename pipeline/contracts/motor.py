@@ -12,6 +12,7 @@ from pipeline.contracts.rotation import shaft_angle
 from pipeline.contracts.waveform import samples_per_time_constant
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.finding import Finding
+from pipeline.records.stated import stated_constants
 
 NAMEPLATE = ("motor_type", "lot", "winding", "pole_pairs", "slots")
 CONSEQUENCE = {
@@ -30,6 +31,7 @@ def agree(campaign: Campaign) -> tuple[Finding, ...]:
     of them to say. The finding stands at the file of the smaller group and names the other.
     """
     findings = [finding for key in NAMEPLATE for finding in _contradictions(campaign, key)]
+    findings += _statements(campaign)
     findings += _one_test_only(campaign)
     findings += _cogging_directions(campaign)
     findings += _torque_signs(campaign)
@@ -60,6 +62,27 @@ def _contradictions(campaign: Campaign, key: str) -> list[Finding]:
         for value in first
         if value != usual
     ]
+
+
+def _statements(campaign: Campaign) -> list[Finding]:
+    """Captures that state one constant differently; what `records.stated` takes is named."""
+    findings = []
+    for used in stated_constants(campaign):
+        for capture in campaign.captures:
+            said = capture.meta.extra.get(used.name)
+            if said is None or capture.path in used.captures or used.name in campaign.stated:
+                continue
+            findings.append(
+                Finding(
+                    capture.path,
+                    "warning",
+                    "statement_contradiction",
+                    f"{used.name} is stated as {said}, but as {used.number:g} ± {used.u:.2g} in "
+                    f"{used.captures[0]}{_beside(len(used.captures))}, which counts",
+                    f"correct {used.name} or u_{used.name} of one of them",
+                )
+            )
+    return findings
 
 
 def _here(count: int) -> str:

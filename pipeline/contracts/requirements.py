@@ -70,7 +70,7 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
         ),
     ),
     "drive": (
-        Requirement((DQ, ("vq_v", "iq_a")), "vq_v and iq_a, with vd_v and id_a where there"),
+        Requirement((DQ, ("vq_v", "iq_a"), ("iq_a",)), "iq_a, with id_a, vd_v, vq_v where there"),
         _any("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad"),
     ),
 }

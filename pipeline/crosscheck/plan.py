@@ -249,8 +249,8 @@ def _doubt_of(name: str, estimate: Estimate | None, aims: Aims) -> tuple[DoubtKi
         return ("missing", estimate.note) if name in aims.required else None
     if not estimate.known:
         return "missing", estimate.note or "not identifiable from what is there"
-    if estimate.status == "assumed":
-        return "assumed", f"assumed, not measured ({estimate.note or estimate.method})"
+    if estimate.status in ("assumed", "stated"):
+        return "assumed", f"{estimate.status}, not measured ({estimate.note or estimate.method})"
     if estimate.at_bound:
         return "at_bound", f"its fit ended at a bound of its search, {estimate.number:.4g}"
     return _too_uncertain(name, estimate, aims)

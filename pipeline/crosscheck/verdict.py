@@ -35,8 +35,8 @@ def verdict(
         if estimate is None or not estimate.known:
             reason = "no capture of it" if estimate is None else estimate.note
             why.append(f"missing: {name} ({reason})")
-        elif estimate.status == "assumed":
-            why.append(f"assumed, not measured: {name}")
+        elif estimate.status in ("assumed", "stated"):
+            why.append(f"{estimate.status}, not measured: {name}")
         elif estimate.at_bound:
             why.append(f"at its bound: {name}")
     why += [

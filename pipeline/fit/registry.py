@@ -20,6 +20,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence
+from pipeline.records.stated import stated_constants
 from pipeline.records.uncertainty import without_between
 
 BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
@@ -69,14 +70,16 @@ def fit_all(
 ) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
     """Runs every estimator on one motor's campaign, or recalls what it gave before.
 
-    An estimator sees those constants alone that it declares to use.
+    An estimator sees those constants alone that it declares to use. Stated constants come after
+    all that is measured: they serve where nothing else is known.
 
     Returns all estimates in order of preference (rank, then dependency order), the evidence, and
     the estimators that broke on this data: their constants are then not_identifiable.
     """
     found: list[tuple[int, int, Fit]] = []
     failures: list[Failure] = []
-    known = Constants()
+    stated = stated_constants(campaign)
+    known = Constants(stated)
     for order, estimator in enumerate(estimators()):
         if campaign.of(*estimator.tests):
             chosen = {**estimator.options, **options.get(estimator.name, {})}
@@ -92,7 +95,8 @@ def fit_all(
             result = Fit(_missing(estimator, estimator.experiment))
         found.append((estimator.rank, order, _possible(estimator, result)))
         ranked = sorted(found, key=lambda item: item[:2])
-        known = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
+        measured = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
+        known = Constants((*measured.estimates, *stated))
     known = Constants(tuple(_untorn(e) for e in known.estimates))
     evidence = tuple(e for _, _, fit in found for e in fit.evidence)
     return known, evidence, tuple(failures)

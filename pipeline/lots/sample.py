@@ -76,8 +76,8 @@ def values_of(name: str, members: Iterable[Member]) -> tuple[list[Value], list[s
     values, missing = [], []
     for member in members:
         estimate = member.sheet.constants.get(name)
-        if estimate is None or estimate.value is None:
-            note = "no estimate" if estimate is None else estimate.note
+        if estimate is None or estimate.value is None or estimate.status == "stated":
+            note = "no estimate" if estimate is None else estimate.note or "stated, not measured"
             missing.append(f"{member.sheet.motor_id}: {note}")
             continue
         factor, trouble = _to_reference(name, estimate, member.sheet)

@@ -173,10 +173,14 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """All captures of one motor, of whatever day and bench, sorted by path."""
+    """All captures of one motor, of whatever day and bench, sorted by path.
+
+    `stated` are constants that the configuration states, with `u_NAME` their uncertainties.
+    """
 
     motor_id: str
     captures: tuple[Capture, ...]
+    stated: Mapping[str, float] = field(default_factory=dict)
 
     def of(self, *tests: str) -> tuple[Capture, ...]:
         """The captures of these tests, in path order."""

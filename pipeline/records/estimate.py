@@ -14,7 +14,7 @@ from pipeline.records.uncertainty import (
     standard_uncertainty,
 )
 
-Status = Literal["measured", "derived", "assumed", "not_identifiable"]
+Status = Literal["measured", "derived", "assumed", "stated", "not_identifiable"]
 Conditions = Mapping[str, float | int | str]
 MOST = 1e150
 

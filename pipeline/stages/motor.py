@@ -42,7 +42,7 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     captures, findings = work.read(job, watch)
     if not captures:
         return Finished(findings, ())
-    campaign = Campaign(job.motor_id, captures)
+    campaign = Campaign(job.motor_id, captures, job.constants)
     stamp = stamp_of(job, campaign)
     recall = None if job.key is None else FitMemory(job, stamp)
     verdicts = None if job.key is None else ModelMemory(job, stamp)

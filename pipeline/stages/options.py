@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import Any
 
+from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import UsageError
+from pipeline.records.stated import may_be_stated
 from pipeline.settings import RunSettings
 
 KINDS = {"fit": "estimator", "gates": "gate", "crosscheck": "check"}
@@ -18,9 +21,10 @@ Known = Mapping[str, Mapping[str, float]]
 
 
 def check_options(settings: RunSettings) -> None:
-    """Refuses an option of an estimator, gate or check that there is not, and a value that none
-    of them can take: neither must be silent.
+    """Refuses an option of an estimator, gate or check that there is not, a stated constant that
+    there is not, and a value that none of them can take: none must be silent.
     """
+    _check_constants(settings.constants)
     if not (settings.fit or settings.gates or settings.crosscheck):
         return
     from pipeline.contracts.registry import gates
@@ -30,6 +34,20 @@ def check_options(settings: RunSettings) -> None:
     _check("fit", settings.fit, {e.name: e.options for e in estimators()})
     _check("gates", settings.gates, {g.name: g.settings() for g in gates()})
     _check("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()})
+
+
+def _check_constants(stated: Mapping[str, Any]) -> None:
+    for key, value in stated.items():
+        name = key.removeprefix("u_")
+        if not may_be_stated(name):
+            near = get_close_matches(name, filter(may_be_stated, CONSTANTS), 3)
+            hint = f"did you mean {', '.join(near)}?" if near else "docs/glossary.md lists them"
+            raise UsageError(f"constants.{key}: no constant {name!r} can be stated", hint)
+        term, number = CONSTANTS[name], isinstance(value, (int, float)) and math.isfinite(value)
+        if not number or isinstance(value, bool) or (key != name and value < 0.0):
+            raise UsageError(f"constants.{key}={value} is no number", f"write it in {term.unit}")
+        if key != name and name not in stated:
+            raise UsageError(f"constants.{key} is of no stated constant", f"state {name} as well")
 
 
 def _check(room: str, given: Mapping[str, Any], known: Known) -> None:

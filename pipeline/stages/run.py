@@ -238,6 +238,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             recordings=settings.recordings,
             gates=settings.gates,
             fit=settings.fit,
+            constants=settings.constants,
             crosscheck=settings.crosscheck,
             model=model if settings.residual_test else None,
             findings=tuple(f for f in found.findings if f.file in {e.path for e in own}),

@@ -64,7 +64,7 @@ def _spin(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 def _rotor_frame(capture: Capture, options: Mapping[str, float]) -> Passed:
     stated, top = capture.meta.pole_pairs, _top_speed_rad_s(capture)
-    if stated is None or top == 0.0:
+    if stated is None or top == 0.0 or not capture.has("vq_v"):
         return Passed()
     found = TURN_RAD / (stated * top * _interval_s(capture))
     return _judge(capture, found, 0.0, options["frame_warn"], "in the shortest electrical period")

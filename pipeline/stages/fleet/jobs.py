@@ -46,6 +46,7 @@ class MotorJob:
     gates: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     fit: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     crosscheck: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
     model: ModelSpec | None = None
     findings: tuple[Finding, ...] = ()
     limits: ReadLimits = field(default_factory=ReadLimits)

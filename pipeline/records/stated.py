@@ -1,0 +1,62 @@
+"""Constants that somebody states: of a nameplate, a maker's datasheet, another bench."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from pipeline.physics.glossary import CONSTANTS, METADATA
+from pipeline.records.capture import Campaign
+from pipeline.records.estimate import Estimate
+from pipeline.records.parse import number
+from pipeline.records.uncertainty import type_b
+
+METHOD = "stated"
+UNSTATED_SHARE = 0.05
+"""Relative standard uncertainty of a constant that is stated without one; chosen: makers of small
+motors commonly promise their constants within 10 %, which is taken as two standard ones."""
+
+
+def may_be_stated(name: str) -> bool:
+    """Whether a key is a constant of the glossary that no other metadata key says already."""
+    return name in CONSTANTS and name not in METADATA
+
+
+def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
+    """Each stated constant as an estimate of status `stated`, by name.
+
+    `NAME` is its value and `u_NAME` its standard uncertainty, both in the constant's unit. What
+    the configuration says (`campaign.stated`) goes before what captures say; of captures that
+    differ the most frequent pair counts. Without `u_NAME` it is `UNSTATED_SHARE` of the value.
+    """
+    found = []
+    names = {key for c in campaign.captures for key in c.meta.extra} | set(campaign.stated)
+    for name in sorted(filter(may_be_stated, names)):
+        said = _said(campaign.stated, name)
+        paths: tuple[str, ...] = ()
+        if said is None:
+            pairs = {c.path: _pair(c.meta.extra, name) for c in campaign.captures}
+            counts = Counter(pair for pair in pairs.values() if pair is not None)
+            if not counts:
+                continue
+            said = max(counts, key=counts.__getitem__)
+            paths = tuple(path for path, pair in pairs.items() if pair == said)
+        found.append(_estimate(name, *said, paths))
+    return tuple(found)
+
+
+def _said(stated: Mapping[str, float], name: str) -> tuple[float, float | None] | None:
+    return (stated[name], stated.get(f"u_{name}")) if name in stated else None
+
+
+def _pair(extra: Mapping[str, str], name: str) -> tuple[float, float | None] | None:
+    value = number(extra.get(name, ""))
+    return None if value is None else (value, number(extra.get(f"u_{name}", "")))
+
+
+def _estimate(name: str, value: float, u: float | None, captures: tuple[str, ...]) -> Estimate:
+    note = "" if u is not None else f"u_{name} is not stated, taken as {UNSTATED_SHARE:.0%}"
+    spread = UNSTATED_SHARE * abs(value) if u is None else u
+    budget = type_b(f"stated:{name}", spread)
+    unit = CONSTANTS[name].unit
+    return Estimate(name, value, unit, "stated", METHOD, budget, captures=captures, note=note)
