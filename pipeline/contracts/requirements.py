@@ -12,7 +12,7 @@ from itertools import combinations
 PAIRS = ("ab", "bc", "ca")
 LINE_VOLTAGES = tuple(f"v{pair}_v" for pair in PAIRS)
 LINE_CURRENTS = ("ia_a", "ib_a", "ic_a")
-TABLES_WITHOUT_TIME = frozenset({"lcr", "flux_map"})
+TABLES_WITHOUT_TIME = frozenset({"lcr", "flux_map", "torque_table"})
 
 Alternative = tuple[str, ...]
 
@@ -69,6 +69,7 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
             "iq_a, psi_d_wb and psi_q_wb, or vq_v less the drop of iq_a at omega_mech_rad_s",
         ),
     ),
+    "torque_table": _all("iq_a", "torque_shaft_nm"),
     "drive": (
         Requirement((DQ, ("vq_v", "iq_a"), ("iq_a",)), "iq_a, with id_a, vd_v, vq_v where there"),
         _any("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad"),

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.fit.operating_points import Point
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import Contribution
 
+Array = NDArray[np.float64]
 SOURCE = "assumed:locked_angle"
 # Pairs of back-EMF harmonics that make torque ripple of the same order, 6 or 12 a cycle. A winding
 # that is sold as sinusoidal keeps the lower ones to a few per cent of the fundamental.
@@ -36,15 +38,23 @@ def angle_doubt(
     angles = np.array([p.angle_rad for p in points if p.standing])
     if not angles.size:
         return ()
-    alone = pole_pairs is None or not np.all(np.isfinite(angles))
+    u = ripple_share(angles, pole_pairs, known) * abs(kt_nm_a) * angles.size / len(points)
+    return (Contribution(SOURCE, u, "B"),)
+
+
+def ripple_share(angles_rad: Array, pole_pairs: int | None, known: Constants) -> float:
+    """Relative standard uncertainty of a torque constant over these mechanical angles [n, rad].
+
+    Angles that are not known (NaN), and any angle without pole pairs, cancel nothing.
+    """
+    alone = pole_pairs is None or not np.all(np.isfinite(angles_rad))
     parts = []
     for order, names in RIPPLES.items():
         found = [known.best(name) for name in names]
         ripple = sum(USUAL[order] if one is None else one.number for one in found)
-        share = 1.0 if alone else abs(np.mean(np.exp(1j * order * (pole_pairs or 1) * angles)))
+        share = 1.0 if alone else abs(np.mean(np.exp(1j * order * (pole_pairs or 1) * angles_rad)))
         parts.append(float(ripple * share) / np.sqrt(2.0))
-    u = abs(kt_nm_a) * float(np.hypot(*parts)) * angles.size / len(points)
-    return (Contribution(SOURCE, u, "B"),)
+    return float(np.hypot(*parts))
 
 
 def standstill_words(points: Sequence[Point], found: Sequence[Point]) -> str:

@@ -180,4 +180,5 @@ TESTS: dict[str, str] = {
     "holding_current": "rotor held at many angles, both directions",
     "flux_map": "table of currents and flux linkages",
     "drive": "everyday closed-loop log",
+    "torque_table": "static table of torque and current",
 }

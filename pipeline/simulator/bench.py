@@ -32,6 +32,7 @@ _TESTS: Mapping[str, Callable[[Session, Any], Recording]] = {
     "heat_run": standing.heat_run,
     "holding_current": standing.holding_current,
     "flux_map": standing.flux_map,
+    "torque_table": standing.torque_table,
     "drive": driven.drive,
 }
 

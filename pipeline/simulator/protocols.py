@@ -146,6 +146,21 @@ class FluxMap:
 
 
 @dataclass(frozen=True, slots=True)
+class TorqueTable:
+    """Shaft clamped to a transducer: q current stepped up and down (rated currents) at angles.
+
+    `angles` are spread evenly over one electrical cycle; seven cancel ripple of orders 6 and 12,
+    six would not. `friction` is the share of Coulomb's
+    torque that the bearings hold back from the transducer, against the sense of the last step.
+    """
+
+    levels: tuple[float, ...] = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
+    angles: int = 7
+    friction: float = 0.3
+    with_angle: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class Drive:
     """Closed-loop everyday log: random speed references with reversals, load and d steps."""
 
@@ -172,5 +187,6 @@ PROTOCOLS: dict[str, type] = {
     "heat_run": HeatRun,
     "holding_current": HoldingCurrent,
     "flux_map": FluxMap,
+    "torque_table": TorqueTable,
     "drive": Drive,
 }

@@ -274,6 +274,30 @@ def flux_map(session: Session, how: protocols.FluxMap) -> Recording:
     return Recording("flux_map", session.meta("flux_map"), (table,))
 
 
+def torque_table(session: Session, how: protocols.TorqueTable) -> Recording:
+    """Torque of a clamped shaft against q current, row by row, without a clock."""
+    from pipeline.simulator.field import torques
+
+    motor = session.motor
+    once = np.array([*how.levels, *how.levels[::-1]]) * motor.current_rated_a
+    sense = np.repeat([1.0, -1.0], len(how.levels))
+    turn = 2.0 * math.pi / motor.pole_pairs
+    at = np.repeat(turn * np.arange(how.angles) / how.angles, once.size)
+    i_q, eps = np.tile(once, how.angles), motor.pole_pairs * at
+    torque = torques(np.zeros(i_q.size), i_q, eps, motor.ambient_degc, session.plant)
+    held = how.friction * motor.torque_coulomb_nm * np.tile(sense, how.angles)
+    amps = session.instruments.current * (1.0 + session.fault("current_scale"))
+    seen = amps * i_q + session.noise(i_q.size, session.current_sigma_a)
+    table = {
+        "iq_a": to_grid(seen, session.current_step_a),
+        "torque_shaft_nm": session.torque(torque - held, np.arange(float(i_q.size))),
+        "temp_magnet_degc": np.full(i_q.size, motor.ambient_degc),
+    }
+    if how.with_angle:
+        table["theta_mech_rad"] = session.angle(at)
+    return Recording("torque_table", session.meta("torque_table"), (table,))
+
+
 def holding_current(session: Session, how: protocols.HoldingCurrent) -> Recording:
     """Current along q that holds the rotor at many angles, friction against the way it came."""
     from pipeline.simulator.field import torques

@@ -245,6 +245,13 @@ def flux_map(motor: Motor, rng: np.random.Generator) -> Capture:
     return capture_of("flux_map", columns, motor)
 
 
+def torque_table(motor: Motor, rng: np.random.Generator) -> Capture:
+    iq = np.tile(np.linspace(-motor.rated_a, motor.rated_a, 9), 4)
+    torque = 1.5 * motor.pole_pairs * motor.psi_wb * iq
+    scatter = 1e-3 * np.abs(torque).max() * rng.standard_normal(iq.size)
+    return capture_of("torque_table", {"iq_a": iq, "torque_shaft_nm": torque + scatter}, motor)
+
+
 def drive(motor: Motor, rng: np.random.Generator) -> Capture:
     t = np.arange(40000) * 1e-4
     omega = 0.8 * motor.top_rad_s * np.sin(2.0 * np.pi * t / 2.0)
@@ -268,6 +275,7 @@ TESTS = {
         holding_current,
         flux_map,
         drive,
+        torque_table,
     )
 }
 

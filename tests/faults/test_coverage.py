@@ -23,6 +23,7 @@ from tests.faults.healthy import (
     resistance,
     spin_down,
     torque_map,
+    torque_table,
     with_column,
     with_rows,
 )
@@ -188,3 +189,14 @@ def test_flux_map_of_one_line(rng: np.random.Generator) -> None:
     capture = flux_map(MOTOR, rng)
     line = with_rows(capture, column(capture, "id_a") == 0.0)
     assert refused(line).code == "current_coverage"
+
+
+def test_torque_table_of_one_current_and_of_one_sense(rng: np.random.Generator) -> None:
+    """Refused: one current gives no slope. Warned: one sense hides an offset in saturation."""
+    capture = torque_table(MOTOR, rng)
+    current = column(capture, "iq_a")
+    one = with_column(capture, "iq_a", np.full(current.size, MOTOR.rated_a))
+    assert refused(one).code == "current_coverage"
+    found = validate(with_rows(capture, current > 0.0), {})[1]
+    assert [f.code for f in found] == ["current_coverage"]
+    assert validate(capture, {})[1] == ()

@@ -151,7 +151,8 @@ def test_all_failures_at_once(rng: np.random.Generator) -> None:
         ("heat_run", "id_a"),
         ("holding_current", "iq_a"),
         ("flux_map", "psi_q_wb"),
-        ("drive", "vq_v"),
+        ("drive", "iq_a"),
+        ("torque_table", "torque_shaft_nm"),
         ("drive", "theta_mech_rad omega_mech_rad_s"),
     ],
 )

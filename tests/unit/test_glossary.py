@@ -50,7 +50,7 @@ OWN_METADATA = _words("u_rel_clock")
 
 CONTRACT_TESTS = _words("""
 resistance current_step lcr open_circuit hand_turn cogging torque_map spin_down heat_run
-holding_current flux_map drive
+holding_current flux_map drive torque_table
 """)
 
 CONTRACT_CHECKS = _words("""
@@ -58,7 +58,7 @@ kt_vs_ke saliency_ratio resistance_temperature resistance_balance pole_pairs_nam
 lcr_vs_step_inductance torque_equation cogging_order_vs_slots power_balance tau_elec_vs_l_over_r
 """)
 
-OWN_CHECKS = _words("time_base")
+OWN_CHECKS = _words("time_base stated_constants")
 """Checks beyond those of the contract."""
 
 # The longest suffixes first: `_v_s_rad` is no `_rad`.

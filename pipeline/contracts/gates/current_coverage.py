@@ -101,12 +101,25 @@ def _flux_map(capture: Capture, options: Mapping[str, float]) -> Passed:
     return Passed()
 
 
+def _torque_table(capture: Capture, options: Mapping[str, float]) -> Passed:
+    """Refuses one current only; warns of one sense only, where an offset looks like a constant."""
+    del options
+    current = _finite(capture, "iq_a")["iq_a"]
+    if np.ptp(current) <= 1e-3 * np.abs(current).max(initial=0.0):
+        raise CaptureError(CODE, "iq_a has one level only", "add rows at further currents")
+    if current.min() * current.max() >= 0.0:
+        words = "q current of one sense only: an offset of the transducer bends with saturation"
+        return Passed(findings=(warning(capture, CODE, words, "add rows of the other sense"),))
+    return Passed()
+
+
 LOOKS: dict[str, Callable[[Capture, Mapping[str, float]], Passed]] = {
     "resistance": _resistance,
     "current_step": _step,
     "torque_map": _torque_map,
     "heat_run": _heat_run,
     "flux_map": _flux_map,
+    "torque_table": _torque_table,
 }
 
 GATE = Gate(

@@ -75,6 +75,7 @@ def test_the_names_are_those_of_the_contract() -> None:
             "power_balance",
             "tau_elec_vs_l_over_r",
             "time_base",
+            "stated_constants",
         ]
     )
 
