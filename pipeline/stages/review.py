@@ -19,6 +19,7 @@ from pipeline.io.recordings.viewer import (
     free_port,
     has_screen,
     page_address,
+    require_free,
     silence,
     window,
 )
@@ -69,6 +70,9 @@ def main(settings: ReviewSettings) -> Outcome:
 def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
     """Servers run once their addresses are told; the window or the page follows the telling."""
     page, table = _ports(settings.port)
+    used = ([page] if settings.web else []) + ([table] if chosen.table else [])
+    for port in used if settings.port else []:
+        require_free(port)
     with ExitStack() as stack:
         catalogues = []
         if chosen.table:

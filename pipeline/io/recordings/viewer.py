@@ -30,6 +30,25 @@ def free_port() -> int:
     return port
 
 
+def require_free(port: int) -> None:
+    """Raises MachineError where a port of loopback cannot be served."""
+    with socket.socket() as probe:
+        # as servers bind: a connection that was just closed does not hold the port
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HERE, port))
+            probe.listen()
+        except OSError as error:
+            raise cannot_serve(port, error.strerror or str(error)) from error
+
+
+def cannot_serve(port: int, why: str) -> MachineError:
+    """The error for a port that another program has, or that is not for this user."""
+    return MachineError(
+        f"port {port} cannot be served: {why}", "name another with port=, or leave it out"
+    )
+
+
 def viewer_command(*words: str) -> list[str]:
     """The viewer's own program; the `rerun` on the path would outlive its end as a child.
 

@@ -18,7 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
-from pipeline.io.recordings.viewer import HERE, free_port, viewer_command
+from pipeline.io.recordings.viewer import HERE, cannot_serve, free_port, viewer_command
 from pipeline.records.errors import MachineError
 
 PREFIX = "/recordings/"
@@ -62,8 +62,7 @@ def page_server(
         try:
             server = PageServer(port, recordings, inner, policy(origins))
         except OSError as error:
-            what = f"port {port} cannot be served: {error.strerror}"
-            raise MachineError(what, "name another with port=, or leave it out") from error
+            raise cannot_serve(port, error.strerror or str(error)) from error
         with server:
             yield server
     finally:
