@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -24,6 +23,7 @@ from urllib.parse import unquote
 
 from pipeline.io.publish import sync_file, sync_folder
 from pipeline.io.registry_exports import one_line
+from pipeline.io.registry_stand_in import StandIn, unfit
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Event
 from pipeline.records.parse import whole
@@ -58,8 +58,6 @@ CONFIGURATION = {
     "delta.logRetentionDuration": "interval 36500 days",
 }
 APPLICATION = "registry"
-# deltalake 1.6 panics at these in a folder's path, and takes %41 for A.
-UNFIT = re.compile(r"""[\x00-\x1f\x7f"*<>\[\]\\^`{|}]|%[0-9A-Fa-f]{2}""")
 # More small files than this are merged into one, which keeps a look at the registry fast; rows,
 # old files and Delta's time travel stay.
 MOST_FILES = 32
@@ -81,11 +79,15 @@ class EventTable:
     def __init__(self, place: str, options: Mapping[str, str] | None = None) -> None:
         self.place = place
         self.options = dict(options or {})
-        if self.folder is not None and UNFIT.search(self.folder.resolve().as_posix()):
-            raise UsageError(
-                f"registry {place!r}: Delta cannot work below a folder with such a name",
-                "name another by registry=FOLDER, or none by registry=null",
-            )
+        self._stand_in: StandIn | None = None
+        if self.folder is not None and unfit(self.folder):
+            self._stand_in = StandIn(self.folder)
+            if unfit(Path(self._stand_in.place)):
+                raise UsageError(
+                    f"registry {place!r}: Delta cannot work below a folder with such a name, nor "
+                    "below that for temporary files",
+                    "set TMPDIR to a folder with a plain name, or registry=null",
+                )
         if self.folder is None and place.partition("://")[0] not in USUAL_SCHEMES:
             self._known_scheme()
 
@@ -158,6 +160,11 @@ class EventTable:
         """The folder on this machine's disk; None for an object store."""
         return None if "://" in self.place else Path(self.place)
 
+    @property
+    def _opened_at(self) -> str:
+        """Where deltalake finds the table: there, or in the folder that stands in for it."""
+        return self.place if self._stand_in is None else self._stand_in.place
+
     def missing_commits(self) -> list[int]:
         """Numbers of the commits that are missing from the log before the last one (disk only)."""
         there = self._commits()
@@ -181,7 +188,7 @@ class EventTable:
         if self.folder is not None and not self.folder.is_dir():
             return None
         try:
-            return DeltaTable(self.place, storage_options=self.options or None)
+            return DeltaTable(self._opened_at, storage_options=self.options or None)
         except TableNotFoundError:
             return None
 
@@ -200,7 +207,7 @@ class EventTable:
             if self.folder is not None:
                 self.folder.mkdir(parents=True, exist_ok=True)
             return DeltaTable.create(
-                self.place,
+                self._opened_at if self._stand_in is None else self._stand_in.create(),
                 Schema(fields),
                 mode="error",
                 name="motor datasheets",
@@ -231,7 +238,10 @@ class EventTable:
         last = rows[-1][0].sequence
         properties = CommitProperties(app_transactions=[Transaction(APPLICATION, last)])
         try:
-            write_deltalake(table, _frame(rows), mode="append", commit_properties=properties)
+            if self._stand_in is None:
+                write_deltalake(table, _frame(rows), mode="append", commit_properties=properties)
+            else:
+                self._stand_in.append(table, _frame(rows), properties)
         except DeltaError:
             return False
         return True
@@ -241,6 +251,8 @@ class EventTable:
         import polars as pl
         from deltalake.exceptions import DeltaError
 
+        if self._stand_in is not None:
+            return
         sizes = pl.DataFrame(table.get_add_actions(flatten=True))["size_bytes"].to_list()
         if sum(size < SMALL_BYTES for size in sizes) > MOST_FILES:
             with suppress(DeltaError):

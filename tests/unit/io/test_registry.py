@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +18,7 @@ from pipeline.io.registry import Registry
 from pipeline.io.registry_exports import FOLDER, place_of
 from pipeline.io.registry_table import MOST_FILES
 from pipeline.records.errors import MachineError, UsageError
-from pipeline.records.ledger import Selection, Version, newest
+from pipeline.records.ledger import Event, Selection, Version, newest
 from tests.registered import HOUR, NOON, document, version_of
 
 HOSTILE = [
@@ -127,21 +130,54 @@ def test_a_version_that_is_no_digest_is_refused(registry: Registry, version: obj
         registry.publish([document("a", 1) | {"version": version}], NOON)
 
 
-@pytest.mark.parametrize("name", ["a%41", "x[1]", "back\\slash", "star*"])
-def test_a_folder_that_delta_cannot_open_is_refused_before_any_work(
-    tmp_path: Path, name: str
+FOLDERS = (
+    *("out[1]", "a b", "50%", "100%25", "a%41", "a#b", "a?b", "m\u00fcnchen \u03a9", "it's", 'q"q'),
+    *("-lead", "line\nbreak", "tab\tt", "x{y}", "a|b", "back\\slash", "star*", "<x>", "c^d", "`t`"),
+    *("k\u00f6 pie #1 ? 100% ~", "a:b", "c=d", "$HOME", "\U0001f642"),
+)
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_folder_of_any_name_keeps_a_registry(tmp_path: Path, name: str) -> None:
+    """`out[1]` was refused: version 1.6 of deltalake panics there, at `%41` it writes elsewhere."""
+    place = tmp_path / name / "registry"
+    Registry(str(place)).publish([document("a", 1)], NOON)
+    again = Registry(str(place))
+    again.publish([document("a", 2), document("b", 1)], NOON)
+    assert revisions(again.history("a")) == [("a", 1), ("a", 2)]
+    assert again.documents(again.history("a"))[1]["motor_id"] == "a"
+    assert again.verify().faults == ()
+    assert again.verify().versions == 3
+    assert len(list((place / "_delta_log").glob("*.json"))) == 3
+    assert sorted(p.name for p in tmp_path.iterdir()) == [name]
+
+
+@pytest.mark.parametrize("name", ["out", "out[1]"])
+def test_the_slower_of_two_writers_decides_again_in_any_folder(tmp_path: Path, name: str) -> None:
+    """Both see no version; the second is told of the first's before it adds its own."""
+    place = str(tmp_path / name)
+    slow = Registry(place)
+    seen: list[int] = []
+
+    def decide(events: Sequence[Event]) -> list[Any]:
+        seen.append(len(events))
+        if len(seen) == 1:
+            Registry(place).publish([document("a", 1)], NOON)
+        return [(replace(first, sequence=len(events) + 7), None)]
+
+    Registry(place).publish([document("z", 1)], NOON)
+    first = slow._table.events()[0]  # type: ignore[index]
+    slow._table.append(decide)
+    assert seen == [1, 2]
+
+
+def test_temporary_files_below_such_a_folder_are_wrong_usage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Version 1.6 of deltalake panics there, or writes elsewhere."""
-    with pytest.raises(UsageError, match="folder"):
-        Registry(str(tmp_path / name / "registry"))
-
-
-def test_an_odd_but_possible_folder(tmp_path: Path) -> None:
-    place = tmp_path / "k\u00f6 pie #1 ? 100% ~" / "registry"
-    registry = Registry(str(place))
-    registry.publish([document("a", 1)], NOON)
-    assert registry.verify().faults == ()
-    assert (place / "_delta_log").is_dir()
+    (tmp_path / "t[1]").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "t[1]"))
+    with pytest.raises(UsageError, match="TMPDIR"):
+        Registry(str(tmp_path / "out[1]"))
 
 
 def test_times_and_numbers_survive_delta_exactly(registry: Registry, tmp_path: Path) -> None:
