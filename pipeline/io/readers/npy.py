@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.io.foreign import Reader
 from pipeline.io.raw_table import RawTable
+from pipeline.io.readers.npz import BROKEN
 from pipeline.records.errors import CaptureError
 
 REMEDY = "save it with numpy.save, a row a sample"
@@ -17,7 +18,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     """One table; objects are never unpickled. Raises CaptureError for anything else."""
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError, OverflowError, SyntaxError) as fault:
+    except BROKEN as fault:
         raise CaptureError("not_npy", f"it is no numpy array: {fault}", REMEDY) from fault
     if not isinstance(array, np.ndarray):
         raise CaptureError("not_npy", "it holds several arrays", "map it with `reader: npz`")

@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.io.foreign import Reader
 from pipeline.io.raw_table import RawTable
 from pipeline.records.errors import CaptureError
+from pipeline.records.parse import ParseError, decoded
 
 MARK = b"WPILOG"
 SCALARS = {"double": "<d", "float": "<f", "int64": "<q", "boolean": "<?"}
@@ -40,7 +41,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     try:
         entries = _entries(data)
         found = [table for entry in entries if (table := _table(entry)) is not None]
-    except (struct.error, IndexError, UnicodeDecodeError) as fault:
+    except (struct.error, IndexError, ParseError) as fault:
         raise CaptureError(
             "not_wpilog", f"its records do not add up: {fault}", "copy the log again"
         ) from fault
@@ -77,7 +78,7 @@ def _text(payload: bytes, at: int) -> tuple[str, int]:
     end = at + 4 + size
     if end > len(payload):
         raise IndexError("a name is longer than its record")
-    return payload[at + 4 : end].decode(), end
+    return decoded(payload[at + 4 : end]), end
 
 
 def _records(data: bytes, at: int) -> Iterator[tuple[int, int, bytes]]:
@@ -109,7 +110,7 @@ def _table(entry: _Entry) -> RawTable | None:
     elif entry.kind in ARRAYS:
         dtype, size = ARRAYS[entry.kind]
         width = len(entry.payloads[0]) // size
-        if any(len(one) != width * size for one in entry.payloads):
+        if not width or any(len(one) != width * size for one in entry.payloads):
             return None
         rows = np.frombuffer(b"".join(entry.payloads), dtype).reshape(-1, width)
         fields = {f"{entry.name}.{n}": rows[:, n] for n in range(width)}
