@@ -25,7 +25,6 @@ ASIDE = {
 }
 """Constants that a hidden effect has no single value for, and why."""
 MECHANICAL = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
-INDUCTANCES = ("ld_h", "lq_h", "ld_rated_h", "lq_rated_h")
 
 
 class Row(NamedTuple):
@@ -101,10 +100,10 @@ def test_what_nobody_knows_is_in_the_uncertainty_of_inertia_and_drag(tmp_path: P
 
 
 @pytest.mark.slow
-def test_95_of_100_lie_inside_their_intervals_beside_the_inductances(rows: list[Row]) -> None:
-    """R, psi, Kt, J, T_c, b, coefficients of temperature; before, Kt of L3 at z 3.2 as well."""
-    kept = [row for row in rows if not row.aside and row.name not in INDUCTANCES]
-    assert len(kept) >= 45
+def test_95_of_100_lie_inside_their_intervals(rows: list[Row]) -> None:
+    """Before: Kt of L3 1.6 % off at z 3.2, inductances at z up to 6."""
+    kept = [row for row in rows if not row.aside]
+    assert len(kept) >= 60
     judge(kept)
 
 
