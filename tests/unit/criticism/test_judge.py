@@ -65,6 +65,13 @@ def test_captures_that_disagree_are_not_surer_than_their_scatter():
     assert u(around) == pytest.approx(scatter, rel=0.3)
 
 
+def test_a_fit_that_a_bound_keeps_from_its_end_is_no_surer_than_what_is_left_to_go():
+    """Six captures agree on a step of 0.5 that is not done."""
+    around = captures([0.0] * 6)
+    held_back = replace(around, residual=around.residual + 0.5)
+    assert u(held_back) == pytest.approx(0.5, rel=0.05)
+
+
 def test_one_capture_alone_has_its_noise():
     around = captures([0.0])
     assert u(around) == pytest.approx(ROWS**-0.5, rel=0.1)
