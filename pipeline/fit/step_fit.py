@@ -153,7 +153,7 @@ def _weights(
         noises = (record.current_noise, record.voltage_noise)
         there = (np.ones(record.count.size, dtype=bool), record.level != BETWEEN)
         own = [
-            _variance(values[:, 0], record.count, noise, sigma, used)
+            row_variance(values[:, 0], record.count, noise, sigma, used)
             for values, noise, sigma, used in zip(read, noises, pair, there, strict=True)
         ]
         weights.append(
@@ -163,7 +163,7 @@ def _weights(
     return tuple(weights), tuple(shares)
 
 
-def _variance(
+def row_variance(
     read: Array, count: Array, noise: Noise, sigma: float, used: Flags
 ) -> tuple[Array, Array]:
     """Variance of the means [n] of `count` samples of a channel, and white noise's part of it."""
