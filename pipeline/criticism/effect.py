@@ -54,7 +54,8 @@ class Parameter:
     are zero. `u`: standard uncertainty, in its own unit, of a value that a closer look told.
     `usual`: what handbooks say of the material, and its standard uncertainty, in its own unit: a
     prior of every fit. `at_least`: another amplitude of the effect; if this one stays below half of
-    it, captures speak against the effect.
+    it, captures speak against the effect. `starts`: values, in multiples of `scale`, at which an
+    amplitude is tried too, since the residual bends too far from zero for its tangent.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Parameter:
     u: float = 0.0
     at_least: str = ""
     usual: tuple[float, float] | None = None
+    starts: tuple[float, ...] = ()
 
     @property
     def amplitude(self) -> bool:
@@ -244,7 +246,8 @@ class Recorded:
 
     `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument` tells the
     instruments of one bench apart (`drive` or `bench`), `phase` (0, 1, 2) whose line current a
-    two-terminal test recorded.
+    two-terminal test recorded. `ahead`(delay): what current and torque are so much later [s], less
+    what they are now, from the whole log; without it, from these samples.
     """
 
     i_a: Complex
@@ -255,6 +258,31 @@ class Recorded:
     inverter: bool
     instrument: str
     phase: int | None = None
+    ahead: Callable[[float], tuple[Complex, Array]] | None = None
+
+    def later(self, delay_s: float) -> tuple[Complex, Array]:
+        """Current [n, A] and torque [n, N·m] as they are recorded `delay_s` later."""
+        if self.ahead is not None:
+            current, torque = self.ahead(delay_s)
+            return self.i_a + current, self.torque_nm + torque
+        at: Array = np.arange(self.torque_nm.size, dtype=np.float64) + delay_s / self.ts_s
+        return between(self.i_a, at), between(self.torque_nm, at)
+
+
+def between(signal: Any, at: Array) -> Any:
+    """A signal [N] at places [n] between its samples, its ends held.
+
+    Through two samples by a cubic whose slopes there are the central differences. Reference:
+    Catmull & Rom (1974), A class of local interpolating splines.
+    """
+    place = np.clip(at, 0.0, signal.size - 1.0)
+    first = np.minimum(place.astype(np.int64), max(signal.size - 2, 0))
+    part = place - first
+    near = [signal[np.clip(first + k, 0, signal.size - 1)] for k in (-1, 0, 1, 2)]
+    before, here, there, after = near
+    bend = 2.0 * before - 5.0 * here + 4.0 * there - after
+    twist = 3.0 * (here - there) + after - before
+    return here + 0.5 * part * (there - before + part * (bend + part * twist))
 
 
 Values = Mapping[str, float]

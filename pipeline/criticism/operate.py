@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.effect import Array, Complex, Machine, Operating, Recorded, Values
+from pipeline.criticism.effect import (
+    Array,
+    Complex,
+    Machine,
+    Operating,
+    Recorded,
+    Values,
+    between,
+)
 from pipeline.criticism.model import Model, clock_gain, values_of
 from pipeline.criticism.segment import RECORDER, Segment, slow_orders
 from pipeline.criticism.traces import smoothed
@@ -179,11 +187,40 @@ def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> R
         ts_s=segment.ts_s,
         inverter=True,
         instrument=segment.instrument,
+        ahead=ahead_in(segment, signals),
     )
 
 
+def ahead_in(
+    segment: Segment, signals: Mapping[str, Array]
+) -> Callable[[float], tuple[Complex, Array]] | None:
+    """What currents and torque are later in the whole log of a segment, less what they are now;
+    None where nothing was thinned. The segment is on its true clock.
+    """
+    log, rows = segment.log, segment.recorded.get("t_s")
+    if not log or rows is None:
+        return None
+    period = float(rows[1] - rows[0])
+    at = np.rint(rows / period)
+
+    def ahead(delay_s: float) -> tuple[Complex, Array]:
+        later = at + delay_s / segment.ts_s
+        change = {
+            name: between(column, later) - between(column, at) for name, column in log.items()
+        }
+        zero = np.zeros(at.size)
+        current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)
+        return current, change.get("torque_shaft_nm", zero)
+
+    return ahead if at.size == next(iter(signals.values())).size else None
+
+
 def _true_current(recorded: Recorded, model: Model, values: Values) -> Complex:
-    recorded = replace(recorded, i_a=recorded.i_a / (1.0 + values["gain_current"]))
+    gain = 1.0 + values["gain_current"]
+    ahead = recorded.ahead
+    recorded = replace(recorded, i_a=recorded.i_a / gain)
+    if ahead is not None:
+        recorded = replace(recorded, ahead=lambda delay: (ahead(delay)[0] / gain, ahead(delay)[1]))
     for effect in model.effects:
         if effect.current is not None:
             q = values_of(effect, model.machine, values)

@@ -23,7 +23,7 @@ from pipeline.criticism.model import (
     ripple,
     values_of,
 )
-from pipeline.criticism.operate import angle_error, current_slope, on_true_clock, operate
+from pipeline.criticism.operate import ahead_in, angle_error, current_slope, on_true_clock, operate
 from pipeline.criticism.segment import RECORDER, Segment
 from pipeline.criticism.traces import LINES_V
 from pipeline.numerics.projection import Projection
@@ -107,6 +107,7 @@ def _true_load(
         segment.ts_s,
         segment.kind == "dq",
         segment.instrument,
+        ahead=ahead_in(segment, signals),
     )
     for effect in hooks:
         if effect.load is not None:

@@ -174,7 +174,7 @@ def score_all(
     """
     by = _Scoring.of(around, fitted, told)
     price = math.log(float(around.size))
-    search_price = 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
+    search_price = searched(offered)
     best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
     first = by.own.size
     for candidate in offered:
@@ -199,6 +199,11 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
         for p in effect.parameters_of(machine)
         if not p.choice
     )
+
+
+def searched(offered: Sequence[Candidate]) -> float:
+    """What the search over candidates costs a score [3]."""
+    return 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +266,7 @@ class _Scoring:
             0.0,
             mine,
             dict(zip(names, end.step[: self.own.size].tolist(), strict=True)),
-            _share(around, candidate.effect, self.before, after),
+            share_of(around, candidate.effect, self.before, after),
             max(sizes, default=math.inf),
             quiet_fall(around, self.before.spreads, after.spreads),
             candidate.effect.closer is None
@@ -308,7 +313,7 @@ def _outside(value: float, parameter: Parameter) -> bool:
     return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
 
 
-def _share(around: System, effect: Effect, before: Standing, after: Standing) -> float:
+def share_of(around: System, effect: Effect, before: Standing, after: Standing) -> float:
     """Largest share of the removable misfit that went away: of one recorded signal, of the
     captures of the tests that excite the effect, or of what the priors of the station cost; but of
     a signal's error no more than the share of its power, at one order, that went with it.

@@ -18,6 +18,8 @@ from pipeline.records.capture import Capture
 Kind = Literal[
     "dq", "q", "shaft", "motion", "open", "terminal", "lcr", "flux_map", "steady", "standing"
 ]
+DELAYED = ("id_a", "iq_a", "torque_shaft_nm")
+"""Columns that an instrument may be late with by many samples."""
 PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 """Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
 RECORDER: Mapping[Kind, str] = {
@@ -57,7 +59,8 @@ class Segment:
     reversals, of which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak
     samples of the mains lines, and of the wander of sensors, that there may be; `whole` are the
     columns of a drive log before it was thinned, with `good`, the samples that were recorded well;
-    `steps` the resolution of columns whose rounding error follows the signal.
+    `steps` the resolution of columns whose rounding error follows the signal; `log` the currents
+    and torque of all samples where the others were thinned.
     """
 
     capture: str
@@ -79,6 +82,7 @@ class Segment:
     lines: Array | None = None
     whole: Mapping[str, Array] | None = None
     steps: Mapping[str, float] = field(default_factory=dict)
+    log: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def size(self) -> int:

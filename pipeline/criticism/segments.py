@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.noise import is_rounded, resolution, sensor_noise
 from pipeline.criticism.segment import (
+    DELAYED,
     PAIR_RAD,
     Segment,
     Sensors,
@@ -143,12 +144,13 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
     whole = {**found, "good": keep.astype(float)} if logged else None
+    log = {name: found[name] for name in DELAYED if name in found}
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     made = segment_of(
         capture, "dq", "drive", period, found=found, sensors=told, channels=channels, weak=weak
     )
-    return replace(made, whole=whole)
+    return replace(made, whole=whole, log=log)
 
 
 def _shaft(capture: Capture, machine: Machine) -> Segment | None:

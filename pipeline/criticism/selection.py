@@ -38,6 +38,7 @@ from pipeline.criticism.scores import (
     widened,
 )
 from pipeline.criticism.segment import Segment
+from pipeline.criticism.starts import with_starts
 from pipeline.criticism.system import (
     Fitted,
     System,
@@ -88,7 +89,9 @@ def search(
     for _ in range(_MOST):
         offered = candidates(library, fitted)
         wide = widened(segments, fitted, offered, rungs[-1].around if rungs else None)
-        scores = score_all(wide, fitted, offered, told_groups(wide, segments))
+        told = told_groups(wide, segments)
+        scores = score_all(wide, fitted, offered, told)
+        scores = with_starts(segments, wide, fitted, offered, scores, told)
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
         if len(rungs) == _MOST:

@@ -317,13 +317,16 @@ def _kept(
 
     A stale column costs no accuracy. The residual is always computed anew, a fit ends where it has
     nothing left along the columns, and the columns of two near fits span nearly the same space.
-    The exception: once an effect of the angle is found, the columns of other effects of the angle
-    have changed.
+    The exceptions: once an effect of the angle is found, the columns of other effects of the angle
+    have changed; and all have once one is found that may be far from zero.
     """
     if before is None:
         return {}
     known = before.around.model.effects
-    turned = any(e.angle is not None and e not in known for e in fitted.model.effects)
+    found = [e for e in fitted.model.effects if e not in known]
+    if any(p.starts for e in found for p in e.parameters_of(fitted.model.machine)):
+        return {}
+    turned = any(e.angle is not None for e in found)
 
     def stays(column: Column) -> bool:
         of_angle = column.effect is not None and column.effect.angle is not None

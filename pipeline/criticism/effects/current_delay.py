@@ -6,24 +6,41 @@ import numpy as np
 
 from pipeline.criticism.effect import Complex, Effect, Parameter, Recorded, Values
 
+_LATE = tuple(2.0**k for k in range(1, 8))
+_EARLY = tuple(-late for late in _LATE)
+"""Delays [sample periods] that it is looked for at."""
+
 
 def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
         return r.i_a
-    # the rotor has turned on since; a turn to first order alone would lengthen the current
-    turned = np.exp(1j * r.omega_e_rad_s * q["delay_s"])
-    now: Complex = turned * (r.i_a + q["delay_s"] * np.gradient(r.i_a, r.ts_s))
+    # of phase currents, the rotor has turned on since they were sampled
+    turned = np.exp(1j * r.omega_e_rad_s * q["delay_s"] * q["of_phases"])
+    now: Complex = turned * r.later(q["delay_s"])[0]
     return now
 
 
 EFFECT = Effect(
     name="current_delay",
-    words="recorded phase current i(t − τ)",
+    words="recorded current i(t − τ), of the phases or in the rotor frame",
     signature="error proportional to di/dt and to ω_e i",
     tests=("torque_map", "drive"),
     experiment="current steps at standstill and at the highest speed",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
-    parameters=(Parameter("delay_s", "s", 0.5, 0.02, "period_s", low=-5.0, high=5.0),),
+    parameters=(
+        Parameter(
+            "delay_s", "s", 0.5, 0.02, "period_s", low=-200.0, high=200.0, starts=(*_EARLY, *_LATE)
+        ),
+        Parameter(
+            "of_phases",
+            "1",
+            1.0,
+            0.0,
+            scan=(1.0, 0.0),
+            choice=True,
+            words="1: the phase currents are late, 0: those of the rotor frame are",
+        ),
+    ),
     signals=("id_a", "iq_a"),
     rivals={
         "skin_effect": "current steps at standstill",
