@@ -246,8 +246,8 @@ class Recorded:
 
     `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument` tells the
     instruments of one bench apart (`drive` or `bench`), `phase` (0, 1, 2) whose line current a
-    two-terminal test recorded. `ahead`(delay): what current and torque are so much later [s], less
-    what they are now, from the whole log; without it, from these samples.
+    two-terminal test recorded. `ahead`(delay): what current, torque and electrical angle are so
+    much later [s], less what they are now, from the whole log; without it, from these samples.
     """
 
     i_a: Complex
@@ -258,15 +258,18 @@ class Recorded:
     inverter: bool
     instrument: str
     phase: int | None = None
-    ahead: Callable[[float], tuple[Complex, Array]] | None = None
+    ahead: Callable[[float], tuple[Complex, Array, Array]] | None = None
 
-    def later(self, delay_s: float) -> tuple[Complex, Array]:
-        """Current [n, A] and torque [n, N·m] as they are recorded `delay_s` later."""
+    def later(self, delay_s: float) -> tuple[Complex, Array, Array]:
+        """Current [n, A] and torque [n, N·m] as they are recorded `delay_s` later, and the
+        electrical angle that the rotor turns until then [n, rad].
+        """
         if self.ahead is not None:
-            current, torque = self.ahead(delay_s)
-            return self.i_a + current, self.torque_nm + torque
+            current, torque, turned = self.ahead(delay_s)
+            return self.i_a + current, self.torque_nm + torque, turned
         at: Array = np.arange(self.torque_nm.size, dtype=np.float64) + delay_s / self.ts_s
-        return between(self.i_a, at), between(self.torque_nm, at)
+        turned = self.omega_e_rad_s * delay_s
+        return between(self.i_a, at), between(self.torque_nm, at), turned
 
 
 def between(signal: Any, at: Array) -> Any:

@@ -187,15 +187,15 @@ def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> R
         ts_s=segment.ts_s,
         inverter=True,
         instrument=segment.instrument,
-        ahead=ahead_in(segment, signals),
+        ahead=ahead_in(segment, signals, model.machine.pole_pairs),
     )
 
 
 def ahead_in(
-    segment: Segment, signals: Mapping[str, Array]
-) -> Callable[[float], tuple[Complex, Array]] | None:
-    """What currents and torque are later in the whole log of a segment, less what they are now;
-    None where nothing was thinned. The segment is on its true clock.
+    segment: Segment, signals: Mapping[str, Array], pole_pairs: int
+) -> Callable[[float], tuple[Complex, Array, Array]] | None:
+    """What currents, torque and electrical angle are later in the whole log of a segment, less what
+    they are now; None where nothing was thinned. The segment is on its true clock.
     """
     log, rows = segment.log, segment.recorded.get("t_s")
     if not log or rows is None:
@@ -203,14 +203,14 @@ def ahead_in(
     period = float(rows[1] - rows[0])
     at = np.rint(rows / period)
 
-    def ahead(delay_s: float) -> tuple[Complex, Array]:
+    def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
         later = at + delay_s / segment.ts_s
         change = {
             name: between(column, later) - between(column, at) for name, column in log.items()
         }
         zero = np.zeros(at.size)
         current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)
-        return current, change.get("torque_shaft_nm", zero)
+        return current, change.get("torque_shaft_nm", zero), pole_pairs * change["theta_mech_rad"]
 
     return ahead if at.size == next(iter(signals.values())).size else None
 
@@ -220,7 +220,12 @@ def _true_current(recorded: Recorded, model: Model, values: Values) -> Complex:
     ahead = recorded.ahead
     recorded = replace(recorded, i_a=recorded.i_a / gain)
     if ahead is not None:
-        recorded = replace(recorded, ahead=lambda delay: (ahead(delay)[0] / gain, ahead(delay)[1]))
+
+        def scaled(delay_s: float) -> tuple[Complex, Array, Array]:
+            current, torque, turned = ahead(delay_s)
+            return current / gain, torque, turned
+
+        recorded = replace(recorded, ahead=scaled)
     for effect in model.effects:
         if effect.current is not None:
             q = values_of(effect, model.machine, values)

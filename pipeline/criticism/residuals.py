@@ -107,7 +107,7 @@ def _true_load(
         segment.ts_s,
         segment.kind == "dq",
         segment.instrument,
-        ahead=ahead_in(segment, signals),
+        ahead=ahead_in(segment, signals, model.machine.pole_pairs),
     )
     for effect in hooks:
         if effect.load is not None:

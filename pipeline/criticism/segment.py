@@ -18,8 +18,6 @@ from pipeline.records.capture import Capture
 Kind = Literal[
     "dq", "q", "shaft", "motion", "open", "terminal", "lcr", "flux_map", "steady", "standing"
 ]
-DELAYED = ("id_a", "iq_a", "torque_shaft_nm")
-"""Columns that an instrument may be late with by many samples."""
 PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 """Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
 RECORDER: Mapping[Kind, str] = {
@@ -59,8 +57,8 @@ class Segment:
     reversals, of which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak
     samples of the mains lines, and of the wander of sensors, that there may be; `whole` are the
     columns of a drive log before it was thinned, with `good`, the samples that were recorded well;
-    `steps` the resolution of columns whose rounding error follows the signal; `log` the currents
-    and torque of all samples where the others were thinned.
+    `steps` the resolution of columns whose rounding error follows the signal; `log` what an
+    instrument may be late with, at all samples, where the others were thinned.
     """
 
     capture: str

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.noise import is_rounded, resolution, sensor_noise
 from pipeline.criticism.segment import (
-    DELAYED,
     PAIR_RAD,
     Segment,
     Sensors,
@@ -37,6 +36,7 @@ from pipeline.criticism.traces import (
     smoothed,
     tellable,
     thinned,
+    whole_log,
     window_of,
     with_angle,
     with_travel,
@@ -144,7 +144,7 @@ def _dq(capture: Capture, machine: Machine) -> Segment | None:
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
     whole = {**found, "good": keep.astype(float)} if logged else None
-    log = {name: found[name] for name in DELAYED if name in found}
+    log = whole_log(found, period)
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     made = segment_of(

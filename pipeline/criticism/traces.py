@@ -29,6 +29,9 @@ and a bump of fewer samples is none."""
 _SMOOTHING_S = 0.05
 """Half of the time [s] that a temperature is averaged over: windings warm in seconds."""
 SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
+_TURNING_S = 0.002
+"""Length of the mean of an angle that says how far the rotor turns during a delay [s]: shorter, and
+its rounding is in the current's angle; longer, and a step of the speed is blurred."""
 PAD = 24
 """Samples kept on either side of a window that is cut out: what differences and smoothing of a
 speed reach over."""
@@ -194,6 +197,13 @@ def thinned(
     rows = (starts[:, None] - pad + np.arange(length + 2 * pad)[None, :]).ravel()
     cut = {name: column[rows] for name, column in found.items()}
     return cut, pad + (length + 2 * pad) * np.arange(starts.size)
+
+
+def whole_log(found: Mapping[str, Array], period: float) -> dict[str, Array]:
+    """Currents and torque of all samples, which may be late by many, and the angle, smoothed."""
+    names = ("id_a", "iq_a", "torque_shaft_nm")
+    turned = smoothed(found["theta_mech_rad"], 2 * round(_TURNING_S / period / 2) + 1)
+    return {"theta_mech_rad": turned, **{name: found[name] for name in names if name in found}}
 
 
 def window_of(period: float, size: int) -> int:

@@ -15,8 +15,8 @@ def _current(r: Recorded, q: Values) -> Complex:
     if not r.inverter:
         return r.i_a
     # of phase currents, the rotor has turned on since they were sampled
-    turned = np.exp(1j * r.omega_e_rad_s * q["delay_s"] * q["of_phases"])
-    now: Complex = turned * r.later(q["delay_s"])[0]
+    later, _, turned = r.later(q["delay_s"])
+    now: Complex = np.exp(1j * turned * q["of_phases"]) * later
     return now
 
 
