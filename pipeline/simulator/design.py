@@ -133,6 +133,7 @@ class Instruments:
     voltage_commanded: float = 1.0
     torque: float = 1.0
     lcr: float = 1.0
+    clock: float = 1.0
     temperature_degc: float = 0.0
     clamp: float = 1.0
     probe: float = 1.0
@@ -168,7 +169,10 @@ class Bench:
     size of a random walk at the end of a capture and of a mains pick-up, in units of the
     channel's noise. `jitter_s` scatters the time stamps only. `temperature_hz` puts thermometers
     of fast captures on a clock of their own. `scope` records the current steps in place of the
-    station's own sensors.
+    station's own sensors. Hidden faults of the recorder: its clock is fast or
+    slow by the share `clock_rel` beyond what `u_rel_clock` states (stated where above 0), while the
+    speed that the bench tells goes by a clock of its own; torque and logged dq currents come
+    `late_torque_s` and `late_current_s` late.
     """
 
     station: str = "sim-1"
@@ -191,6 +195,7 @@ class Bench:
     u_rel_torque: float = 2e-3
     u_rel_lcr: float = 2e-3
     u_temp_degc: float = 0.5
+    u_rel_clock: float = 0.0
     noise_scale: float = 1.0
     drift_rel: float = 0.0
     hum_rel: float = 0.0
@@ -198,6 +203,9 @@ class Bench:
     jitter_s: float = 0.0
     temperature_hz: float | None = None
     scope: Scope | None = None
+    clock_rel: float = 0.0
+    late_torque_s: float = 0.0
+    late_current_s: float = 0.0
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:
@@ -205,12 +213,15 @@ class Bench:
         if self.instruments is not None:
             return self.instruments
         draw = rng.standard_normal(6)
+        # of a stream of its own: what else is drawn stays as it was without a clock
+        clock = rng.spawn(1)[0].standard_normal()
         station = Instruments(
             current=1.0 + self.u_rel_current * float(draw[0]),
             voltage=1.0 + self.u_rel_voltage * float(draw[1]),
             voltage_commanded=1.0 + self.u_rel_voltage * float(draw[2]),
             torque=1.0 + self.u_rel_torque * float(draw[3]),
             lcr=1.0 + self.u_rel_lcr * float(draw[4]),
+            clock=1.0 + self.u_rel_clock * float(clock),
             temperature_degc=self.u_temp_degc * float(draw[5]),
         )
         if self.scope is None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.simulator import protocols
 from pipeline.simulator.design import Recording
-from pipeline.simulator.sensors import Session, grid, to_grid
+from pipeline.simulator.sensors import Session, grid, late, to_grid
 
 if TYPE_CHECKING:
     from pipeline.simulator.converter import Control
@@ -141,8 +141,8 @@ def log(session: Session, rows: Array, period_s: float) -> dict[str, Array]:
     step_a, step_v = session.current_step_a / 2.0, session.voltage_step_v
     return {
         "t_s": stamps,
-        "id_a": to_grid(i_dq.real, step_a),
-        "iq_a": to_grid(i_dq.imag, step_a),
+        "id_a": to_grid(late(i_dq.real, t_s, session.bench.late_current_s), step_a),
+        "iq_a": to_grid(late(i_dq.imag, t_s, session.bench.late_current_s), step_a),
         "vd_v": to_grid(v_dq.real, step_v),
         "vq_v": to_grid(v_dq.imag, step_v),
         "theta_mech_rad": rows[:, 4],

@@ -48,6 +48,14 @@ def scope_range(largest: float) -> float:
     return next(x * decade for x in (1.0, 2.0, 5.0, 10.0) if x * decade >= wanted)
 
 
+def late(signal: Array, t_s: Array, delay_s: float) -> Array:
+    """A signal [n] as it was `delay_s` before each instant [n, s], its first value before that."""
+    if delay_s == 0.0:
+        return signal
+    found: Array = np.interp(t_s - delay_s, t_s, signal)
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Session:
     """One motor on one station with its instruments as they really are, and its randomness."""
@@ -104,13 +112,14 @@ class Session:
         return 0.0
 
     def clock(self, n: int, rate_hz: float) -> tuple[Array, Array]:
-        """Sampling instants and the stamps written for them [n each, s]."""
+        """Sampling instants and the stamps the recorder writes for them [n each, s]."""
         t_s = np.arange(n) / rate_hz
+        told = t_s * (self.instruments.clock * (1.0 + self.bench.clock_rel))
         if self.bench.jitter_s <= 0.0:
-            return t_s, t_s
+            return t_s, told
         limit = 0.45 / rate_hz
         scatter = self.bench.jitter_s * self.rng.standard_normal(n)
-        return t_s, t_s + np.clip(scatter, -limit, limit)
+        return t_s, told + np.clip(scatter, -limit, limit)
 
     def line_current(self, i_a: Array, phase: int, t_s: Array) -> Array:
         """A line current [n] as measured."""
@@ -167,6 +176,7 @@ class Session:
         lag = self.fault("torque_lag")
         if lag > 0.0 and torque.size > 1:
             torque = first_order_lag(torque, (t_s[1] - t_s[0]) / lag)
+        torque = late(torque, t_s, self.bench.late_torque_s)
         gain = self.instruments.torque * (1.0 + self.fault("torque_scale"))
         sigma = self.bench.torque_noise_rel * self.motor.torque_rated_nm
         seen = gain * torque + self.fault("torque_offset") + self.noise(torque.size, sigma, t_s)
@@ -208,4 +218,6 @@ class Session:
             "u_rel_torque": f"{bench.u_rel_torque:g}",
             "u_temp_degc": f"{bench.u_temp_degc:g}",
         }
+        if bench.u_rel_clock > 0.0:
+            words["u_rel_clock"] = f"{bench.u_rel_clock:g}"
         return {**words, **further, **motor.nameplate}

@@ -175,4 +175,4 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
     assert judged("compliance", share=0.3, twist_rad=0.005, **rigid)
     assert not judged("compliance", share=0.3, twist_rad=1e-4, **rigid)
     assert not judged("compliance", share=0.01, twist_rad=0.005, **rigid)
-    assert judged("torque_lag", lag_s=1e-3, late=-0.4)
+    assert judged("torque_lag", lag_s=1e-3, late=-0.4, stamped=0.0)

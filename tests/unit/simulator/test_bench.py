@@ -118,6 +118,36 @@ def test_gains_are_drawn_from_the_stated_uncertainty_and_common_to_a_campaign():
     assert ratios == pytest.approx([0.84 * station.voltage / station.current] * 3, rel=2e-3)
 
 
+def test_a_recorders_clock_is_in_its_stamps_alone():
+    """Recorded time over true time, drawn where stated; the bench's own speed knows better."""
+    motor, plan = design("gimbal-5208"), tuple(s for s in CAMPAIGN if s[0] == "spin_down_forward")
+    fast = replace(QUIET, clock_rel=-0.02)
+    right, wrong = (campaign(motor, bench, 1, plan)[0].tables[0] for bench in (QUIET, fast))
+    assert wrong["t_s"] == pytest.approx(0.98 * right["t_s"], rel=1e-12)
+    for name in ("theta_mech_rad", "omega_mech_rad_s"):
+        assert np.array_equal(wrong[name], right[name])
+    bench = Bench(u_rel_clock=1e-3)
+    drawn = [bench.drawn(np.random.default_rng(seed)) for seed in range(2000)]
+    assert np.std([d.clock for d in drawn]) == pytest.approx(1e-3, rel=0.08)
+    plain = Bench().drawn(np.random.default_rng(3))
+    assert replace(drawn[3], clock=1.0) == plain
+    assert (
+        record("spin_down", motor, bench, np.random.default_rng(1)).meta["u_rel_clock"] == "0.001"
+    )
+
+
+def test_a_late_log_is_the_log_of_before():
+    """Torque and dq currents by whole samples; nothing else moves."""
+    motor, plan = design("gimbal-5208"), tuple(s for s in CAMPAIGN if s[0] == "torque_map_fast")
+    faulty = replace(QUIET, late_torque_s=2e-3, late_current_s=5e-4)
+    right, wrong = (campaign(motor, bench, 1, plan)[0].tables[0] for bench in (QUIET, faulty))
+    for name, samples in (("torque_shaft_nm", 20), ("id_a", 5), ("iq_a", 5)):
+        assert wrong[name][samples:] == pytest.approx(right[name][:-samples], abs=1e-6)
+        assert np.ptp(right[name]) > 0.0
+    for name in ("vd_v", "vq_v", "theta_mech_rad", "t_s"):
+        assert np.array_equal(wrong[name], right[name])
+
+
 def test_noise_is_what_the_bench_says():
     motor = design("gimbal-5208")
     quiet = replace(QUIET, noise_scale=1.0)
