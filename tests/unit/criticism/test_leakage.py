@@ -14,7 +14,7 @@ READS = {
     *("test", "pole_pairs", "slots", "ambient_degc", "pair", "theta_elec_deg", "voltage_timing"),
     # what the station states of its own instruments
     *("voltage_kind", "u_rel_current", "u_rel_voltage", "u_rel_torque", "u_temp_degc"),
-    *("u_rel_clock", "extra"),
+    *("u_rel_clock", "stated_u_rel", "extra"),
 }
 EXTRA = {"u_rel_lcr"}
 
