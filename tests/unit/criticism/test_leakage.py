@@ -103,7 +103,7 @@ def test_only_harmless_metadata_is_read():
         here, more = reads_of(tree)
         read, extra = read | here, extra | more
     assert read and read <= READS
-    assert extra and extra <= EXTRA
+    assert extra <= EXTRA
 
 
 def test_no_file_is_opened_but_a_users_effects():
