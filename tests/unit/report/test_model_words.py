@@ -66,6 +66,9 @@ def test_the_terminal_names_the_one_that_misses_most(datasheet: Datasheet) -> No
     text = summary([*sheets, sheet_with(datasheet, SOUND, "three")], (), "out", report=False)
     assert "2 motors are not explained down to the noise, two least" in text
     assert "`diagnose input=FOLDER motor=two` tells more" in text
+    # a stand-in for the folder, which the stage replaces, goes through as it is
+    kept = summary(sheets, (), "out", report=False, folder="\ue000")
+    assert "`diagnose input='\ue000' motor=two` tells more" in kept
     assert [line.split()[3:5] for line in text.splitlines()[1:4]] == [
         ["missing,", "20"],
         ["missing,", "76"],
