@@ -63,7 +63,8 @@ PACKAGES = {
             "mcap",
             ("pipeline/io/mcap/*.py",),
             (
-                "tests/unit/io/mcap",
+                "tests/unit/io/test_mcap_arrangements.py",
+                "tests/unit/io/test_mcap_limits.py",
                 "tests/unit/io/test_cdr.py",
                 "tests/unit/io/test_conformance.py",
                 "tests/unit/io/test_ingest.py",
