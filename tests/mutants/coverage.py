@@ -42,8 +42,8 @@ class Coverage:
     def of(self, mutant: Mutant, root: Path) -> set[str]:
         """Tests that run the line; for what runs at import, those that run what uses its name.
 
-        A name of a module is used in any file that says it; where none does, every test that runs
-        something of the file counts.
+        A name of a module is used where a file of the package says it; where none does, every test
+        that runs something of the file counts.
         """
         end = mutant.line + mutant.before.count("\n")
         run = {t for line in range(mutant.line, end + 1) for t in self.by_line[mutant.path, line]}
@@ -74,24 +74,25 @@ def measure(scratch: Scratch, package: Package, cache: Path) -> Coverage:
     found = Coverage()
     cache.mkdir(parents=True, exist_ok=True)
     base = _digest(scratch.tree)
+    files = frozenset(p.relative_to(scratch.tree).as_posix() for p in package.files(scratch.tree))
+
+    def tracer(tree: Path) -> Tracer:
+        made = Tracer(f"{tree}/", files)
+        made.start()
+        return made
+
     for path in package.test_files(scratch.tree):
         name = path.relative_to(scratch.tree).as_posix()
         key = hashlib.sha256(f"{base} {name} {package.name}".encode() + path.read_bytes())
         kept = cache / f"{key.hexdigest()[:24]}.json"
         if not kept.exists():
-            _, text = scratch.run([name], MEASURING_CPU_S, _tracer)
+            _, text = scratch.run([name], MEASURING_CPU_S, tracer)
             if not text.startswith("{"):
                 said = (scratch.tree.parent / "output").read_text()[-2000:]
                 raise RuntimeError(f"{name} cannot be measured: {said}")
             kept.write_text(text)
         found.add(json.loads(kept.read_text()))
     return found
-
-
-def _tracer(tree: Path) -> Tracer:
-    tracer = Tracer(f"{tree}/")
-    tracer.start()
-    return tracer
 
 
 def _digest(tree: Path) -> str:

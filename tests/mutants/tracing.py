@@ -20,10 +20,11 @@ Lines = set[tuple[str, int]]
 
 
 class Tracer:
-    """Lines of files under `root`, kept by test."""
+    """Lines of some files under `root` (relative paths), kept by test."""
 
-    def __init__(self, root: str) -> None:
+    def __init__(self, root: str, files: frozenset[str]) -> None:
         self.root = root
+        self.files = files
         self.tests: dict[str, Lines] = {}
         self.seconds: dict[str, float] = {}
         self.failed: set[str] = set()
@@ -39,8 +40,8 @@ class Tracer:
     def _called(self, frame: FrameType, _event: str, _argument: object) -> Any:
         name = frame.f_code.co_filename
         if name not in self._files:
-            inside = name.startswith(self.root)
-            self._files[name] = name[len(self.root) :] if inside else None
+            path = name.removeprefix(self.root)
+            self._files[name] = path if path in self.files else None
         return None if self._files[name] is None else self._local
 
     def start(self) -> None:

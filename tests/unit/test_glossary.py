@@ -240,3 +240,71 @@ def test_every_constant_has_an_estimator() -> None:
     """What the contract publishes, something gives."""
     given = {name for estimator in estimators() for name in estimator.gives}
     assert sorted(set(CONSTANTS) - given) == []
+
+
+BOUNDED = [
+    t for table in (COLUMNS, CONSTANTS, METADATA) for t in table.values() if t.unit != "text"
+]
+
+
+@pytest.mark.parametrize("term", BOUNDED, ids=lambda term: f"{term.kind}-{term.name}")
+def test_bounds_are_orders_of_size_and_not_measurements(term: Term) -> None:
+    """A bound has one significant digit; a signed quantity is bounded alike both ways.
+
+    Temperatures and the link's voltage are the exceptions: they have no symmetry about zero.
+    """
+    assert term.low is not None
+    assert term.high is not None
+    assert term.low < term.high
+    for bound in (term.low, term.high):
+        assert float(f"{bound:.0e}") == bound
+    if term.low < 0.0 and not term.name.endswith("_degc") and term.name not in LOPSIDED:
+        assert term.low == -term.high
+
+
+LOPSIDED = {
+    "t_s": "a clock counts from 1970",
+    "vdc_v": "a link dips below zero by a diode's drop",
+    "b_visc_nm_s_rad": "a curve of friction may fall with speed a little",
+}
+
+
+def test_bounds_that_mathematics_sets() -> None:
+    """Counts start at one; shares end at one; largest less smallest is twice the mean at most."""
+    whole = {t.name for t in BOUNDED if t.integer}
+    assert whole == {"pole_pairs", "slots", "cogging_order"}
+    assert all(t.low == 1 for t in BOUNDED if t.integer)
+    shares = [METADATA[f"u_rel_{gain}"] for gain in ("current", "voltage", "torque", "clock")]
+    assert {(t.low, t.high) for t in shares} == {(0, 1)}
+    ratio, imbalance = CONSTANTS["saliency_ratio"], CONSTANTS["resistance_imbalance"]
+    assert ratio.low * ratio.high == pytest.approx(1.0)
+    assert (imbalance.low, imbalance.high) == (0, 2)
+    # a phase has two thirds of a line's voltage at most; a line of two phases twice a phase's
+    assert COLUMNS["vab_v"].high == 2 * COLUMNS["va_v"].high
+    assert CONSTANTS["r_ll_ohm"].high == 2 * CONSTANTS["r_phase_ohm"].high
+    counted = {"saliency_ratio", *whole}
+    assert {t.low for t in CONSTANTS.values() if t.low >= 0.0 and t.name not in counted} == {
+        0.0,
+        1e-12,
+    }
+    assert CONSTANTS["cogging_order"].high == 5000
+
+
+# Sizes of a drone's motor, a gimbal's, a servo's and a car's.
+MOTORS = {
+    "r_phase_ohm": (0.05, 5.6, 1.1, 0.005),
+    "ld_h": (8e-6, 2.9e-3, 4e-3, 1e-4),
+    "psi_pm_wb": (4e-4, 0.02, 0.1, 0.07),
+    "pole_pairs": (6, 11, 4, 4),
+    "j_rotor_kgm2": (5e-7, 8e-5, 3e-4, 0.03),
+    "kv_ll_peak_rpm_v": (2300.0, 80.0, 30.0, 20.0),
+    "cogging_order": (36, 132, 24, 48),
+    "tau_elec_s": (2e-4, 5e-4, 4e-3, 0.02),
+    "rth_winding_k_w": (20.0, 4.0, 0.8, 0.05),
+}
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_motors_that_exist_are_plausible(name: str) -> None:
+    term = CONSTANTS[name]
+    assert all(term.low <= value <= term.high for value in MOTORS[name])

@@ -21,6 +21,8 @@ from pipeline.io.mcap.tables import read_tables
 from tests.unit.io.recordings import START_NS, mcap_file, protobuf_schema
 
 N = 3000
+LARGE = 1 << 18
+"""From this many bytes on a chunk is read alone."""
 Message = tuple[str, int, bytes]
 
 
@@ -58,30 +60,30 @@ WRITERS = {
 }
 
 
-def alone(write: Any) -> list[Message]:
+def alone(write: Any, count: int) -> list[Message]:
     """One topic, every message of one length."""
-    return [("/a", START_NS + n, write(n, 2)) for n in range(N)]
+    return [("/a", START_NS + n, write(n, 2)) for n in range(count)]
 
 
-def between(write: Any) -> list[Message]:
-    """From the middle on a second topic lies between, of the same length."""
+def between(write: Any, count: int) -> list[Message]:
+    """In the last third a second topic lies between, of the same length."""
     found = []
-    for n in range(N):
+    for n in range(count):
         found.append(("/a", START_NS + n, write(n, 2)))
-        if n > N // 2:
-            found.append(("/b", START_NS + n, write(9000 - n, 2)))
+        if n > 2 * count // 3:
+            found.append(("/b", START_NS + n, write(20_000 - n, 2)))
     return found
 
 
-def growing(write: Any) -> list[Message]:
+def growing(write: Any, count: int) -> list[Message]:
     """Blocks of two, then of three, then of two; one message in the middle is longer."""
-    sizes = [2] * 1000 + [3] * 1000 + [2] * 500 + [5] + [2] * 499
-    return [("/a", START_NS + n, write(n, items)) for n, items in enumerate(sizes)]
+    sizes = np.repeat([2, 3, 2, 5, 2], [count // 3, count // 3, 500, 1, count // 3 - 501])
+    return [("/a", START_NS + n, write(n, items)) for n, items in enumerate(sizes.tolist())]
 
 
-def swapped(write: Any) -> list[Message]:
+def swapped(write: Any, count: int) -> list[Message]:
     """Written in another order than they were logged."""
-    found = alone(write)
+    found = alone(write, count)
     found[100], found[2000] = found[2000], found[100]
     return found
 
@@ -93,12 +95,12 @@ def size_of(write: Any, n: int, payload: bytes) -> int:
 
 @pytest.mark.parametrize("arrangement", [alone, between, growing, swapped])
 @pytest.mark.parametrize("encoding", WRITERS)
-@pytest.mark.parametrize("chunk_size", [3000, 1 << 16, 1 << 24])
+@pytest.mark.parametrize("chunk_size", [3000, 1 << 16, LARGE, 1 << 24])
 def test_every_arrangement_gives_the_samples_that_were_written(
     encoding: str, arrangement: Any, chunk_size: int
 ) -> None:
     write, schema, base = WRITERS[encoding]
-    messages = arrangement(write)
+    messages = arrangement(write, 12_000 if chunk_size >= LARGE else N)
     packing = CompressionType.NONE if chunk_size > 3000 else CompressionType.ZSTD
     data = mcap_file(messages, schema, encoding, chunk_size=chunk_size, compression=packing)
     tables = {t.name: t for t in read_tables(scan(data), lambda _topic, _name: True)}
@@ -106,7 +108,7 @@ def test_every_arrangement_gives_the_samples_that_were_written(
     for topic, table in tables.items():
         own = sorted((time, payload) for name, time, payload in messages if name == topic)
         since = np.array([time - START_NS for time, _ in own])
-        numbers = since if topic == "/a" else 9000 - since
+        numbers = since if topic == "/a" else 20_000 - since
         pairs = zip(numbers.tolist(), own, strict=True)
         items = [size_of(write, n, payload) for n, (_, payload) in pairs]
         starts = zip(numbers.tolist(), items, strict=True)

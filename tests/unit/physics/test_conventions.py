@@ -252,3 +252,34 @@ def test_the_labels_are_their_numbers() -> None:
     for number, label, _, _ in CONVENTIONS:
         value = 2.0 * math.pi if label == "2*pi" else float(label)
         assert number == pytest.approx(value, abs=5e-5)
+
+
+def test_copper_at_25_degrees() -> None:
+    """1/259.5 = 0.003854 a kelvin; 0.500 ohm at 20 degC is 0.598 ohm at 70 (0.00393 at 20)."""
+    assert pytest.approx(0.003854, abs=5e-7) == c.COPPER_COEFFICIENT_25_1_K
+    at_20 = c.COPPER_COEFFICIENT_25_1_K / (1.0 - 5.0 * c.COPPER_COEFFICIENT_25_1_K)
+    assert at_20 == pytest.approx(0.00393, abs=5e-6)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "u", "word"),
+    [
+        (1.09, 0.0, "surface"),
+        (1.11, 0.0, "interior"),
+        (0.91, 0.0, "surface"),
+        (0.89, 0.0, "exchanged"),
+        (1.29, 0.15, "surface"),
+        (1.31, 0.15, "interior"),
+        (0.69, 0.15, "exchanged"),
+    ],
+)
+def test_saliency_beyond_a_tenth_and_two_u(ratio: float, u: float, word: str) -> None:
+    assert word in (c.saliency_words(ratio, u) if u else c.saliency_words(ratio))
+
+
+@pytest.mark.parametrize(("off", "number"), [(0.0199, 7), (0.0201, None)])
+def test_pole_pairs_within_two_hundredths(off: float, number: int | None) -> None:
+    for count in (7.0 - off, 7.0 + off):
+        assert c.pole_pairs_from(count * 10.0, 10.0).number == number
+    assert c.pole_pairs_from(0.01, 10.0).number is None
+    assert c.pole_pairs_from(-10.0, 10.0).number == 1

@@ -71,3 +71,37 @@ def test_numbers_without_uncertainty() -> None:
     assert quantity(math.nan, "A") == "–"
     assert significant(0.99996, 4) == "1.000"
     assert plain(-2.5) == f"{MINUS}2.5"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0, "V", "0 V"),
+        (-12.0, "1", f"{MINUS}12"),
+        (999_999.0, "1", "999999"),
+        (1e6, "1", "1.000 ×10⁶"),
+        (0.25, "1", "0.2500"),
+        (1000.5, "kg·m²", "1000 kg·m²"),
+        (12_345.6, "rad/s", "12.35 ×10³ rad/s"),
+        (0.00099, "rad/s", "990.0 ×10⁻⁶ rad/s"),
+        (0.001, "rad/s", "0.001000 rad/s"),
+        (2.5e-15, "A", "0.002500 pA"),
+        (3.5e9, "ohm", "3500 MΩ"),
+        (1000.0001, "V", "1.000 kV"),
+        (1e-3 + 1e-19, "H", "1.000 mH"),
+    ],
+)
+def test_numbers_without_a_spread(value: float, unit: str, text: str) -> None:
+    """Four digits, all digits of a whole number below a million, and prefixes from pico to mega."""
+    assert reading(value, 0.0, unit).text() == text
+    assert reading(value, math.inf, unit).text() == text
+
+
+def test_digits_and_zeros() -> None:
+    assert significant(0.0, 3) == "0"
+    assert significant(math.inf, 3) == "–"
+    assert significant(1234.5, 2) == "1200"
+    assert significant(-0.00012349, 4) == f"{MINUS}0.0001235"
+    assert (plain(1 / 3), plain(1e-7), plain(123456.7)) == ("0.333333", "1e-07", "123457")
+    assert quantity(0.0, "A") == "0 A"
+    assert quantity(1.0, "1") == "1.000"
