@@ -58,7 +58,11 @@ PACKAGES = {
         ),
         Package("crosscheck", ("pipeline/crosscheck/**/*.py",), ("tests/unit/crosscheck",)),
         Package("criticism", ("pipeline/criticism/**/*.py",), ("tests/unit/criticism",)),
-        Package("lots", ("pipeline/lots/*.py",), ("tests/unit/lots",)),
+        Package(
+            "lots",
+            ("pipeline/lots/*.py",),
+            ("tests/unit/lots", "tests/unit/stages/test_regress.py"),
+        ),
         Package(
             "mcap",
             ("pipeline/io/mcap/*.py",),
