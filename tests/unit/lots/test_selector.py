@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
@@ -132,3 +132,37 @@ def test_a_zone_is_heeded() -> None:
     query = parse_selector("date:2026-03-01", SHELF)
     assert query.takes_content("x", "2026-03-02T00:30:00+01:00")
     assert not query.takes_content("x", "2026-03-02T00:30:00")
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "after"),
+    [
+        ("date:2025", "2025-01-01", "2026-01-01"),
+        ("date:2025-12", "2025-12-01", "2026-01-01"),
+        ("date:2025-11", "2025-11-01", "2025-12-01"),
+        ("date:2024-02", "2024-02-01", "2024-03-01"),
+        ("date:2024-02-28", "2024-02-28", "2024-02-29"),
+        ("date:2025-12-31", "2025-12-31", "2026-01-01"),
+        ("date:2024-02..2025", "2024-02-01", "2026-01-01"),
+    ],
+)
+def test_a_span_holds_its_first_instant_and_not_the_next_ones(
+    text: str, first: str, after: str
+) -> None:
+    query = parse_selector(text, SHELF)
+    before = (datetime.fromisoformat(first) - timedelta(seconds=1)).isoformat()
+    last = (datetime.fromisoformat(after) - timedelta(seconds=1)).isoformat()
+    assert [query.takes_content("x", when) for when in (before, first, last, after)] == [
+        False,
+        True,
+        True,
+        False,
+    ]
+
+
+def test_a_selector_has_4096_characters() -> None:
+    long = "lot:A" + ",A" * 2045
+    assert len(long) == 4095
+    assert parse_selector(f"{long} ", SHELF).takes(SHELF[0])
+    with pytest.raises(UsageError, match="too long"):
+        parse_selector(f"{long}  ", SHELF)
