@@ -90,3 +90,41 @@ def test_angle_counts_where_the_bench_lags() -> None:
         late.append(replace(one, tables=(table.with_columns(shifted.alias("omega_mech_rad_s")),)))
     slow = fitted(ESTIMATOR, Campaign("m", tuple(late))).estimates
     assert slow == fitted(ESTIMATOR, captures).estimates
+
+
+@pytest.mark.parametrize(
+    ("kind", "columns", "factor", "offset"),
+    [
+        ("voltage", ("vd_v", "vq_v"), 1.001, 0.0),
+        ("current", ("id_a", "iq_a"), 1.001, 0.0),
+        ("temperature", ("temp_winding_degc", "temp_magnet_degc"), 1.0, 0.1),
+    ],
+)
+def test_a_bent_instrument_moves_the_results_as_their_budgets_say(
+    kind: str, columns: tuple[str, ...], factor: float, offset: float
+) -> None:
+    """Signed contributions: readings that are 0.1 % or 0.1 K too high, fitted anew.
+
+    R goes up with a voltage that reads high and down with a current that does; Ke goes with the
+    voltage alone; a thermometer that reads high makes R at 25 degrees less and Ke more.
+    """
+    key, u = {"voltage": ("u_rel_voltage", 0.01), "current": ("u_rel_current", 0.01)}.get(
+        kind, ("u_temp_degc", 1.0)
+    )
+    stated = [replace(c, meta=replace(c.meta, **{key: u})) for c in exactly_recorded().of("drive")]
+    bent = []
+    for one in stated:
+        (table,) = one.tables
+        there = [name for name in columns if name in table.columns]
+        high = table.with_columns(*(table[n] * factor + offset for n in there))
+        bent.append(replace(one, tables=(high,)))
+    before = fitted(ESTIMATOR, Campaign("m", tuple(stated))).estimates
+    after = fitted(ESTIMATOR, Campaign("m", tuple(bent))).estimates
+    share = (offset if kind == "temperature" else factor - 1.0) / u
+    signs = {"voltage": (1, 1), "current": (0, -1), "temperature": (1, -1)}[kind]
+    for one, other, sign in zip(before, after, signs, strict=True):
+        said = sum(p.u for p in one.budget if p.source.startswith((f"{kind}@", f"{kind}_")))
+        moved = (other.number - one.number) / one.number
+        assert moved == pytest.approx(said * share / one.number, rel=0.03, abs=2e-6)
+        assert (abs(moved) > 1e-5) == (sign != 0)
+        assert moved * sign >= 0.0

@@ -122,26 +122,27 @@ def test_an_outlier_is_told_in_robust_deviations() -> None:
     assert own["N-3"].z == pytest.approx(-own["N-4"].z, rel=0.5)
 
 
-def wave(alpha: float, side: str, motor: str):
+def wave(alpha: float, side: str, motor: str, phase: float = 0.3):
     """Orders 4 (1 N·m) and 6 (0.4 N·m) of one motor, its encoder turned by `alpha`."""
-    orders = (Order(4, 1.0, 0.01, 4.0 * alpha), Order(6, 0.4, 0.01, 0.3 + 6.0 * alpha))
+    orders = (Order(4, 1.0, 0.01, 4.0 * alpha), Order(6, 0.4, 0.01, phase + 6.0 * alpha))
     made = line.sheet(motor, "A", "S1", {NAME: 1.0}, orders=orders)
     return line.members([made], side)  # type: ignore[arg-type]
 
 
-def test_the_encoders_zero_does_not_blur_the_mean_wave() -> None:
+@pytest.mark.parametrize(("phase", "crest"), [(0.3, 0.3), (2.0, 2.0 + math.pi), (-1.0, -1.0)])
+def test_the_encoders_zero_does_not_blur_the_mean_wave(phase: float, crest: float) -> None:
     """Motors turned anyhow: one wave without spread, its highest common crest at zero.
 
-    At the crests of order 4 the phase of order 6 is 0.3 or 0.3 + pi: 1 + 0.4 cos 0.3.
+    At the crests of order 4 order 6 has its phase or pi more: the one whose cosine is positive.
     """
     alphas = (0.0, 0.7, 2.0, -1.3)
-    members = [m for k, a in enumerate(alphas) for m in wave(a, "baseline", f"m{k}")]
+    members = [m for k, a in enumerate(alphas) for m in wave(a, "baseline", f"m{k}", phase)]
     (band,) = cogging_bands(members)
     theta, mean = np.array(band.theta_mech_rad), np.array(band.mean_nm)
     assert np.ptp([np.array(band.low_nm), np.array(band.high_nm)], axis=0) == pytest.approx(
         0.0, abs=1e-9
     )
-    assert mean == pytest.approx(np.cos(4 * theta) + 0.4 * np.cos(6 * theta + 0.3), abs=1e-9)
+    assert mean == pytest.approx(np.cos(4 * theta) + 0.4 * np.cos(6 * theta + crest), abs=1e-9)
     assert (theta[0], theta[-1], theta.size) == (0.0, pytest.approx(2 * np.pi), 24 * 6 + 1)
 
 
