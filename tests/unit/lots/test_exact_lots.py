@@ -195,3 +195,19 @@ def test_few_motors_that_all_show_it_leave_it_undecided() -> None:
     assert compare_traits(half, "datasheet")[0].verdict == "pass"
     assert compare_traits(shown("candidate", "N", 2, 2), "datasheet") == ()
     assert compare_traits(shown("baseline", "N", 2, 2), "datasheet") == ()
+
+
+def test_a_lot_of_another_station_that_nothing_links_names_both() -> None:
+    found, _ = compare(lot("N", 1.05 + SHAPE, "S2"))
+    assert found.verdict == "CONFOUNDED"
+    assert "S2 of the candidate and S1 of the baseline" in found.why
+
+
+def test_the_headline_counts_lots() -> None:
+    limits = line.limits((NAME,))
+    one = compare_lots(line.samples(base(), lot("N", 1.0 + SHAPE)), limits, CONSTANTS)
+    two = compare_lots(
+        line.samples(base(), [*lot("N", 1.0 + SHAPE), *lot("M", 1.0 + SHAPE)]), limits, CONSTANTS
+    )
+    assert one.headline.startswith("Lot N: ")
+    assert two.headline.startswith("Lots N, M: ")
