@@ -35,6 +35,14 @@ def judgements() -> dict[str, dict[str, str]]:
     return yaml.safe_load(JUDGED.read_text(encoding="utf-8")) or {}
 
 
+def judged(outcome: Outcome) -> Outcome:
+    """What a person said of a mutant that no test killed."""
+    said = judgements().get(outcome.mutant.key)
+    if outcome.verdict == "killed" or said is None:
+        return outcome
+    return Outcome(outcome.mutant, said["verdict"], said["why"])
+
+
 def drawn(package: Package, root: Path, seed: int, count: int) -> list[Mutant]:
     """The mutants of a package that a seed draws."""
     mutants = [
@@ -64,7 +72,6 @@ def run(
     for test in sorted(covered.failed):
         note(f"{package.name}: fails without a change, left out: {test}")
     killers = _read(cache / "killers.json")
-    judged = judgements()
     outcomes = []
     for mutant in drawn(package, scratch.tree, seed, count):
         if only and mutant.key not in only:
@@ -72,10 +79,7 @@ def run(
         verdict, why = attempt(mutant, scratch, covered, killers.get(mutant.key, ""))
         if verdict == "killed":
             killers[mutant.key] = why
-        else:
-            judgement = judged.get(mutant.key, {"verdict": verdict, "why": why})
-            verdict, why = judgement["verdict"], judgement["why"]
-        outcomes.append(Outcome(mutant, verdict, why))
+        outcomes.append(judged(Outcome(mutant, verdict, why)))
         note(f"{mutant.key} {verdict:10} {mutant.path}:{mutant.line} {mutant.kind} {why}")
         note(f"    {_short(mutant.before)}  ->  {_short(mutant.after)}")
         _write(cache / "killers.json", killers)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.mutants.operators import Mutant
 from tests.mutants.packages import PACKAGES
-from tests.mutants.run import Outcome, run
+from tests.mutants.run import Outcome, judged, run
 from tests.mutants.scratch import Scratch
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -60,7 +60,7 @@ def _measure(chosen: argparse.Namespace, place: Path) -> None:
         for seed in chosen.seed or (1, 2):
             path = CACHE / f"result-{name}-{seed}.json"
             before = _kept(path) if chosen.survivors else []
-            left = frozenset(o.mutant.key for o in before if o.verdict == "survived")
+            left = frozenset(o.mutant.key for o in before if o.verdict != "killed")
             if chosen.survivors and not left:
                 continue
             outcomes = run(
@@ -86,9 +86,8 @@ def _say(line: str) -> None:
 def _kept(path: Path) -> list[Outcome]:
     if not path.exists():
         return []
-    return [
-        Outcome(Mutant(**o["mutant"]), o["verdict"], o["why"]) for o in json.loads(path.read_text())
-    ]
+    kept = json.loads(path.read_text())
+    return [judged(Outcome(Mutant(**o["mutant"]), o["verdict"], o["why"])) for o in kept]
 
 
 def _row(name: str, seed: int, outcomes: list[Outcome]) -> str:
