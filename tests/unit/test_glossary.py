@@ -271,8 +271,13 @@ LOPSIDED = {
 
 def test_bounds_that_mathematics_sets() -> None:
     """Counts start at one; shares end at one; largest less smallest is twice the mean at most."""
+    assert sorted((t.kind, t.name) for t in BOUNDED if t.integer) == [
+        ("constant", "cogging_order"),
+        ("constant", "pole_pairs"),
+        ("metadata", "pole_pairs"),
+        ("metadata", "slots"),
+    ]
     whole = {t.name for t in BOUNDED if t.integer}
-    assert whole == {"pole_pairs", "slots", "cogging_order"}
     assert all(t.low == 1 for t in BOUNDED if t.integer)
     shares = [METADATA[f"u_rel_{gain}"] for gain in ("current", "voltage", "torque", "clock")]
     assert {(t.low, t.high) for t in shares} == {(0, 1)}
