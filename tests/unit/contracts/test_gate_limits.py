@@ -315,4 +315,5 @@ def test_small_currents_share_a_common_part_too() -> None:
     turned = capture("drive", **dict(zip(names, [-waves[0], *waves[1:]], strict=True)))
     assert _common_share(turned) == pytest.approx(2.0 / 3.0, rel=1e-3)
     assert _common_share(capture("drive", ia_a=waves[0])) == 0.0
-    assert _common_share(capture("drive", **dict.fromkeys(names, np.zeros(50)))) == 0.0
+    for nothing in (np.zeros(50), np.full(50, np.nan)):
+        assert _common_share(capture("drive", **dict.fromkeys(names, nothing))) == 0.0
