@@ -20,6 +20,7 @@ from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import FieldMap, SourceMap, TimeMap
 from pipeline.io.survey import Entry, Question, Survey
 from pipeline.records.capture import Campaign, Capture, CaptureMeta, Mask
+from pipeline.records.comparison import ModelSpec
 from pipeline.records.content import content_digest
 from pipeline.records.datasheet import Superseded
 from pipeline.records.estimate import Estimate, Order
@@ -76,6 +77,7 @@ JOB = MotorJob(
     "m", ENTRIES, "in", "out", "d" * 64, ("r_phase_ohm", "ld_h"), "manual", True, True,
     GATES, FIT, {"kt_vs_ke": {"allowance": 0.1}}, (FINDING,), ReadLimits(), (REVOKED,),
 )  # fmt: skip
+SPEC = ModelSpec("standard", ("cogging",))
 SURVEY = Survey(ENTRIES, (FINDING,), ("notes.txt",))
 SUPERSEDED = Superseded("v" * 64, "A. Smith", "unit")
 
@@ -164,11 +166,27 @@ class Fit:
         return keys.fit_parts(**own | {"campaign": _readings(self.campaign)})
 
 
+@dataclass(frozen=True)
+class Model:
+    """What is handed to the residual test."""
+
+    code: str = "e" * 64
+    libraries: str = "numpy 2"
+    campaign: Campaign = CAMPAIGN
+    model: ModelSpec = SPEC
+    start: tuple[Estimate, ...] = (ESTIMATE,)
+    doubt: tuple[Revocation, ...] = (REVOKED,)
+
+    def parts(self) -> keys.Parts:
+        own = {f.name: getattr(self, f.name) for f in fields(self)}
+        return keys.model_parts(**own | {"campaign": _readings(self.campaign)})
+
+
 def _readings(campaign: Campaign) -> Sequence[str]:
     return [campaign.motor_id, *(content_digest(capture) for capture in campaign.captures)]
 
 
-KEPT: tuple[Callable[[], Any], ...] = (Answer, Motor, Batch, Version, Superseding, Fit)
+KEPT: tuple[Callable[[], Any], ...] = (Answer, Motor, Batch, Version, Superseding, Fit, Model)
 OF_NO_WORK = {
     Motor: tuple(f"job.{name}" for name in keys.NOT_OF_A_MOTOR),
     # the entries of a survey are in the keys of its motors
@@ -194,6 +212,11 @@ def unseen(handed: Any, *, without: str | None = None) -> list[str]:
 @pytest.mark.parametrize("kept", KEPT)
 def test_whatever_the_work_gets_is_in_its_key(kept: Callable[[], Any]) -> None:
     assert unseen(kept()) == []
+
+
+def test_every_key_is_among_these() -> None:
+    made = {name for name in vars(keys) if name.endswith("_parts")}
+    assert made == {f"{kept.__name__.lower()}_parts" for kept in KEPT}  # type: ignore[attr-defined]
 
 
 PARTS = [(kept, name) for kept in KEPT for name in kept().parts()]
