@@ -21,7 +21,7 @@ from pipeline.stages.fleet import work
 from pipeline.stages.fleet.fits import FitMemory
 from pipeline.stages.fleet.jobs import Files, Finished, MotorJob, MotorResult
 from pipeline.stages.fleet.keeping import note_motor
-from pipeline.stages.fleet.keys import key_of, superseding_parts, version_parts
+from pipeline.stages.fleet.keys import handed, key_of, superseding_parts, version_parts
 from pipeline.stages.fleet.model_memory import ModelMemory
 from pipeline.stages.fleet.versions import datasheet_code, datasheet_libraries
 
@@ -60,8 +60,9 @@ def stamp_of(job: MotorJob, campaign: Campaign) -> work.Stamp:
     """The version of a motor's datasheet, with all that it is a digest of."""
     readings = tuple(content_digest(capture) for capture in campaign.captures)
     code, libraries = datasheet_code(), datasheet_libraries()
-    parts = version_parts(code, libraries, [job.motor_id, *readings], job.config_sha256)
-    return work.Stamp(key_of(parts), readings, job.config_sha256, code, libraries)
+    given = handed(campaign, readings)
+    version = key_of(version_parts(code, libraries, given, job.config_sha256))
+    return work.Stamp(version, readings, job.config_sha256, code, libraries, given)
 
 
 def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:

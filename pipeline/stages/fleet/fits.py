@@ -49,7 +49,7 @@ class FitMemory:
         self._kept = _load(self._path)
         self._homes = homes()
         self._used: dict[str, tuple[str, bytes, bytes]] = {}
-        self._campaign = [job.motor_id, *stamp.readings]
+        self._campaign = stamp.campaign
         self._doubt = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def __call__(

@@ -15,6 +15,7 @@ from typing import Any
 from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import SourceMap
 from pipeline.io.survey import Question, Survey
+from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.content import content_digest
 from pipeline.records.datasheet import Superseded
@@ -89,10 +90,16 @@ def batch_parts(
     }
 
 
-def version_parts(code: str, libraries: str, campaign: Sequence[str], config_sha256: str) -> Parts:
+def handed(campaign: Campaign, readings: Sequence[str]) -> list[Any]:
+    """What a campaign hands to the work: every field of it, its captures by their digests."""
+    own = {f.name: getattr(campaign, f.name) for f in fields(campaign) if f.name != "captures"}
+    return [own, list(readings)]
+
+
+def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha256: str) -> Parts:
     """What a datasheet hangs on: captures as they were read, configuration, code, libraries.
 
-    `campaign` is the motor and the digest of each of its captures, in their order.
+    `campaign` is what `handed` gives.
     """
     return {
         "campaign": campaign,
@@ -110,7 +117,7 @@ def superseding_parts(version: str, superseded: Superseded) -> Parts:
 def fit_parts(
     code: str,
     libraries: str,
-    campaign: Sequence[str],
+    campaign: Sequence[Any],
     options: Mapping[str, float],
     known: Sequence[Estimate],
     doubt: object,
@@ -131,7 +138,7 @@ def fit_parts(
 def model_parts(
     code: str,
     libraries: str,
-    campaign: Sequence[str],
+    campaign: Sequence[Any],
     model: ModelSpec,
     start: Sequence[Estimate],
     doubt: object,

@@ -25,7 +25,7 @@ class ModelMemory:
     def __init__(self, job: MotorJob, stamp: Stamp) -> None:
         """`stamp` is of the datasheet to be made; where it was revoked, no verdict is recalled."""
         self._path = Path(job.output) / FOLDER / "models" / f"{file_stem(job.motor_id)}.json"
-        self._campaign = [job.motor_id, *stamp.readings]
+        self._campaign = stamp.campaign
         self._doubt = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def key(self, model: ModelSpec, start: Constants) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pipeline.contracts.motor import agree
 from pipeline.crosscheck import agreement
@@ -33,7 +34,8 @@ from pipeline.stages.fleet.model_tests import Verdicts, judged_model
 class Stamp:
     """What a datasheet says it was made of: its version, and what that is a digest of.
 
-    `readings` are the digests of the motor's captures as they were read, in their order.
+    `readings` are the digests of the motor's captures as they were read, in their order; `campaign`
+    is all that estimators are handed, for keys.
     """
 
     version: str
@@ -41,6 +43,7 @@ class Stamp:
     config_sha256: str
     code_version: str
     libraries: str
+    campaign: Sequence[Any]
 
 
 @dataclass(frozen=True, slots=True)

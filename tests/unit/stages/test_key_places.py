@@ -49,7 +49,7 @@ def test_a_fit_is_kept_until_one_part_of_its_key_changes(
             calls.append("fit")
             return Fit((EXACT,))
 
-        stamp = Stamp(version, readings, "d" * 64, "1", "numpy 2")
+        stamp = Stamp(version, readings, "d" * 64, "1", "numpy 2", [job.motor_id, *readings])
         memory = fits.FitMemory(replace(job, output=str(tmp_path)), stamp)
         before = len(calls)
         memory(estimator, Constants(known), options, fit)

@@ -182,8 +182,8 @@ class Model:
         return keys.model_parts(**own | {"campaign": _readings(self.campaign)})
 
 
-def _readings(campaign: Campaign) -> Sequence[str]:
-    return [campaign.motor_id, *(content_digest(capture) for capture in campaign.captures)]
+def _readings(campaign: Campaign) -> Sequence[Any]:
+    return keys.handed(campaign, [content_digest(capture) for capture in campaign.captures])
 
 
 KEPT: tuple[Callable[[], Any], ...] = (Answer, Motor, Batch, Version, Superseding, Fit, Model)

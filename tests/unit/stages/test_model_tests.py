@@ -60,7 +60,8 @@ def test_a_verdict_is_kept_while_nothing_that_it_hangs_on_changes(
         of: MotorJob = job, reading: str = "r", model: ModelSpec = spec, known: Constants = KNOWN
     ) -> int:
         before = len(made)
-        memory = ModelMemory(of, Stamp("v", (reading,), "c" * 64, "0.1.0", ""))
+        given = [of.motor_id, reading]
+        memory = ModelMemory(of, Stamp("v", (reading,), "c" * 64, "0.1.0", "", given))
         assert judged_model(CAMPAIGN, model, known, memory) == (FOUND, ())
         return len(made) - before
 
