@@ -29,7 +29,7 @@ def _in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     """
     if request.node.get_closest_marker("workers") is not None:
         return
-    from pipeline.stages.fleet import pools
+    from pipeline.execution import pools
 
     @contextmanager
     def threads(workers: int) -> Iterator[pools.Pool]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
 from importlib.machinery import SourceFileLoader
@@ -78,6 +78,15 @@ def _load(path: Path, digest: str) -> Effect:
         if not isinstance(effect, Effect):
             raise UsageError(f"{path.name} defines no EFFECT", "see docs/criticism.md")
         return guarded(effect, path, path.read_text(encoding="utf-8", errors="replace"))
+
+
+def known_effects(wanted: Sequence[str], effects_path: str | None = None) -> None:
+    """Refuses the name of an effect that there is not, also of one to take away, or is twice."""
+    names = tuple(name.removeprefix("-") for name in wanted)
+    chosen(names, effects_path)
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise UsageError(f"model.effects names {twice[0]} twice", "name it once")
 
 
 def chosen(names: tuple[str, ...], effects_path: str | None = None) -> dict[str, Effect]:

@@ -194,3 +194,8 @@ class Campaign:
         stated = [getattr(c.meta, key) for c in self.captures]
         counts = Counter(value for value in stated if value is not None)
         return max(counts, key=counts.__getitem__, default=None)
+
+    def text(self, key: str) -> str | None:
+        """What `nameplate` says of a key, as text."""
+        stated = self.nameplate(key)
+        return None if stated is None else str(stated)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from pipeline.calculators.coupling import GRIP, KE_KT, KV
+from pipeline.calculators.impedance import COPPER, SALIENCY, WYE_DELTA
+from pipeline.calculators.poles import POLE_PAIRS
+from pipeline.calculators.quantities import Calculator, parse, render, usage
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
 from pipeline.settings import CalcSettings
-from pipeline.stages.calculators.coupling import GRIP, KE_KT, KV
-from pipeline.stages.calculators.impedance import COPPER, SALIENCY, WYE_DELTA
-from pipeline.stages.calculators.poles import POLE_PAIRS
-from pipeline.stages.calculators.quantities import Calculator, parse, render, usage
 
 KINDS: dict[str, Calculator] = {
     "wye-delta": WYE_DELTA,

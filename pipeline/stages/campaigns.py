@@ -11,6 +11,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
+from pipeline.execution.captures import ReadTask, usable_captures
+from pipeline.execution.crew import Crew
+from pipeline.execution.looking import look_with
+from pipeline.execution.pools import Cluster, core_count, open_pool
 from pipeline.io.files import input_folder
 from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import find_map, load_source_maps
@@ -21,10 +25,6 @@ from pipeline.records.finding import Finding
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import nothing_usable
 from pipeline.settings import configuration_folder
-from pipeline.stages.fleet.captures import ReadTask, usable_captures
-from pipeline.stages.fleet.crew import Crew
-from pipeline.stages.fleet.looking import look_with
-from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
 
 if TYPE_CHECKING:
     pass

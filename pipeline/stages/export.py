@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pipeline.estimation.registry import estimators
 from pipeline.export.protocol import Exporter, Source
 from pipeline.export.registry import exporters
-from pipeline.fit.registry import estimators
 from pipeline.io.publish import output_folder, write_whole
 from pipeline.io.registry import Registry, one_of
 from pipeline.physics.glossary import CONSTANTS

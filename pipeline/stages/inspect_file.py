@@ -8,6 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from pipeline.execution.crew import Crew
+from pipeline.execution.pools import Cluster, open_pool
 from pipeline.io.files import size_bytes
 from pipeline.io.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
@@ -16,8 +18,6 @@ from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings, configuration_folder
-from pipeline.stages.fleet.crew import Crew
-from pipeline.stages.fleet.pools import Cluster, open_pool
 
 if TYPE_CHECKING:
     from pipeline.io.inspect_file import InspectReport

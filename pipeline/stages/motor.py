@@ -7,23 +7,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.fit.registry import estimators
+from pipeline.estimation.registry import estimators
+from pipeline.execution import work
+from pipeline.execution.fits import FitMemory
+from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
+from pipeline.execution.keeping import note_motor
+from pipeline.execution.keys import key_of, superseding_parts
+from pipeline.execution.model_memory import ModelMemory
+from pipeline.execution.stamp import stamp_of
 from pipeline.io.publish import together
 from pipeline.records.capture import Campaign
-from pipeline.records.content import content_digest
 from pipeline.records.datasheet import Datasheet, Superseded
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
-from pipeline.stages.fleet import work
-from pipeline.stages.fleet.fits import FitMemory
-from pipeline.stages.fleet.jobs import Files, Finished, MotorJob, MotorResult
-from pipeline.stages.fleet.keeping import note_motor
-from pipeline.stages.fleet.keys import handed, key_of, superseding_parts, version_parts
-from pipeline.stages.fleet.model_memory import ModelMemory
-from pipeline.stages.fleet.versions import datasheet_code, datasheet_libraries
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -54,15 +53,6 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     said = (*job.findings, *findings)
     files = _write(job, campaign, datasheet, found.evidence, said, watch)
     return Finished(findings, files)
-
-
-def stamp_of(job: MotorJob, campaign: Campaign) -> work.Stamp:
-    """The version of a motor's datasheet, with all that it is a digest of."""
-    readings = tuple(content_digest(capture) for capture in campaign.captures)
-    code, libraries = datasheet_code(), datasheet_libraries()
-    given = handed(campaign, readings)
-    version = key_of(version_parts(code, libraries, given, job.config_sha256))
-    return work.Stamp(version, readings, job.config_sha256, code, libraries, given)
 
 
 def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:

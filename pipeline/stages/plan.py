@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.crosscheck.plan import Aims, Known, Plan, Way, make_plan
 from pipeline.crosscheck.registry import check_all, rules
-from pipeline.fit.registry import estimators, fit_all
+from pipeline.estimation.registry import estimators, fit_all
 from pipeline.io.datasheets import read_datasheets
 from pipeline.io.guard import ReadLimits
 from pipeline.io.limits import limits_file, required_constants

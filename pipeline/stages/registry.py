@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, time
 from typing import Literal
 
+from pipeline.execution.statuses import show_decision
 from pipeline.io.registry import Registry, one_of
 from pipeline.lots.selector import OF_CONTENT, known, parse_selector
 from pipeline.records.current_status import status_of
@@ -25,7 +26,6 @@ from pipeline.report.registry_text import (
     when,
 )
 from pipeline.settings import RegistrySettings
-from pipeline.stages.fleet.statuses import show_decision
 
 PREFIX = re.compile("[0-9a-f]{4,64}")
 TAG = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,63}")

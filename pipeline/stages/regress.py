@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.fit.registry import estimators
+from pipeline.estimation.registry import estimators
 from pipeline.io.diagnoses import read_diagnoses
 from pipeline.io.limits import limits_file, read_limits
 from pipeline.io.publish import canonical_json, output_folder, write_whole

@@ -11,6 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.execution.statuses import histories_of, status_now
 from pipeline.io.datasheets import read_datasheet
 from pipeline.io.recordings.readback import recording_property
 from pipeline.io.recordings.seal import verify
@@ -30,7 +31,6 @@ from pipeline.records.naming import file_stem, printable
 from pipeline.records.outcome import Outcome
 from pipeline.report.status_text import status_lines
 from pipeline.settings import ReviewSettings
-from pipeline.stages.fleet.statuses import histories_of, status_now
 
 LAST_PORT = 65534
 """One less than there are, for the fleet's table is on the next."""

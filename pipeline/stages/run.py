@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -12,10 +11,27 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pipeline.api.options import check_options
+from pipeline.execution.crew import Crew
+from pipeline.execution.jobs import MotorJob, MotorResult
+from pipeline.execution.keeping import Batch, Keeping
+from pipeline.execution.keys import batch_parts, key_of, motor_parts
+from pipeline.execution.looking import look_with
+from pipeline.execution.pools import Cluster, core_count, open_pool
+from pipeline.execution.publishing import (
+    datasheets_of,
+    outcome_of,
+    placed,
+    publish,
+    removed_note,
+)
+from pipeline.execution.stamp import configuration_digest
+from pipeline.execution.statuses import histories_of, restated
+from pipeline.execution.versions import RUN, tools
 from pipeline.io.files import input_folder, size_bytes
 from pipeline.io.guard import ReadLimits
 from pipeline.io.limits import limits_file, required_constants
-from pipeline.io.publish import canonical_json, output_folder
+from pipeline.io.publish import output_folder
 from pipeline.io.registry import Registry
 from pipeline.io.source_map import SourceMap, find_map, load_source_maps
 from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
@@ -26,24 +42,7 @@ from pipeline.records.ledger import Event, Revocation
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.report.progress import progress
-from pipeline.settings import RunSettings, configuration_folder, result_document
-from pipeline.stages.criticism import known_effects
-from pipeline.stages.fleet.crew import Crew
-from pipeline.stages.fleet.jobs import MotorJob, MotorResult
-from pipeline.stages.fleet.keeping import Batch, Keeping
-from pipeline.stages.fleet.keys import batch_parts, key_of, motor_parts
-from pipeline.stages.fleet.looking import look_with
-from pipeline.stages.fleet.pools import Cluster, core_count, open_pool
-from pipeline.stages.fleet.publishing import (
-    datasheets_of,
-    outcome_of,
-    placed,
-    publish,
-    removed_note,
-)
-from pipeline.stages.fleet.statuses import histories_of, restated
-from pipeline.stages.fleet.versions import RUN, tools
-from pipeline.stages.options import check_options
+from pipeline.settings import RunSettings, configuration_folder
 
 CRUMBS = ".work"
 COMMITTED = 50
@@ -66,6 +65,8 @@ def main(settings: RunSettings) -> Outcome:
     ReadLimits(settings.read_seconds, settings.read_memory_mb)
     input_folder(settings.input)
     if settings.residual_test:
+        from pipeline.criticism.registry import known_effects
+
         known_effects(settings.model.effects)
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
@@ -222,8 +223,6 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
     required = required_constants(limits)
-    # Of the limits file, what a lot is held to changes no datasheet.
-    work = canonical_json({**result_document(settings), "required": required})
     model = ModelSpec(settings.model.name, tuple(settings.model.effects))
     jobs = [
         MotorJob(
@@ -231,7 +230,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             entries=tuple(own),
             input=settings.input,
             output=settings.output,
-            config_sha256=_digest(work, own),
+            config_sha256=configuration_digest(settings, required, [e.source for e in own]),
             required=required,
             release=settings.release,
             report=settings.report,
@@ -290,12 +289,6 @@ def _same_again(
         text = f"registry {registry.place}: 0 new, {len(batch.contents)} known"
     outcome = placed(batch.outcome, settings)
     return replace(outcome, text="\n".join(filter(None, [outcome.text, text])))
-
-
-def _digest(work: bytes, entries: Sequence[Entry]) -> str:
-    """Digest of the settings, the limits file and the source maps that these captures need."""
-    maps = sorted({repr(entry.source) for entry in entries if entry.source is not None})
-    return hashlib.sha256("\n".join([work.decode(), *maps]).encode()).hexdigest()
 
 
 def _process(

@@ -15,16 +15,16 @@ from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
 from pipeline.crosscheck import rules as rules_room
 from pipeline.crosscheck.registry import check_all, rules
+from pipeline.estimation import estimators as estimators_room
+from pipeline.estimation.registry import estimators, fit_all
 from pipeline.export import exporters as exporters_room
 from pipeline.export.registry import exporters
-from pipeline.fit import estimators as estimators_room
-from pipeline.fit.registry import estimators, fit_all
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
 ESTIMATOR = '''
 """Rows a capture, as a constant."""
-from pipeline.fit.protocol import Estimator, Fit
+from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.physics.glossary import Term
 from pipeline.records.estimate import Estimate
 

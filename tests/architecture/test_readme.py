@@ -17,8 +17,8 @@ from pipeline.commands import COMMANDS
 from pipeline.contracts.protocol import Gate
 from pipeline.criticism.effect import Effect
 from pipeline.crosscheck.protocol import Rule
+from pipeline.estimation.protocol import Estimator
 from pipeline.export.protocol import Exporter, Source
-from pipeline.fit.protocol import Estimator
 from pipeline.io.source_map import parse_source_map
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
@@ -150,12 +150,12 @@ def test_example_exporter() -> None:
 
 
 @pytest.mark.parametrize(
-    "room", ["fit/estimators", "crosscheck/rules", "contracts/gates", "export/exporters"]
+    "room", ["estimation/estimators", "crosscheck/rules", "contracts/gates", "export/exporters"]
 )
 def test_examples_are_in_the_style_of_the_house(room: str) -> None:
     """Each example passes the linter and the formatter in the room it is for."""
     mark = {
-        "fit/estimators": "ESTIMATOR",
+        "estimation/estimators": "ESTIMATOR",
         "crosscheck/rules": "RULE",
         "contracts/gates": "GATE",
         "export/exporters": "EXPORTER",

@@ -184,10 +184,10 @@ def test_contracts_load_without_pandera(room: str) -> None:
     assert sorted(loaded & {"pandera", "rerun", "altair", "numba"}) == []
 
 
-@pytest.mark.parametrize("room", ["pipeline.fit.registry", "pipeline.crosscheck.registry"])
+@pytest.mark.parametrize("room", ["pipeline.estimation.registry", "pipeline.crosscheck.registry"])
 def test_plug_ins_load_light(room: str) -> None:
     """Finding the plug-ins costs neither a plotting library nor a compiler."""
     name = room.rsplit(".", 2)[1]
-    find = {"fit": "estimators", "crosscheck": "rules"}[name]
+    find = {"estimation": "estimators", "crosscheck": "rules"}[name]
     loaded = _modules_after(f"import {room}\n{room}.{find}()")
     assert sorted(loaded & {"pandera", "rerun", "altair", "scipy.stats"}) == []

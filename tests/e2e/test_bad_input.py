@@ -11,7 +11,7 @@ import pytest
 
 import pipeline.stages.run as run_stage
 from pipeline.__main__ import main
-from pipeline.stages.fleet.jobs import MotorJob, MotorResult
+from pipeline.execution.jobs import MotorJob, MotorResult
 
 HEAD = "# contract: 1\n# motor_id: stray\n# test: {test}\n"
 

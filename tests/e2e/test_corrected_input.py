@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.fit import registry as fit_registry
+from pipeline.estimation import registry as fit_registry
+from pipeline.execution import keys
 from pipeline.io.registry import Registry
 from pipeline.settings import configuration_folder
 from pipeline.stages import motor
-from pipeline.stages.fleet import keys
 from tests.registered import NOON
 
 KT_NM_A = 0.748

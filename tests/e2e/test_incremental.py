@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
+from pipeline.execution import fits
+from pipeline.execution.crew import Crew
 from pipeline.stages import run
-from pipeline.stages.fleet import fits
-from pipeline.stages.fleet.crew import Crew
 
 WORDS = ("report=true", "recordings=false")
 

@@ -13,7 +13,7 @@ import pytest
 from scipy.special import bdtr
 
 from pipeline.criticism.comparison import compare
-from pipeline.fit.registry import fit_all
+from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

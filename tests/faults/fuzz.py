@@ -23,6 +23,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.contracts.motor import agree
+from pipeline.execution.captures import ReadTask, usable_captures
 from pipeline.io.guard import READER_FAILED, ReadLimits
 from pipeline.io.ingest import read_capture, survey
 from pipeline.io.publish import canonical_json
@@ -30,7 +31,6 @@ from pipeline.io.source_map import SourceMap, load_source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder
-from pipeline.stages.fleet.captures import ReadTask, usable_captures
 from tests.faults.grammar import case
 from tests.faults.test_random_damage import FILES, TEXTS
 from tests.unit.io.recordings import small_capture

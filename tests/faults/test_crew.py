@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.execution.crew import Crew
+from pipeline.execution.pools import Pool, local_pool
 from pipeline.io.guard import ReadLimits, reading
 from pipeline.records.errors import CaptureError, MachineError
-from pipeline.stages.fleet.crew import Crew
-from pipeline.stages.fleet.pools import Pool, local_pool
 
 pytestmark = pytest.mark.workers
 LIMITS = ReadLimits(seconds=1.0, memory_mb=200)

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
+from pipeline.execution.pools import Cluster, open_pool
 from pipeline.records.errors import UsageError
-from pipeline.stages.fleet.pools import Cluster, open_pool
 from tests.faults.fleet import ROOT, command, family, make_fleet, simulated
 from tests.faults.kills import results
 

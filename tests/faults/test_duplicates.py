@@ -10,11 +10,11 @@ import polars as pl
 import pytest
 
 from pipeline.contracts.duplicates import CODE, once
-from pipeline.fit.registry import fit_all
+from pipeline.estimation.registry import fit_all
+from pipeline.execution.captures import ReadTask, usable_captures
 from pipeline.io.guard import ReadLimits
 from pipeline.io.survey import survey
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
-from pipeline.stages.fleet.captures import ReadTask, usable_captures
 from tests.unit.io.recordings import META, json_messages, mcap_file
 
 ROWS = 600

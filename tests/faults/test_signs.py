@@ -12,8 +12,8 @@ import pytest
 from pipeline.contracts.gates import wrapped_angle
 from pipeline.contracts.protocol import Passed
 from pipeline.contracts.validate import validate
-from pipeline.fit import registry
-from pipeline.fit.protocol import Estimator, Fit
+from pipeline.estimation import registry
+from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.errors import CaptureError

@@ -45,7 +45,7 @@ PACKAGES = {
                 "::test_smooth_speed_of_a_long_record_is_that_of_a_short_one",
             ),
         ),
-        Package("fit", ("pipeline/fit/**/*.py",), ("tests/unit/fit",)),
+        Package("fit", ("pipeline/estimation/**/*.py",), ("tests/unit/estimation",)),
         Package(
             "contracts",
             ("pipeline/contracts/**/*.py",),

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from pipeline.fit.estimators import (
+from pipeline.estimation.estimators import (
     hand_turn,
     heat_run,
     lcr,

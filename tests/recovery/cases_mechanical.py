@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from pipeline.fit.estimators import (
+from pipeline.estimation.estimators import (
     cogging,
     drive_voltage,
     inductance_rated,

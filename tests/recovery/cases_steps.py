@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.fit.estimators import current_step
+from pipeline.estimation.estimators import current_step
 from pipeline.simulator.bench import truth
 from pipeline.simulator.design import Scope
 from pipeline.simulator.protocols import CurrentStep

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import stats
 
-from pipeline.fit.protocol import Estimator
+from pipeline.estimation.protocol import Estimator
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 

@@ -64,9 +64,9 @@ def test_other_seeds_are_another_block():
 @pytest.mark.parametrize(
     ("changed", "drawn_anew"),
     [
-        ("pipeline.fit.estimators.resistance", {"resistance", "heat_run", "thermal"}),
-        ("pipeline.fit.estimators.spin_down", {"spin_down"}),
-        ("pipeline.fit.step_model", {"current_step"}),
+        ("pipeline.estimation.estimators.resistance", {"resistance", "heat_run", "thermal"}),
+        ("pipeline.estimation.estimators.spin_down", {"spin_down"}),
+        ("pipeline.estimation.step_model", {"current_step"}),
         ("pipeline.simulator.sensors", set(CASES)),
         ("pipeline.records.estimate", set(CASES)),
         ("tests.recovery.harness", set(CASES)),

@@ -17,10 +17,10 @@ from pipeline.criticism.segments import segments
 from pipeline.criticism.size import machine_of
 from pipeline.criticism.specification import model_of
 from pipeline.criticism.system import Fitted, System, own_columns
+from pipeline.execution.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.stages.campaigns import campaigns
-from pipeline.stages.fleet.start import start_constants
 
 REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
 

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.contracts.registry import gates
 from pipeline.crosscheck.registry import rules
-from pipeline.fit.registry import estimators
+from pipeline.estimation.registry import estimators
 from pipeline.physics.glossary import COLUMNS, CONSTANTS, METADATA, TESTS, Term
 from pipeline.records.capture import CaptureMeta
 

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 ROOMS = {
     "readers": ("pipeline.io.foreign", "readers"),
     "gates": ("pipeline.contracts.registry", "gates"),
-    "estimators": ("pipeline.fit.registry", "estimators"),
+    "estimators": ("pipeline.estimation.registry", "estimators"),
     "rules": ("pipeline.crosscheck.registry", "rules"),
     "exporters": ("pipeline.export.registry", "exporters"),
     "effects": ("pipeline.criticism.registry", "effects"),
@@ -119,5 +119,5 @@ def test_what_is_kept_hangs_on_the_sources_of_outside_plug_ins(tmp_path: Path) -
     after = python(tmp_path, "-c", code).stdout
     assert after != before
     assert python(ROOT, "-c", code).stdout == "\n"
-    whole = "from pipeline.stages.fleet.versions import datasheet_libraries as v; print(v())"
+    whole = "from pipeline.execution.versions import datasheet_libraries as v; print(v())"
     assert after.strip() in python(tmp_path, "-c", whole).stdout

@@ -21,8 +21,8 @@ Diagnose = Callable[[Campaign, str], dict[str, Any]]
 def product(campaign: Campaign, model: str) -> dict[str, Any]:
     """What `python -m pipeline diagnose` writes for a campaign."""
     from pipeline.criticism.diagnosis import diagnose
+    from pipeline.execution.start import start_constants
     from pipeline.records.comparison import ModelSpec
-    from pipeline.stages.fleet.start import start_constants
 
     document: dict[str, Any] = diagnose(
         campaign, ModelSpec(model), start_constants(campaign)

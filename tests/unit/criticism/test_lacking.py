@@ -13,11 +13,11 @@ from pipeline.criticism.comparison import compare
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.segments import segments
 from pipeline.criticism.size import PAIRLESS, machine_of, pole_pairs_of
+from pipeline.execution.start import start_constants
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.stages.campaigns import campaigns
-from pipeline.stages.fleet.start import start_constants
 
 DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
 STANDARD = ModelSpec("standard")

@@ -8,8 +8,8 @@ import pytest
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.judge import signal_errors
 from pipeline.criticism.orders import holding_orders, sector_errors
+from pipeline.execution.start import start_constants
 from pipeline.records.comparison import ModelSpec
-from pipeline.stages.fleet.start import start_constants
 from tests.stories.fits import REAL, campaign, fit
 
 pytestmark = pytest.mark.skipif(not REAL.is_dir(), reason="shared real recordings are not here")

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.crosscheck.registry import check_all
 from pipeline.crosscheck.rules.time_base import RULE, pace
-from pipeline.fit.registry import fit_all
+from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign

@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.crosscheck.rules import resistance_temperature
 from pipeline.crosscheck.verdict import verdict
-from pipeline.fit import registry
-from pipeline.fit.protocol import Estimator, Fit
+from pipeline.estimation import registry
+from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import AWAITS_APPROVAL, left_to_a_person

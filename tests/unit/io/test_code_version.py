@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 import pipeline
+from pipeline.execution.versions import LOOK, RUN, WORK
 from pipeline.io import code_version
 from pipeline.io.code_version import DISTRIBUTIONS, Code, installed, own_code
 from pipeline.io.syntax import syntax_of
-from pipeline.stages.fleet.versions import LOOK, RUN, WORK
 
 MOTOR = '''"""A motor."""
 from __future__ import annotations

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.fit.registry import estimators
+from pipeline.estimation.registry import estimators
 from pipeline.io.limits import read_limits, required_constants
 from pipeline.lots.limits_lint import lint
 from pipeline.physics.glossary import CONSTANTS

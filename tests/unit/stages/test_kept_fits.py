@@ -6,11 +6,11 @@ from dataclasses import fields
 
 import numpy as np
 
-from pipeline.fit.protocol import Fit
+from pipeline.estimation.protocol import Fit
+from pipeline.execution.fits import _decoded, _encoded
 from pipeline.records.estimate import Estimate, Order
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import type_b
-from pipeline.stages.fleet.fits import _decoded, _encoded
 
 ESTIMATE = Estimate(
     name="cogging_amplitude_nm",

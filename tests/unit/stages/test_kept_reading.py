@@ -19,6 +19,7 @@ import pytest
 
 from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
+from pipeline.execution.jobs import MotorJob
 from pipeline.io.csv_dialect import CsvDialect
 from pipeline.io.ingest import read_capture
 from pipeline.io.metadata import capture_meta
@@ -30,7 +31,6 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.content import content_digest
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.stages import motor
-from pipeline.stages.fleet.jobs import MotorJob
 from tests.changes import changes
 from tests.unit.io.recordings import json_messages, mcap_file
 

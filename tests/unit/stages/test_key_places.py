@@ -10,8 +10,11 @@ import pytest
 
 from pipeline.contracts.registry import gates
 from pipeline.crosscheck.registry import rules
-from pipeline.fit.protocol import Estimator, Fit
-from pipeline.fit.registry import estimators
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.registry import estimators
+from pipeline.execution import fits, keeping, keys
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.work import Stamp
 from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import FieldMap, SourceMap
 from pipeline.io.survey import Question, Survey, look, survey
@@ -21,9 +24,6 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Revocation
 from pipeline.settings import RunSettings, configuration_folder
 from pipeline.stages import run
-from pipeline.stages.fleet import fits, keeping, keys
-from pipeline.stages.fleet.jobs import MotorJob
-from pipeline.stages.fleet.work import Stamp
 from tests.changes import changes
 
 HALL = SourceMap("hall", header="^Time", fields=(FieldMap("Time", "t_s"), FieldMap("I", "iq_a")))

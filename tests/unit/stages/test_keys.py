@@ -15,6 +15,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.execution import keys
+from pipeline.execution.jobs import MotorJob
 from pipeline.io.csv_dialect import CsvDialect
 from pipeline.io.guard import ReadLimits
 from pipeline.io.source_map import FieldMap, SourceMap, TimeMap
@@ -28,8 +30,6 @@ from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
 from pipeline.records.uncertainty import Contribution
 from pipeline.settings import RunSettings
-from pipeline.stages.fleet import keys
-from pipeline.stages.fleet.jobs import MotorJob
 from tests.changes import changes
 
 HALL = SourceMap(

@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 
 from pipeline.criticism import adequacy
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.model_memory import ModelMemory
+from pipeline.execution.model_tests import judged_model
+from pipeline.execution.work import Stamp
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -15,10 +19,6 @@ from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Revocation
 from pipeline.records.model_verdict import Excess, ModelVerdict
-from pipeline.stages.fleet.jobs import MotorJob
-from pipeline.stages.fleet.model_memory import ModelMemory
-from pipeline.stages.fleet.model_tests import judged_model
-from pipeline.stages.fleet.work import Stamp
 
 CAMPAIGN = Campaign("m", (Capture("a.csv", "0", "verified", CaptureMeta("m", "drive"), ()),))
 FOUND = ModelVerdict(

@@ -1,0 +1,194 @@
+"""Datasheets: made from fits by cross-checks, or loaded from the output of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import polars as pl
+
+from pipeline.api import frames
+from pipeline.api.fits import Fits, MotorFit
+from pipeline.api.models import model_spec
+from pipeline.api.options import check_options
+from pipeline.api.recordings import Options
+from pipeline.execution import work
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.stamp import configuration_digest, stamp_of
+from pipeline.io.datasheets import read_datasheets
+from pipeline.io.diagnoses import read_diagnoses
+from pipeline.io.limits import limits_file, required_constants
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.diagnosis_summary import DiagnosisSummary
+from pipeline.records.outcome import Stopwatch
+from pipeline.settings import ModelSettings, RunSettings, configuration_folder
+
+DATASHEET_SCHEMA = {
+    "motor_id": pl.String,
+    "motor_type": pl.String,
+    "lot": pl.String,
+    "status": pl.String,
+    "why": pl.List(pl.String),
+    "version": pl.String,
+    "code_version": pl.String,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Datasheets:
+    """Datasheets by motor, and diagnoses where an output folder holds some."""
+
+    motors: Mapping[str, Datasheet]
+    diagnoses: Mapping[str, DiagnosisSummary] = field(default_factory=dict)
+
+    def __getitem__(self, motor_id: str) -> Datasheet:
+        """The datasheet of one motor."""
+        return self.motors[motor_id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.motors)
+
+    def __len__(self) -> int:
+        return len(self.motors)
+
+    @property
+    def constants(self) -> pl.DataFrame:
+        """One row a motor and constant, SI units: value, u, 95 % interval, status, captures."""
+        rows = [
+            row
+            for name, one in self.motors.items()
+            for row in frames.constant_rows(
+                name, one.motor_type, one.lot, (e for _, e in sorted(one.constants.items()))
+            )
+        ]
+        return frames.frame(rows, frames.CONSTANT_SCHEMA)
+
+    @property
+    def checks(self) -> pl.DataFrame:
+        """One row a motor and cross-check: status, value, limit, meaning, suspect."""
+        rows = [r for n, one in self.motors.items() for r in frames.check_rows(n, one.checks)]
+        return frames.frame(rows, frames.CHECK_SCHEMA)
+
+    @property
+    def summary(self) -> pl.DataFrame:
+        """One row a motor: status with its reasons, and version."""
+        rows = [
+            {
+                "motor_id": name,
+                "motor_type": one.motor_type,
+                "lot": one.lot,
+                "status": one.status,
+                "why": list(one.why),
+                "version": one.version,
+                "code_version": one.code_version,
+            }
+            for name, one in self.motors.items()
+        ]
+        return frames.frame(rows, DATASHEET_SCHEMA)
+
+    def _repr_html_(self) -> str:
+        return self.summary.select("motor_id", "lot", "status", "why")._repr_html_()
+
+
+def check(
+    fits: Fits,
+    *,
+    limits: str = "default",
+    release: str = "manual",
+    options: Options | None = None,
+    model: str | None = "standard",
+    effects: Sequence[str] = (),
+) -> Datasheets:
+    """Cross-checks the constants of each motor and puts its datasheet together.
+
+    Parameters
+    ----------
+    fits : Fits
+        What `fit` gave.
+    limits : str
+        Limits file of `conf/limits/`, or the path of one: constants that a release must hold.
+    release : str
+        `manual`: a person approves in the registry; `auto`: released if nothing is missing.
+    options : mapping of mapping, optional
+        Options of checks.
+    model : str, optional
+        Model that the captures are held against; None for no residual test.
+    effects : sequence of str
+        Effects to add to it.
+
+    Returns
+    -------
+    Datasheets
+        One a motor: `released`, `provisional` or `refused`, with the reasons.
+
+    Raises
+    ------
+    UsageError
+        For a limits file or an option that there is not.
+
+    Examples
+    --------
+    >>> import pipeline
+    >>> sheets = pipeline.check(pipeline.fit(pipeline.read("data/demo", motor="G52-1402")))
+    >>> sheets["G52-1402"].status
+    'refused'
+    >>> sheets.checks.filter(pl.col("status") == "fail")["check"].to_list()
+    ['resistance_balance']
+
+    """
+    settings = RunSettings(
+        fit=dict(fits.options),
+        constants=dict(fits.stated),
+        crosscheck=dict(options or {}),
+        limits=limits,
+        release=release,
+        residual_test=model is not None,
+        model=ModelSettings(name=model or "standard", effects=list(effects)),
+    )
+    check_options(settings)
+    required = required_constants(limits_file(configuration_folder() / "limits", limits))
+    sheets = {name: _datasheet(one, settings, required) for name, one in fits.motors.items()}
+    return Datasheets(sheets)
+
+
+def _datasheet(fit: MotorFit, settings: RunSettings, required: tuple[str, ...]) -> Datasheet:
+    model = model_spec(settings.model.name, settings.model.effects)
+    job = MotorJob(
+        motor_id=fit.campaign.motor_id,
+        entries=(),
+        input="",
+        output="",
+        config_sha256=configuration_digest(settings, required, fit.sources),
+        required=required,
+        release=settings.release,
+        report=False,
+        recordings=False,
+        fit=settings.fit,
+        constants=settings.constants,
+        crosscheck=settings.crosscheck,
+        model=model if settings.residual_test else None,
+    )
+    found = work.check(job, fit.campaign, fit.constants, None, Stopwatch())
+    return work.assemble(job, fit.campaign, found, stamp_of(job, fit.campaign))
+
+
+def load(output: str | Path) -> Datasheets:
+    """Reads the datasheets, and the diagnoses, of an output folder of `run`.
+
+    Raises UsageError where the folder holds none, or a file that is no datasheet.
+
+    Parameters
+    ----------
+    output : path
+        The folder that a run wrote to.
+
+    Returns
+    -------
+    Datasheets
+        As they were published; who approved them is in the registry.
+
+    """
+    place = Path(output)
+    sheets = {one.motor_id: one for one in read_datasheets(place)}
+    return Datasheets(sheets, read_diagnoses([place / "diagnosis"]))

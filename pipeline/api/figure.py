@@ -1,0 +1,55 @@
+"""A plot that a notebook shows and a file keeps."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from pathlib import Path
+
+from pipeline.report.page import TEMPLATES
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Figure:
+    """One drawing as a self-contained SVG document; light and dark follow the viewer."""
+
+    title: str
+    svg: str
+
+    def __repr__(self) -> str:
+        return f"Figure({self.title!r})"
+
+    def _repr_html_(self) -> str:
+        """The drawing as an image, so that its style sheet stays its own."""
+        data = base64.b64encode(self.svg.encode()).decode()
+        return f'<img alt="{escape(self.title)}" src="data:image/svg+xml;base64,{data}"/>'
+
+    def save(self, path: str | Path) -> Path:
+        """Writes the SVG document; returns its path."""
+        place = Path(path)
+        place.write_text(self.svg, encoding="utf-8")
+        return place
+
+
+def figure(title: str, element: str) -> Figure:
+    """A figure of the report's inline `<svg>` element, with the report's style sheet.
+
+    Raises ValueError where there is nothing to draw.
+    """
+    if not element.startswith("<svg"):
+        raise ValueError(f"{title}: no finite samples to draw")
+    style = _style()
+    head, _, body = element.partition(">")
+    head = head.replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+    return Figure(title, f"{head}><style><![CDATA[{style}]]></style>{body}")
+
+
+@cache
+def _style() -> str:
+    """The report's colours and its rules for drawings, without those for pages."""
+    sheet = (TEMPLATES / "style.css").read_text(encoding="utf-8")
+    colours, _, rules = sheet.partition("* {")
+    kept = [line for line in rules.splitlines() if line.startswith(("svg ", ".ladder"))]
+    return "\n".join([colours.rstrip(), *kept])

@@ -1,0 +1,189 @@
+"""Estimating and checking: recordings in, constants with uncertainty and datasheets out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from pipeline.api import frames
+from pipeline.api.figure import Figure, figure
+from pipeline.api.options import check_options
+from pipeline.api.recordings import Options, Recordings
+from pipeline.estimation.registry import Failure, fit_all
+from pipeline.io.source_map import SourceMap
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.evidence import Evidence
+from pipeline.settings import RunSettings
+
+RESIDUAL_SCHEMA = {
+    "motor_id": pl.String,
+    "estimator": pl.String,
+    "plot": pl.String,
+    "capture": pl.String,
+    "series": pl.String,
+    "x_name": pl.String,
+    "x": pl.Float64,
+    "y_name": pl.String,
+    "measured": pl.Float64,
+    "fitted": pl.Float64,
+    "residual": pl.Float64,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MotorFit:
+    """What the estimators found of one motor; `sources` are the maps it was read by."""
+
+    campaign: Campaign
+    constants: Constants
+    evidence: tuple[Evidence, ...]
+    failures: tuple[Failure, ...]
+    sources: tuple[SourceMap, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Fits:
+    """Estimates of every motor, before any check.
+
+    `options` are those of the estimators, `stated` the constants that were stated. `failures` of a
+    motor name estimators that broke on it.
+    """
+
+    motors: Mapping[str, MotorFit]
+    options: Options = field(default_factory=dict)
+    stated: Mapping[str, float] = field(default_factory=dict)
+
+    def __getitem__(self, motor_id: str) -> MotorFit:
+        """The estimates of one motor."""
+        return self.motors[motor_id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.motors)
+
+    def __len__(self) -> int:
+        return len(self.motors)
+
+    @property
+    def constants(self) -> pl.DataFrame:
+        """One row a motor and constant, SI units: value, u, 95 % interval, status, captures."""
+        return self._rows(alternatives=False)
+
+    @property
+    def alternatives(self) -> pl.DataFrame:
+        """The same constants by other methods than the chosen one."""
+        return self._rows(alternatives=True)
+
+    @property
+    def residuals(self) -> pl.DataFrame:
+        """One row a point of every fit: measured, fitted and their difference [unit of y]."""
+        parts: list[pl.DataFrame] = []
+        for motor_id, fit in self.motors.items():
+            for one in fit.evidence:
+                parts += _residual_frames(motor_id, one)
+        return pl.concat(parts) if parts else pl.DataFrame(schema=RESIDUAL_SCHEMA)
+
+    def plot(self, estimator: str, motor: str | None = None) -> tuple[Figure, ...]:
+        """The plots of one estimator: measured, fitted, and the residual below.
+
+        Raises KeyError where that estimator drew none for the motor.
+        """
+        from pipeline.report.chart import chart
+
+        motor_id = next(iter(self.motors)) if motor is None else motor
+        drawn = [e for e in self.motors[motor_id].evidence if e.estimator == estimator]
+        if not drawn:
+            known = dict.fromkeys(e.estimator for e in self.motors[motor_id].evidence)
+            raise KeyError(f"{motor_id}: no plot of {estimator}; there are {', '.join(known)}")
+        return tuple(figure(f"{motor_id}: {one.title}", chart(one)) for one in drawn)
+
+    def _rows(self, *, alternatives: bool) -> pl.DataFrame:
+        rows = []
+        for motor_id, fit in self.motors.items():
+            found = fit.constants
+            chosen = found.rest() if alternatives else tuple(found.chosen().values())
+            motor_type, lot = (fit.campaign.text(key) for key in ("motor_type", "lot"))
+            rows += frames.constant_rows(motor_id, motor_type, lot, chosen)
+        return frames.frame(rows, frames.CONSTANT_SCHEMA)
+
+    def _repr_html_(self) -> str:
+        known = self.constants.filter(pl.col("value").is_not_null())
+        return known.select("motor_id", "constant", "value", "u", "unit", "method")._repr_html_()
+
+
+def fit(
+    recordings: Recordings | str | Path,
+    *,
+    constants: Mapping[str, float] | None = None,
+    options: Options | None = None,
+) -> Fits:
+    """Estimates every constant that the captures of each motor determine.
+
+    Parameters
+    ----------
+    recordings : Recordings or path
+        What `read` or `simulate` gave, or a folder to read.
+    constants : mapping of str to float, optional
+        Stated constants and their standard uncertainties, SI units:
+        `{"kt_peak_nm_a": 0.118, "u_kt_peak_nm_a": 0.002}`.
+    options : mapping of mapping, optional
+        Options of estimators, for instance `{"torque_map": {"level": 0.001}}`.
+
+    Returns
+    -------
+    Fits
+        A constant that is not determined is `not_identifiable` and names the test to record.
+
+    Raises
+    ------
+    UsageError
+        For an option that no estimator has, or a constant that there is not.
+
+    Examples
+    --------
+    >>> import pipeline
+    >>> fits = pipeline.fit(pipeline.read("data/demo", motor="G52-0601"))
+    >>> row = fits.constants.row(by_predicate=pl.col("constant") == "pole_pairs", named=True)
+    >>> row["value"], row["status"]
+    (7.0, 'measured')
+
+    """
+    from pipeline.api.recordings import read
+
+    chosen, stated = dict(options or {}), dict(constants or {})
+    check_options(RunSettings(fit=chosen, constants=stated))
+    given = recordings if isinstance(recordings, Recordings) else read(recordings)
+    motors = {}
+    for name, campaign in given.campaigns.items():
+        known = replace(campaign, stated=stated)
+        motors[name] = MotorFit(known, *fit_all(known, chosen), given.sources.get(name, ()))
+    return Fits(motors, chosen, stated)
+
+
+def _residual_frames(motor_id: str, evidence: Evidence) -> Iterator[pl.DataFrame]:
+    for series in evidence.series:
+        n = series.x.size
+        fitted = series.fitted if series.fitted.size == n else np.full(n, np.nan)
+        words = {
+            "motor_id": motor_id,
+            "estimator": evidence.estimator,
+            "plot": evidence.title,
+            "capture": evidence.capture,
+            "series": series.label,
+            "x_name": evidence.x_name,
+            "y_name": evidence.y_name,
+        }
+        numbers = pl.DataFrame(
+            {
+                "x": np.asarray(series.x, np.float64),
+                "measured": np.asarray(series.measured, np.float64),
+                "fitted": np.asarray(fitted, np.float64),
+                "residual": np.asarray(series.measured - fitted, np.float64),
+            }
+        )
+        constant = [pl.lit(word, pl.String).alias(name) for name, word in words.items()]
+        yield numbers.with_columns(constant).select(list(RESIDUAL_SCHEMA))

@@ -1,0 +1,159 @@
+"""Results as polars frames: one tidy row a fact, the unit in a column of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import polars as pl
+
+from pipeline.records.capture import Campaign
+from pipeline.records.datasheet import Check
+from pipeline.records.estimate import Estimate
+from pipeline.records.finding import Finding
+
+CAPTURE_SCHEMA = {
+    "motor_id": pl.String,
+    "path": pl.String,
+    "test": pl.String,
+    "station": pl.String,
+    "started_at": pl.String,
+    "integrity": pl.String,
+    "rows": pl.Int64,
+    "masked": pl.Int64,
+    "duration_s": pl.Float64,
+    "columns": pl.List(pl.String),
+}
+CONSTANT_SCHEMA = {
+    "motor_id": pl.String,
+    "motor_type": pl.String,
+    "lot": pl.String,
+    "constant": pl.String,
+    "value": pl.Float64,
+    "unit": pl.String,
+    "u": pl.Float64,
+    "u_a": pl.Float64,
+    "u_b": pl.Float64,
+    "dof": pl.Float64,
+    "low_95": pl.Float64,
+    "high_95": pl.Float64,
+    "status": pl.String,
+    "method": pl.String,
+    "captures": pl.List(pl.String),
+    "note": pl.String,
+}
+CHECK_SCHEMA = {
+    "motor_id": pl.String,
+    "check": pl.String,
+    "status": pl.String,
+    "value": pl.Float64,
+    "limit": pl.Float64,
+    "unit": pl.String,
+    "meaning": pl.String,
+    "suspect": pl.String,
+}
+FINDING_SCHEMA = {
+    "file": pl.String,
+    "severity": pl.String,
+    "code": pl.String,
+    "first_row": pl.Int64,
+    "last_row": pl.Int64,
+    "message": pl.String,
+    "remedy": pl.String,
+}
+
+
+def frame(rows: Iterable[Mapping[str, Any]], schema: Mapping[str, Any]) -> pl.DataFrame:
+    """A frame of rows with the types of `schema`, also where there is no row."""
+    return pl.DataFrame(list(rows), schema=dict(schema), orient="row")
+
+
+def capture_rows(campaign: Campaign) -> list[dict[str, Any]]:
+    """One row a capture: what it is, how many rows it has and how many of them are masked."""
+    rows = []
+    for capture in campaign.captures:
+        clocks = [t["t_s"].to_numpy() for t in capture.tables if "t_s" in t.columns and t.height]
+        kept = sum(int(capture.kept(n).sum()) for n in range(len(capture.tables)))
+        count = sum(table.height for table in capture.tables)
+        rows.append(
+            {
+                "motor_id": campaign.motor_id,
+                "path": capture.path,
+                "test": capture.meta.test,
+                "station": capture.meta.station,
+                "started_at": capture.meta.started_at,
+                "integrity": capture.integrity,
+                "rows": count,
+                "masked": count - kept,
+                "duration_s": max((float(t[-1] - t[0]) for t in clocks), default=None),
+                "columns": sorted(capture.columns),
+            }
+        )
+    return rows
+
+
+def constant_rows(
+    motor_id: str, motor_type: str | None, lot: str | None, estimates: Iterable[Estimate]
+) -> list[dict[str, Any]]:
+    """One row an estimate; value, uncertainty and interval are null where it is not identifiable.
+
+    `dof` is null where it is infinite.
+    """
+    rows = []
+    for one in estimates:
+        low, high = one.interval() if one.known else (None, None)
+        said = one.document()
+        rows.append(
+            {
+                "motor_id": motor_id,
+                "motor_type": motor_type,
+                "lot": lot,
+                "constant": one.name,
+                "value": None if one.value is None else one.number,
+                "unit": one.unit,
+                "u": said["u"],
+                "u_a": said["u_a"],
+                "u_b": said["u_b"],
+                "dof": said["dof"],
+                "low_95": low,
+                "high_95": high,
+                "status": one.status,
+                "method": one.method,
+                "captures": list(one.captures),
+                "note": one.note,
+            }
+        )
+    return rows
+
+
+def check_rows(motor_id: str, checks: Sequence[Check]) -> list[dict[str, Any]]:
+    """One row a cross-check."""
+    return [
+        {
+            "motor_id": motor_id,
+            "check": one.name,
+            "status": one.status,
+            "value": one.value,
+            "limit": one.limit,
+            "unit": one.unit,
+            "meaning": one.meaning,
+            "suspect": one.suspect,
+        }
+        for one in checks
+    ]
+
+
+def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """One row a finding; the rows are null where it is not about rows."""
+    return [
+        {
+            "file": one.file,
+            "severity": one.severity,
+            "code": one.code,
+            "first_row": None if one.rows is None else one.rows[0],
+            "last_row": None if one.rows is None else one.rows[1],
+            "message": one.message,
+            "remedy": one.remedy,
+        }
+        for one in findings
+    ]

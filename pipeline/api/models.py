@@ -1,0 +1,298 @@
+"""Models held against recordings: where one is off, and which physical effect it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from pipeline.api import frames
+from pipeline.api.figure import Figure, figure
+from pipeline.api.recordings import Recordings, read
+from pipeline.execution.start import start_constants
+from pipeline.records.comparison import Comparison, ModelSpec
+from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.errors import UsageError
+from pipeline.records.evidence import Evidence, Series
+
+ERROR_SCHEMA = {
+    "motor_id": pl.String,
+    "signal": pl.String,
+    "capture": pl.String,
+    "kind": pl.String,
+    "split": pl.String,
+    "rmse": pl.Float64,
+    "noise_floor": pl.Float64,
+    "ratio": pl.Float64,
+    "unit": pl.String,
+    "n": pl.Int64,
+    "n_eff": pl.Float64,
+}
+PARAMETER_SCHEMA = {
+    "motor_id": pl.String,
+    "parameter": pl.String,
+    "value": pl.Float64,
+    "u": pl.Float64,
+    "unit": pl.String,
+}
+LADDER_SCHEMA = {
+    "motor_id": pl.String,
+    "step": pl.Int64,
+    "added": pl.String,
+    "held_out": pl.Float64,
+    "signal": pl.String,
+    "rmse": pl.Float64,
+    "noise_floor": pl.Float64,
+    "unit": pl.String,
+}
+RANKING_SCHEMA = {
+    "motor_id": pl.String,
+    "effect": pl.String,
+    "missing": pl.Boolean,
+    "score": pl.Float64,
+    "held_out_drop": pl.Float64,
+    "p_value": pl.Float64,
+    "confused_with": pl.List(pl.String),
+    "explanation": pl.String,
+    "experiment": pl.String,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Comparisons:
+    """One comparison a motor. Errors are of window means; 1 is the noise floor."""
+
+    motors: Mapping[str, Comparison]
+
+    def __getitem__(self, motor_id: str) -> Comparison:
+        """The comparison of one motor."""
+        return self.motors[motor_id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.motors)
+
+    @property
+    def errors(self) -> pl.DataFrame:
+        """One row a signal and capture: rmse and noise floor [unit], and their ratio."""
+        rows = [
+            {"motor_id": name, **one.document(), "ratio": one.rmse / one.noise_floor}
+            for name, result in self.motors.items()
+            for one in result.errors
+        ]
+        return frames.frame([_only(row, ERROR_SCHEMA) for row in rows], ERROR_SCHEMA)
+
+    @property
+    def parameters(self) -> pl.DataFrame:
+        """One row a fitted parameter; what the data do not determine has no value."""
+        rows = [
+            _only({"motor_id": name, "parameter": key, **one.document()}, PARAMETER_SCHEMA)
+            for name, result in self.motors.items()
+            for key, one in result.parameters.items()
+        ]
+        return frames.frame(rows, PARAMETER_SCHEMA)
+
+    @property
+    def residuals(self) -> pl.DataFrame:
+        """One row a sample of every trace: measured, model and their difference."""
+        parts = [
+            pl.DataFrame(
+                {
+                    "t_s": one.t_s,
+                    "measured": one.measured,
+                    "model": one.model,
+                    "residual": one.measured - one.model,
+                }
+            ).select(
+                pl.lit(name).alias("motor_id"),
+                pl.lit(one.capture).alias("capture"),
+                pl.lit(one.signal).alias("signal"),
+                pl.lit(one.kind).alias("kind"),
+                pl.lit(one.split).alias("split"),
+                pl.all(),
+            )
+            for name, result in self.motors.items()
+            for one in result.traces
+        ]
+        return pl.concat(parts) if parts else pl.DataFrame()
+
+    def plot(self, signal: str, capture: str, motor: str | None = None) -> Figure:
+        """One signal of one capture: measured, model, and the residual below.
+
+        Raises KeyError where the comparison holds no such trace.
+        """
+        from pipeline.report.chart import chart
+
+        motor_id = next(iter(self.motors)) if motor is None else motor
+        for one in self.motors[motor_id].traces:
+            if (one.signal, one.capture) == (signal, capture):
+                series = Series("", one.t_s, one.measured, one.model)
+                drawn = Evidence("model", signal, "t_s", signal, "line", (series,), capture)
+                return figure(f"{motor_id}: {signal} of {capture}", chart(drawn))
+        raise KeyError(f"{motor_id}: no trace of {signal} in {capture}")
+
+    def _repr_html_(self) -> str:
+        rows = [(n, one.name, list(one.effects), one.held_out) for n, one in self.motors.items()]
+        names = ["motor_id", "model", "effects", "held_out"]
+        return pl.DataFrame(rows, schema=names, orient="row")._repr_html_()
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnoses:
+    """One diagnosis a motor: what its model lacks, how sure that is, what else it could be."""
+
+    motors: Mapping[str, Diagnosis]
+
+    def __getitem__(self, motor_id: str) -> Diagnosis:
+        """The diagnosis of one motor."""
+        return self.motors[motor_id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.motors)
+
+    @property
+    def verdicts(self) -> pl.DataFrame:
+        """One row a motor: verdict and missing effects."""
+        rows = [(name, one.verdict, list(one.missing)) for name, one in self.motors.items()]
+        schema = {"motor_id": pl.String, "verdict": pl.String, "missing": pl.List(pl.String)}
+        return frames.frame([dict(zip(schema, row, strict=True)) for row in rows], schema)
+
+    @property
+    def ladder(self) -> pl.DataFrame:
+        """One row a step and signal: the held-out error as effects are added, 1 at the floor."""
+        rows = []
+        for name, result in self.motors.items():
+            for step, at in enumerate(result.ladder):
+                before = result.ladder[step - 1].effects if step else ()
+                added = ", ".join(e for e in at.effects if e not in before)
+                said = {"motor_id": name, "step": step, "added": added, "held_out": at.held_out}
+                rows += [
+                    {**said, "signal": signal, **error.document()}
+                    for signal, error in at.errors.items()
+                ]
+        return frames.frame(rows, LADDER_SCHEMA)
+
+    @property
+    def ranking(self) -> pl.DataFrame:
+        """One row an effect: its evidence, and what it could be confused with."""
+        rows = [
+            _only(
+                {"motor_id": name, "missing": one.effect in result.missing, **one.document()},
+                RANKING_SCHEMA,
+            )
+            for name, result in self.motors.items()
+            for one in result.ranking
+        ]
+        return frames.frame(rows, RANKING_SCHEMA)
+
+    def plot(self, motor: str | None = None) -> Figure:
+        """The ladder of one motor: each signal's held-out error over its noise floor by step."""
+        from pipeline.report.rung_chart import rung_chart
+
+        motor_id = next(iter(self.motors)) if motor is None else motor
+        ladder = self.ladder.filter(pl.col("motor_id") == motor_id)
+        steps = ladder.unique("step", maintain_order=True)["added"].to_list()
+        over = {
+            str(name[0]): (part["rmse"] / part["noise_floor"]).to_list()
+            for name, part in ladder.group_by("signal", maintain_order=True)
+            if part.height == len(steps)
+        }
+        whole = self.motors[motor_id].whole_model
+        names = [f"+ {added}" if added else whole for added in steps]
+        return figure(f"{motor_id}: error by step", rung_chart(names, over))
+
+    def _repr_html_(self) -> str:
+        return self.verdicts._repr_html_()
+
+
+def compare(
+    recordings: Recordings | str | Path,
+    model: str = "standard",
+    effects: Sequence[str] = (),
+    *,
+    effects_path: str | None = None,
+) -> Comparisons:
+    """Holds a model against measurements that it was not fitted to, signal by signal.
+
+    Parameters
+    ----------
+    recordings : Recordings or path
+        What `read` or `simulate` gave, or a folder to read.
+    model : str
+        `ideal`, or `standard`: with copper and magnet temperature and Coulomb friction.
+    effects : sequence of str
+        Effects to add; a name with a leading `-` takes one away.
+    effects_path : str, optional
+        Folder of your own effects, one file each.
+
+    Returns
+    -------
+    Comparisons
+        Held-out errors over their noise floors, fitted parameters, traces.
+
+    Raises
+    ------
+    UsageError
+        For an effect that there is not.
+
+    Notes
+    -----
+    Leave-one-capture-out prediction; see docs/criticism.md.
+
+    """
+    from pipeline.criticism.comparison import compare as compare_one
+
+    spec = model_spec(model, effects, effects_path)
+    campaigns = _recordings(recordings).campaigns
+    return Comparisons({n: compare_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
+
+
+def diagnose(
+    recordings: Recordings | str | Path,
+    model: str = "standard",
+    effects: Sequence[str] = (),
+    *,
+    effects_path: str | None = None,
+) -> Diagnoses:
+    """Names the physical effects that a model lacks, or says that it knows none.
+
+    Parameters are those of `compare`.
+
+    Returns
+    -------
+    Diagnoses
+        Verdict `adequate`, `missing`, `unknown` or `insufficient` a motor; the ladder of held-out
+        errors as effects are added; the ranking of all effects.
+
+    Raises
+    ------
+    UsageError
+        For an effect that there is not.
+
+    """
+    from pipeline.criticism.diagnosis import diagnose as diagnose_one
+
+    spec = model_spec(model, effects, effects_path)
+    campaigns = _recordings(recordings).campaigns
+    return Diagnoses({n: diagnose_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
+
+
+def model_spec(name: str, effects: Sequence[str], effects_path: str | None = None) -> ModelSpec:
+    """The model asked for; raises UsageError for a model or an effect that there is not."""
+    from pipeline.criticism.registry import known_effects
+    from pipeline.criticism.specification import MODELS
+
+    if name not in MODELS:
+        raise UsageError(f"no model {name!r}", f"known are {', '.join(MODELS)}")
+    known_effects(effects, effects_path)
+    return ModelSpec(name, tuple(effects), effects_path)
+
+
+def _recordings(given: Recordings | str | Path) -> Recordings:
+    return given if isinstance(given, Recordings) else read(given)
+
+
+def _only(row: Mapping[str, Any], schema: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: row[name] for name in schema}

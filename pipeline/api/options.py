@@ -1,0 +1,91 @@
+"""Options of plug-ins as the configuration gives them: refused where they cannot be meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.errors import UsageError
+from pipeline.records.stated import may_be_stated
+from pipeline.settings import RunSettings
+
+KINDS = {"fit": "estimator", "gates": "gate", "crosscheck": "check"}
+SHARES = ("share", "correlation")
+CHANCES = ("level", "chance")
+ABSOLUTE_ZERO_DEGC = -273.15
+
+Known = Mapping[str, Mapping[str, float]]
+
+
+def check_options(settings: RunSettings) -> None:
+    """Refuses an option of an estimator, gate or check that there is not, a stated constant that
+    there is not, and a value that none of them can take: none must be silent.
+    """
+    _check_constants(settings.constants)
+    if not (settings.fit or settings.gates or settings.crosscheck):
+        return
+    from pipeline.contracts.registry import gates
+    from pipeline.crosscheck.registry import rules
+    from pipeline.estimation.registry import estimators
+
+    _check("fit", settings.fit, {e.name: e.options for e in estimators()})
+    _check("gates", settings.gates, {g.name: g.settings() for g in gates()})
+    _check("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()})
+
+
+def _check_constants(stated: Mapping[str, Any]) -> None:
+    for key, value in stated.items():
+        name = key.removeprefix("u_")
+        if not may_be_stated(name):
+            near = get_close_matches(name, filter(may_be_stated, CONSTANTS), 3)
+            hint = f"did you mean {', '.join(near)}?" if near else "docs/glossary.md lists them"
+            raise UsageError(f"constants.{key}: no constant {name!r} can be stated", hint)
+        term, number = CONSTANTS[name], isinstance(value, (int, float)) and math.isfinite(value)
+        if not number or isinstance(value, bool) or (key != name and value < 0.0):
+            raise UsageError(f"constants.{key}={value} is no number", f"write it in {term.unit}")
+        if key != name and name not in stated:
+            raise UsageError(f"constants.{key} is of no stated constant", f"state {name} as well")
+
+
+def _check(room: str, given: Mapping[str, Any], known: Known) -> None:
+    for name, options in given.items():
+        if name not in known:
+            raise UsageError(f"{room}.{name}: no such {KINDS[room]}", f"one of {', '.join(known)}")
+        has = ", ".join(known[name]) or "none"
+        if not isinstance(options, Mapping):
+            raise UsageError(
+                f"{room}.{name}={options}: {name} is no option but has some",
+                f"write {room}.{name}.OPTION=number; it has {has}",
+            )
+        for option, value in options.items():
+            if option not in known[name]:
+                raise UsageError(f"{room}.{name}.{option}: no such option", f"it has {has}")
+            wanted = allowed(option, value, known[name][option])
+            if wanted is not None:
+                usual = f"{known[name][option]:g} is usual"
+                raise UsageError(
+                    f"{room}.{name}.{option}={value} is not {wanted}", f"give such a one; {usual}"
+                )
+
+
+def allowed(option: str, value: Any, default: float) -> str | None:
+    """What an option takes, in words; None where the value is that.
+
+    Names say what a number is: a share of something, a chance, a temperature. What is not negative
+    by default is a size or a count, and never is.
+    """
+    number = isinstance(value, (int, float)) and math.isfinite(value)
+    if option == "enabled":
+        return None if number and value in (0, 1) else "1 or 0"
+    if not number or isinstance(value, bool):
+        return "a number"
+    if option.endswith(SHARES):
+        return None if 0.0 <= value <= 1.0 else "a number from 0 to 1"
+    if option.endswith(CHANCES):
+        return None if 0.0 < value < 1.0 else "a number between 0 and 1"
+    if option.endswith("_degc"):
+        return None if value > ABSOLUTE_ZERO_DEGC else f"above {ABSOLUTE_ZERO_DEGC} degC"
+    return None if default < 0.0 or value >= 0.0 else "a number of 0 or more"

@@ -1,0 +1,164 @@
+"""Reading captures: a folder in, validated recordings of each motor out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from pipeline.api import frames
+from pipeline.execution.captures import ReadTask, usable_captures
+from pipeline.io.files import input_folder
+from pipeline.io.guard import ReadLimits
+from pipeline.io.source_map import SourceMap, find_map, load_source_maps
+from pipeline.io.survey import Entry, survey
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.errors import UsageError
+from pipeline.records.finding import Finding
+from pipeline.settings import configuration_folder
+
+Options = Mapping[str, Mapping[str, float]]
+"""Options by the name of a gate, an estimator or a check."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recordings:
+    """Validated captures by motor, and what was refused or doubtful.
+
+    `campaigns` maps a motor_id to its captures. `truth` holds what is true of simulated motors,
+    `sources` the maps that the captures of each motor were read by.
+    """
+
+    campaigns: Mapping[str, Campaign]
+    findings: tuple[Finding, ...] = ()
+    truth: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    sources: Mapping[str, tuple[SourceMap, ...]] = field(default_factory=dict)
+
+    def __getitem__(self, motor_id: str) -> Campaign:
+        """The captures of one motor."""
+        return self.campaigns[motor_id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.campaigns)
+
+    def __len__(self) -> int:
+        return len(self.campaigns)
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The motor_ids, sorted."""
+        return tuple(self.campaigns)
+
+    @property
+    def captures(self) -> pl.DataFrame:
+        """One row a capture: motor_id, path, test, station, rows, masked rows, columns."""
+        rows = [row for one in self.campaigns.values() for row in frames.capture_rows(one)]
+        return frames.frame(rows, frames.CAPTURE_SCHEMA)
+
+    @property
+    def refusals(self) -> pl.DataFrame:
+        """One row a finding: file, severity, code, rows, message and remedy."""
+        return frames.frame(frames.finding_rows(self.findings), frames.FINDING_SCHEMA)
+
+    def signals(self, path: str) -> pl.DataFrame:
+        """The longest table of one capture as read, SI units, NaN for missing.
+
+        Raises KeyError for a path that is not among the captures.
+        """
+        return max(self._capture(path).tables, key=lambda table: table.height)
+
+    def only(self, motor: str | None = None, tests: tuple[str, ...] = ()) -> Recordings:
+        """The recordings of one motor, of some tests, or both; a motor left without any goes."""
+        kept = {}
+        for name, campaign in self.campaigns.items():
+            captures = campaign.of(*tests) if tests else campaign.captures
+            if captures and motor in (None, name):
+                kept[name] = replace(campaign, captures=captures)
+        return replace(self, campaigns=kept)
+
+    def _capture(self, path: str) -> Capture:
+        for campaign in self.campaigns.values():
+            for capture in campaign.captures:
+                if capture.path == path:
+                    return capture
+        raise KeyError(path)
+
+    def _repr_html_(self) -> str:
+        shown = self.captures.group_by("motor_id", "test", maintain_order=True).agg(
+            pl.len().alias("captures"), pl.col("rows").sum()
+        )
+        return f"<p>{len(self)} motors, {len(self.findings)} findings</p>{shown._repr_html_()}"
+
+
+def read(
+    folder: str | Path,
+    *,
+    source: str = "auto",
+    motor: str | None = None,
+    gates: Options | None = None,
+    recover: bool = False,
+    limits: ReadLimits | None = None,
+) -> Recordings:
+    """Reads and validates every capture of a folder and its subfolders, in this process.
+
+    Nothing is written. The commands parse files in worker processes that can be ended; here a
+    file that a stranger made to exhaust the reader ends the caller.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of MCAP and CSV captures.
+    source : str
+        Name of a source map in `conf/source/` for files of another bench; `auto` recognises them.
+    motor : str, optional
+        Only the captures of this motor_id.
+    gates : mapping of mapping, optional
+        Options of gates, for instance `{"time_gaps": {"enabled": 0}}`.
+    recover : bool
+        Use the good part of MCAP files that are cut off.
+    limits : ReadLimits, optional
+        Most memory that one file may take.
+
+    Returns
+    -------
+    Recordings
+        A file that cannot be used is a finding with rows and remedy; the others are read.
+
+    Raises
+    ------
+    UsageError
+        Where the folder, the source map or the motor is not there.
+
+    Examples
+    --------
+    >>> import pipeline
+    >>> recordings = pipeline.read("data/demo", motor="G52-0601")
+    >>> recordings.motors
+    ('G52-0601',)
+    >>> recordings.captures.columns[:3]
+    ['motor_id', 'path', 'test']
+
+    """
+    place = str(folder)
+    input_folder(place)
+    maps = load_source_maps(configuration_folder() / "source")
+    sources = maps if source == "auto" else {source: find_map(maps, source)}
+    found = survey(Path(place), sources, recover=recover)
+    entries: dict[str, list[Entry]] = {}
+    for entry in found.entries:
+        entries.setdefault(entry.said["motor_id"], []).append(entry)
+    if motor is not None and motor not in entries:
+        there = f"there are {', '.join(sorted(entries))}" if entries else "there is none"
+        raise UsageError(f"no capture of motor {motor} in {place}", there)
+    findings, campaigns = list(found.findings), {}
+    for name in sorted(entries) if motor is None else [motor]:
+        task = ReadTask(name, place, tuple(entries[name]), limits or ReadLimits(), gates or {})
+        captures, doubts = usable_captures(task)
+        findings += doubts
+        if captures:
+            campaigns[name] = Campaign(name, captures)
+    used = {n: tuple(e.source for e in own if e.source) for n, own in entries.items()}
+    return Recordings(campaigns, tuple(findings), sources=used)

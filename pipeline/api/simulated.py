@@ -1,0 +1,194 @@
+"""Recordings of a simulated motor with chosen effects, in memory."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from pipeline.api.recordings import Options, Recordings
+from pipeline.contracts.validate import validate
+from pipeline.io.metadata import capture_meta
+from pipeline.io.plain_yaml import load_plain
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.errors import CaptureError, UsageError
+from pipeline.records.finding import Finding
+from pipeline.records.naming import file_stem
+from pipeline.settings import SimulateSettings, configuration_folder
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.catalogue import (
+    bench_from,
+    fleet_from,
+    motor_from,
+    seed_of,
+    with_effects,
+)
+from pipeline.simulator.design import EXACT, Bench, Motor, Recording
+from pipeline.simulator.outside import with_unknown
+from pipeline.simulator.truth import truth
+
+
+def simulate(
+    motor: str = "gimbal-5208",
+    effects: str | Sequence[str] = (),
+    *,
+    outside: str | None = None,
+    seed: int = 1,
+    motor_id: str | None = None,
+    exact: bool = False,
+    gates: Options | None = None,
+) -> Recordings:
+    """Simulates the laboratory campaign of one motor; nothing is written.
+
+    The simulator shares no code with the models that estimate and diagnose.
+
+    Parameters
+    ----------
+    motor : str
+        Design in `conf/motor/`.
+    effects : str or sequence of str
+        Hidden effects: `"cogging"` at its typical size, `"dead_time=0.3"` at another.
+    outside : str, optional
+        A term that is in nobody's library, for instance `"eddy_brake"`.
+    seed : int
+        Of every random draw; the same seed gives the same recordings.
+    motor_id : str, optional
+        Serial number; the design and the seed without it.
+    exact : bool
+        Instruments without gain errors.
+    gates : mapping of mapping, optional
+        Options of the gates that validate the captures.
+
+    Returns
+    -------
+    Recordings
+        Validated as those of `read`; `truth` says what is true of the motor.
+
+    Raises
+    ------
+    UsageError
+        For a design, an effect or a size that there is not.
+
+    Examples
+    --------
+    >>> import pipeline
+    >>> recordings = pipeline.simulate("gimbal-5208", ["stribeck"], seed=3)
+    >>> recordings.motors
+    ('gimbal-5208-3',)
+
+    """
+    words = effects if isinstance(effects, str) else f"[{','.join(effects)}]"
+    settings = SimulateSettings(
+        output="-", motor=motor, effects=words, outside=outside, seed=seed, exact=exact
+    )
+    settings.motor_id = motor_id
+    if seed < 0:
+        raise UsageError(f"simulate: seed={seed}", "it must be 0 or more")
+    try:
+        ((_, design, bench, _, plan),) = single(settings)
+    except (ValueError, KeyError) as error:
+        raise UsageError(f"simulate: {error}", "correct it") from error
+    recorded, true = simulated(design, bench, seed, plan)
+    name = design.motor_id
+    captures, findings = [], []
+    for recording in recorded:
+        try:
+            capture, found = validate(_capture(recording), gates or {})
+        except CaptureError as error:
+            findings.append(Finding.refusal(recording.stem, error))
+        else:
+            captures.append(capture)
+            findings += found
+    found_captures = Campaign(name, tuple(sorted(captures, key=lambda capture: capture.path)))
+    return Recordings({name: found_captures}, tuple(findings), {name: true})
+
+
+def _capture(recording: Recording) -> Capture:
+    """A recording as a capture; its digest is of its columns, for there is no file."""
+    digest = hashlib.sha256()
+    for table in recording.tables:
+        for name, column in table.items():
+            digest.update(name.encode() + b"\0" + column.tobytes())
+    return Capture(
+        path=recording.stem,
+        sha256=digest.hexdigest(),
+        integrity="verified",
+        meta=capture_meta(recording.meta),
+        tables=tuple(pl.DataFrame(dict(table)) for table in recording.tables),
+    )
+
+
+Plan = tuple[tuple[str, str, Mapping[str, Any]], ...]
+
+Job = tuple[str, Motor, Bench, int, Plan]
+"""Subfolder, motor, bench, seed, captures to record (all of the campaign where empty)."""
+
+
+def single(settings: SimulateSettings) -> Iterable[Job]:
+    """The one motor that the settings ask for; raises ValueError or KeyError for what is wrong."""
+    document = _document("motor", settings.motor)
+    motor = motor_from(document)
+    name = settings.motor_id or f"{settings.motor}-{settings.seed}"
+    motor = with_effects(replace(motor, lot=settings.lot, motor_id=name), settings.effects)
+    if settings.outside is not None:
+        motor = with_unknown(motor, settings.outside)
+    bench = bench_from(document.get("bench") or {})
+    if settings.exact:
+        bench = replace(bench, instruments=EXACT)
+    yield "", motor, bench, settings.seed, ()
+
+
+def fleet(settings: SimulateSettings) -> Iterable[Job]:
+    """Every motor on one station, whose gains are drawn once from the fleet's seed."""
+    words = _document("fleet", str(settings.fleet))
+    document = _document("motor", str(words.get("motor")))
+    many = fleet_from(words, document)
+    settled = {**(document.get("bench") or {}), **(words.get("bench") or {})}
+    bench = replace(bench_from(settled), station=many.station)
+    plan = _plan(many.tests)
+    drawn = EXACT if settings.exact else bench.drawn(np.random.default_rng(many.seed))
+    for motor in many.motors:
+        there = replace(bench, instruments=drawn, started_at=many.started_at[motor.motor_id])
+        yield (
+            file_stem(motor.motor_id),
+            motor,
+            there,
+            seed_of(many.seed, motor.motor_id),
+            plan,
+        )
+
+
+def _plan(tests: Sequence[str]) -> Plan:
+    """The steps of the campaign of these names; raises ValueError for one that it has not."""
+    known = [stem for stem, _, _ in CAMPAIGN]
+    if stray := set(tests) - set(known):
+        raise ValueError(f"no test {', '.join(sorted(stray))}; there are {', '.join(known)}")
+    return tuple(step for step in CAMPAIGN if step[0] in tests)
+
+
+def _document(kind: str, name: str) -> dict[str, Any]:
+    folder = configuration_folder() / kind
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    if name not in known:
+        raise UsageError(f"no {kind} {name!r} in conf/{kind}", f"known are {', '.join(known)}")
+    document = load_plain((folder / f"{name}.yaml").read_bytes(), f"{kind}/{name}.yaml")
+    if not isinstance(document, dict):
+        raise UsageError(f"conf/{kind}/{name}.yaml holds no keys", "write `key: value` lines")
+    return document
+
+
+def simulated(
+    motor: Motor, bench: Bench, seed: int, plan: Plan
+) -> tuple[list[Recording], dict[str, Any]]:
+    """The recordings of one motor and what is true of it.
+
+    Raises UsageError for a size that cannot be simulated.
+    """
+    try:
+        return campaign(motor, bench, seed, plan), truth(motor)
+    except ValueError as error:
+        raise UsageError(f"simulate: {motor.motor_id}: {error}", "choose another size") from error

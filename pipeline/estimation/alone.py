@@ -1,0 +1,210 @@
+"""What each capture says by itself: the same constants, fitted to one capture at a time.
+
+Two captures that measure a quantity alike (one test, one pair, one place of the rotor) must agree
+within what each cannot know; if they do not, they are not of one motor, or an instrument changed
+between them. Instruments that two captures share keep their names in the budgets, so that a gain
+that both have in common parts nothing; scatter is each capture's own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.estimation.registry import fit_all
+from pipeline.records.agreement import Reading, Way
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import Budget, Contribution, coverage_factor
+
+Options = Mapping[str, Mapping[str, float]]
+
+
+class Quantity(NamedTuple):
+    """A quantity that constants of several methods give: value = factor * constant [unit]."""
+
+    name: str
+    factor: float
+    unit: str
+
+
+# The torque constant is 1.5 p psi in the amplitude-invariant frame.
+QUANTITIES: Mapping[str, Quantity] = {
+    "pole_pairs": Quantity("pole_pairs", 1.0, "1"),
+    "ke_phase_peak_v_s_rad": Quantity("p·psi", 1.0, "V·s/rad"),
+    "kt_peak_nm_a": Quantity("p·psi", 1.0 / 1.5, "V·s/rad"),
+    "r_phase_ohm": Quantity("r_phase_ohm", 1.0, "ohm"),
+    "ld_h": Quantity("ld_h", 1.0, "H"),
+    "lq_h": Quantity("lq_h", 1.0, "H"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSpread:
+    """Relative standard uncertainties [1] that no budget of a single capture holds.
+
+    From one capture to the next the method's own assumptions change: a magnet loses 0.11 % of its
+    flux a kelvin (NdFeB) and copper gains 0.39 %. An unknown temperature counts as twenty kelvin
+    under current and as ten without, a known one as five where the sensor sits elsewhere; iron
+    saturates by per cents between maps of other currents; inductance falls between steps of other
+    heights, of which only like ones are compared; an everyday log is under nobody's control. A
+    commanded voltage lacks what the inverter drops and loses in dead time, some `inverter` of the
+    DC link (a microsecond at 20 kHz is 2 %), which is much of a slow or lightly loaded log's
+    voltage.
+    """
+
+    flux_temperature_known: float = 0.005
+    flux_temperature_unknown: float = 0.02
+    flux_temperature_unpowered: float = 0.01
+    torque: float = 0.01
+    resistance_temperature_known: float = 0.02
+    resistance_temperature_unknown: float = 0.05
+    inductance: float = 0.03
+    log: float = 0.03
+    inverter: float = 0.02
+    count: float = 0.002
+
+
+SPREAD = ModelSpread()
+UNPOWERED = ("open_circuit", "hand_turn", "spin_down")
+LINES = ("ia_a", "ib_a", "ic_a")
+TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
+
+
+def repeated(campaign: Campaign) -> tuple[Capture, ...]:
+    """The captures that another one of the campaign measures alike."""
+    ways = {capture.path: _way(capture) for capture in campaign.captures}
+    counts = Counter(ways.values())
+    return tuple(c for c in campaign.captures if counts[ways[c.path]] > 1)
+
+
+def readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tuple[Reading, ...]:
+    """Each quantity that each capture determines alone; what it does not determine is left out.
+
+    Parameters
+    ----------
+    motor_id
+        Of the campaign.
+    captures
+        Each is fitted by itself, by every estimator that takes its test.
+    options
+        Of the estimators, as in `fit_all`.
+
+    """
+    found: list[Reading] = []
+    for capture in captures:
+        constants, _, _ = fit_all(Campaign(motor_id, (capture,)), options)
+        for name, quantity in QUANTITIES.items():
+            estimate = constants.best(name)
+            if estimate is None or estimate.status != "measured" or estimate.number <= 0.0:
+                continue
+            reading = _reading(capture, estimate, quantity)
+            if math.isfinite(reading.u_rel_model):
+                found.append(reading)
+    return tuple(found)
+
+
+def _reading(capture: Capture, estimate: Estimate, quantity: Quantity) -> Reading:
+    return Reading(
+        quantity.name,
+        (estimate.method, *_way(capture)),
+        capture.path,
+        quantity.factor * estimate.number,
+        quantity.unit,
+        _own_scatter(estimate.budget, quantity.factor, capture.path),
+        math.hypot(_spread(capture, quantity.name), _inverter(capture, estimate)),
+    )
+
+
+def _own_scatter(budget: Budget, factor: float, path: str) -> Budget:
+    """The budget [unit of the quantity], scatter under the capture's name.
+
+    Few degrees of freedom widen a part as they widen its interval, for the test counts in normal
+    deviates.
+    """
+    parts: list[Contribution] = []
+    for part in budget:
+        u = factor * part.u * coverage_factor(part.dof) / coverage_factor(math.inf)
+        source = f"{part.source}#{path}" if part.kind == "A" else part.source
+        parts.append(replace(part, source=source, u=u, dof=math.inf))
+    return tuple(parts)
+
+
+def _spread(capture: Capture, quantity: str) -> float:
+    """The relative standard uncertainty of the method from one capture to the next [1]."""
+    known = any(capture.has(name) for name in TEMPERATURES)
+    if quantity == "pole_pairs":
+        return SPREAD.count
+    if quantity in ("ld_h", "lq_h"):
+        return SPREAD.inductance
+    if quantity == "r_phase_ohm":
+        own = (
+            SPREAD.resistance_temperature_known
+            if capture.has("temp_winding_degc")
+            else SPREAD.resistance_temperature_unknown
+        )
+    elif capture.meta.test == "torque_map":
+        own = SPREAD.torque if known else SPREAD.flux_temperature_unknown
+    elif capture.meta.test in UNPOWERED and not known:
+        stated = capture.meta.ambient_degc is not None
+        own = SPREAD.flux_temperature_known if stated else SPREAD.flux_temperature_unpowered
+    else:
+        own = SPREAD.flux_temperature_known if known else SPREAD.flux_temperature_unknown
+    return max(own, SPREAD.log) if capture.meta.test == "drive" else own
+
+
+def _inverter(capture: Capture, estimate: Estimate) -> float:
+    """What an inverter's unknown voltage is of a constant read from a commanded one [1].
+
+    The voltage over that which the constant makes up at the capture's largest speed or current.
+    """
+    by_voltage = any(part.source.startswith("voltage_commanded@") for part in estimate.budget)
+    if not by_voltage or not capture.has("vq_v"):
+        return 0.0
+    link_v = max(_largest(capture, "vdc_v"), capture.meta.vdc_v or 0.0)
+    unknown_v = SPREAD.inverter * max(link_v, math.sqrt(3.0) * _largest(capture, "vq_v"))
+    names = ("id_a", "iq_a") if estimate.unit == "ohm" else ("omega_mech_rad_s",)
+    reach = max(_largest(capture, name) for name in names)
+    if not reach and estimate.unit != "ohm" and capture.has("theta_mech_rad"):
+        reach = _fastest_rad_s(capture)
+    return unknown_v / (estimate.number * reach) if reach else math.inf
+
+
+def _largest(capture: Capture, name: str) -> float:
+    """The size that a column reaches, strays aside; 0 where it is not there."""
+    values = np.abs(capture.arrays(name)[name]) if capture.has(name) else np.zeros(0)
+    values = values[np.isfinite(values)]
+    return float(np.percentile(values, 95.0)) if values.size else 0.0
+
+
+def _fastest_rad_s(capture: Capture) -> float:
+    """The speed that the angle reaches, over pieces of a hundredth of the capture [rad/s]."""
+    data = capture.arrays("t_s", "theta_mech_rad")
+    there = np.isfinite(data["theta_mech_rad"])
+    t_s, angle = data["t_s"][there], data["theta_mech_rad"][there]
+    step = max(1, t_s.size // 100)
+    speed = np.abs(np.diff(angle[::step]) / np.diff(t_s[::step]))
+    return float(np.percentile(speed, 95.0)) if speed.size else 0.0
+
+
+def _way(capture: Capture) -> Way:
+    """What two captures must have in common to measure alike."""
+    meta = capture.meta
+    place: Way = (meta.test, meta.pair or "", meta.voltage_kind)
+    if meta.test != "current_step":
+        return place
+    angle = "" if meta.theta_elec_deg is None else f"{meta.theta_elec_deg % 180.0:.0f}"
+    return (*place, angle, _height(capture))
+
+
+def _height(capture: Capture) -> str:
+    """The class of a step's largest current, a quarter wide: inductance falls with current."""
+    names = [name for name in LINES if capture.has(name)]
+    largest = [np.nanmax(np.abs(c), initial=0.0) for c in capture.arrays(*names).values()]
+    most = float(max(largest, default=0.0))
+    return f"{round(math.log(most) / math.log(1.25))}" if most > 0.0 else ""

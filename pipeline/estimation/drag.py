@@ -1,0 +1,381 @@
+"""Inertia and drag from weak-form rows: Coulomb and viscous where that holds, a free curve else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from pipeline.estimation.nuisances import allowed_for
+from pipeline.estimation.shaft_rows import COAST, DRIVE, OVERLAP, ShaftRows
+from pipeline.numerics.clusters import cluster_covariance
+from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.selection import needed_columns
+
+Array = NDArray[np.float64]
+
+# Shares of the highest speed, denser where friction bends. Chords of a square of speed are off by
+# a quarter of the square of their width: by 1.2 % of the largest drag at most, within `MATERIAL`.
+KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
+# Widths of Stribeck's excess, from what the slowest rows resolve (`SLOWEST_SHARE`) to where it is
+# as good as viscous drag. A fifth apart, the nearest one is off by 7 % of the excess at most.
+BUMPS = tuple(float(f"{0.008 * 1.2**k:.3g}") for k in range(19))
+# As many as the estimator names beside orders of the angle: half or twice of it moved no constant
+# of ten simulated campaigns by a twentieth of its u.
+MOST_NUISANCES = 14
+# Two numbers stand for drag as long as they leave a fiftieth of it; the drag curve tells the rest.
+# At this limit a square root of speed beside them would have moved T_c by 20 %, B by 56 %, a cube
+# by 6 and 25 %: they are the law's constants then. Half or twice of it chose no other form.
+MATERIAL = 0.02
+# Six windows that share no sample, thrice what the two constants of drag need; one coast makes 39.
+ENOUGH_COASTING = 12
+# Drives of 0.3 to 0.8 s of two motors, 60 each: 3 to 10 rows gave J alike within a fifth of u, at
+# 15 a nuisance was left out that then stood in J.
+ROWS_A_COLUMN = 10
+LEAST_FREEDOM = 8
+# Errors by clusters are too small where these are few (Cameron and Miller, VI): at three, 0.4 to
+# 0.7 of the scatter of J over 60 drives of two motors, where the other way gave 1.0 to 1.4. At 12
+# to 24 it is 0.4 to 0.8 still, of a scatter that is a tenth of what the gains make of J, while the
+# other way gives up to three times too much.
+LEAST_CLUSTERS = 10
+# Two seconds of windows: longer than what converter, load and speed loop remember.
+LONGEST_MEMORY = 200
+# Below nought by chance once in 30,000.
+NEGATIVE = 4.0
+
+
+def _hat(index: int) -> Callable[[Array], Array]:
+    """Odd function of speed that is 1 at one knot and falls linearly to 0 at its neighbours."""
+    heights = [1.0 if k == index else 0.0 for k in range(len(KNOTS))]
+    return lambda x: np.sign(x) * np.interp(np.abs(x), KNOTS, heights)
+
+
+SHAPES: dict[str, Callable[[Array], Array]] = {
+    "gauss": lambda x: np.asarray(np.exp(-(x**2))),
+    "exponential": lambda x: np.asarray(np.exp(-np.abs(x))),
+    "rational": lambda x: np.asarray(1.0 / (1.0 + x**2)),
+}
+
+
+def _bump(shape: str, width: float) -> Callable[[Array], Array]:
+    """Stribeck's excess in one of the shapes in use (Armstrong-Hélouvry, Control of Machines with
+    Friction, 1991, 2.3), falling over a speed `width`.
+    """
+    return lambda x: np.sign(x) * SHAPES[shape](x / width)
+
+
+_BUMPS = {f"stribeck {shape} {width:g}": _bump(shape, width) for shape in SHAPES for width in BUMPS}
+DRAG_FORMS: dict[str, Callable[[Array], Array]] = {
+    "windage": lambda x: x * np.abs(x),
+    **_BUMPS,
+    **{f"knot {k}": _hat(k) for k in range(len(KNOTS))},
+}
+STRIBECK = tuple(_BUMPS)
+FORMS = ("windage", *STRIBECK)
+CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
+
+
+@dataclass(frozen=True, slots=True)
+class DragFit:
+    """Coefficients of A = g T - sum a_m f_m(w) - nuisances, how sure, and what they mean.
+
+    `free` tells that the drag curve was left free (columns `CURVE`) as Coulomb and viscous drag
+    with the known additions did not hold. `u_form` [3] is the allowance for the form of drag on
+    J, T_c, B; `reasons` [3] says why one of them is not identifiable, else is empty.
+    """
+
+    names: tuple[str, ...]
+    coefficients: Array
+    covariance: Array
+    residuals: Array
+    dof: int
+    free: bool
+    u_form: Array
+    reasons: tuple[str, str, str]
+    design: Array
+    sigma: Array
+    target: Array
+    fastest_rad_s: float
+
+    def refit(self, driving_nm: Array) -> Array:
+        """The coefficients with another driving torque [w] in the same columns."""
+        design = self.design.copy()
+        design[:, 0] = driving_nm
+        return linear_fit(design, self.target, self.sigma).coefficients
+
+    def constants(self, coefficients: Array) -> Array:
+        """J, T_c and B from coefficients in this fit's columns."""
+        inertia = 1.0 / coefficients[0]
+        if not self.free:
+            return np.array([inertia, coefficients[1] * inertia, coefficients[2] * inertia])
+        level, slope = _low_end(coefficients[1 : 1 + len(KNOTS)], self.fastest_rad_s)
+        return np.array([inertia, level * inertia, slope * inertia])
+
+    def scatter(self) -> Array:
+        """Factor [3, 3] of the covariance: rows J, T_c, B; columns the sources that they share."""
+        step = 1e-6 * np.maximum(np.abs(self.coefficients), np.sqrt(np.diag(self.covariance)))
+        columns = []
+        for k in range(self.coefficients.size):
+            moved = self.coefficients.copy()
+            moved[k] += step[k]
+            columns.append((self.constants(moved) - self.constants(self.coefficients)) / step[k])
+        slope = np.column_stack(columns)
+        joint = slope @ self.covariance @ slope.T
+        scale = np.sqrt(np.maximum(np.diag(joint), 1e-300))
+        correlation = joint / np.outer(scale, scale) + 1e-12 * np.eye(3)
+        values, vectors = np.linalg.eigh(correlation)
+        factor: Array = vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
+        return factor
+
+    def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
+        """Speed, drag torque and the published line, one point a window (at most 2000)."""
+        inertia = 1.0 / self.coefficients[0]
+        drag_columns = [k for k, name in enumerate(self.names) if name in _DRAG_NAMES]
+        modelled = self.design[:, drag_columns] @ self.coefficients[drag_columns]
+        keep = slice(None, None, -(-rows.count // 2000))
+        order = np.argsort(rows.speed_rad_s[keep], kind="stable")
+        _, level, slope = self.constants(self.coefficients)
+        speed = rows.speed_rad_s[keep][order]
+        drag = (-(modelled + self.residuals) * inertia)[keep][order]
+        return speed, drag, level * np.sign(speed) + slope * speed
+
+
+_DRAG_NAMES = ("coulomb", "viscous", *FORMS, *CURVE)
+
+
+def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level: float) -> DragFit:
+    """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve.
+
+    The rows' noise, and how many of them count as one, are judged on what the richest model
+    leaves: what a poor one leaves is large and correlated because it is poor.
+    """
+    y = rows.acceleration_rad_s2
+    usable = [n for n in nuisances if float(np.ptp(rows.columns[n])) > 0.0]
+    candidates = {name: -rows.columns[name] for name in [*usable, *FORMS]}
+    base = np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
+    curve_columns = [-rows.columns[n] for n in CURVE]
+    rich = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in usable)])
+    if rows.disjoint(DRIVE) < rich.shape[1]:
+        rich = base
+    most = min(MOST_NUISANCES, max(0, rows.disjoint(DRIVE) // ROWS_A_COLUMN - _drive_columns(rows)))
+    sigma = _balanced(rows, rich, y)
+    tau = autocorrelation_time(linear_fit(rich, y, sigma).residuals / sigma, LONGEST_MEMORY)
+    pool = {n: candidates[n] for n in [*usable, "windage"]}
+    chosen = needed_columns(base, pool, y, sigma, level, most, tau)
+    start = np.column_stack([base, *(candidates[n] for n in chosen)])
+    bumps = {n: candidates[n] for n in STRIBECK}
+    chosen += needed_columns(start, bumps, y, sigma, level, 1, tau)
+    chosen = _without_dip(chosen, base, candidates, y, sigma)
+    design = np.column_stack([base, *(candidates[n] for n in chosen)])
+    names = ("torque", "coulomb", "viscous", *chosen)
+    sigma = _balanced(rows, design, y)
+    plain = [n for n in chosen if n not in FORMS]
+    curve = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in plain)])
+    curve_names = ("torque", *CURVE, *plain)
+    free = _form_fails(rows, design, names, curve, curve_names, y, level) or _implausible(
+        rows, design, names, y, sigma
+    )
+    if free:
+        design, names = curve, curve_names
+        sigma = _balanced(rows, design, y)
+    found = linear_fit(design, y, sigma)
+    covariance, dof = _covariance(rows, design, found, sigma)
+    u_form, reasons = _form(found.coefficients, free, rows)
+    if not free:
+        u_form = _shape_doubt(base, candidates, chosen, found.coefficients, y, sigma)
+    return DragFit(
+        names, found.coefficients, covariance, found.residuals, dof, free, u_form, reasons,
+        design, sigma, y, rows.fastest_rad_s,
+    )  # fmt: skip
+
+
+def freedom(rows: ShaftRows) -> int:
+    """Disjoint drive windows beyond the columns that drives alone must determine."""
+    return rows.disjoint(DRIVE) - _drive_columns(rows)
+
+
+def _drive_columns(rows: ShaftRows) -> int:
+    """Columns that drives determine: g, and drag's two where no coast-down fixes them."""
+    return 1 if np.count_nonzero(rows.kind == COAST) >= ENOUGH_COASTING else 3
+
+
+def too_short(rows: ShaftRows) -> str:
+    """Why the drive windows cannot carry an inertia with its uncertainty, else empty.
+
+    The scatter s of v degrees of freedom is itself known to 1/sqrt(2v): a quarter at
+    `LEAST_FREEDOM`. Fewer tell neither how sure J is nor whether a nuisance is there.
+    Reference: JCGM 100:2008, E.4.3.
+    """
+    if freedom(rows) >= LEAST_FREEDOM:
+        return ""
+    return (
+        f"the drive logs hold only {rows.disjoint(DRIVE)} windows that share no sample and in "
+        f"which the shaft turns, {LEAST_FREEDOM + _drive_columns(rows)} are needed to know how "
+        "sure the inertia is"
+    )
+
+
+def torque_is_parted(design: Array, sigma: Array) -> bool:
+    """Whether the torque column (the first) is no combination of the others."""
+    scaled = design / sigma[:, None]
+    norm = np.linalg.norm(scaled, axis=0)
+    scaled = scaled / np.where(norm > 0.0, norm, 1.0)
+    others = scaled[:, 1:]
+    ranks = [int(np.linalg.matrix_rank(m, tol=1e-8)) for m in (scaled, others)]
+    return ranks[0] > ranks[1]
+
+
+def _covariance(
+    rows: ShaftRows, design: Array, found: LinearFit, sigma: Array
+) -> tuple[Array, int]:
+    """Covariance of the coefficients and its degrees of freedom.
+
+    Under any correlation inside clusters where the drives fill enough of them; with few, the
+    clusters' scores all but cancel (one alone: exactly, as least squares makes their sum zero),
+    so that the residual variance and the number of windows that count as one stand in.
+    Reference: Cameron and Miller, J. Human Resources 50(2), 2015, VI.
+    """
+    if np.unique(rows.cluster[rows.kind == DRIVE]).size >= LEAST_CLUSTERS:
+        return cluster_covariance(design, found.residuals, sigma, rows.cluster)
+    tau = max(autocorrelation_time(found.residuals / sigma, LONGEST_MEMORY), 1.0 / (1.0 - OVERLAP))
+    return found.covariance * found.chi2_dof * tau, max(freedom(rows), 1)
+
+
+def _balanced(rows: ShaftRows, design: Array, y: Array) -> Array:
+    """Standard deviation [w] of each row: one for drives, one for coast-downs, from the fit.
+
+    Each kind starts from what a fit of its own leaves, so that the better one leads.
+    """
+    sigma = np.ones(y.size)
+    floor = max(1e-6 * float(np.std(y)), 1e-300)
+    kinds = [mine for mine in (rows.kind == DRIVE, rows.kind == COAST) if np.any(mine)]
+    for mine in kinds:
+        residuals = linear_fit(design[mine], y[mine]).residuals
+        sigma[mine] = max(float(np.sqrt(np.mean(residuals**2))), floor)
+    for _ in range(3):
+        residuals = linear_fit(design, y, sigma).residuals
+        for mine in kinds:
+            sigma[mine] = max(float(np.sqrt(np.mean(residuals[mine] ** 2))), floor)
+    return sigma
+
+
+def _form_fails(
+    rows: ShaftRows,
+    design: Array,
+    names: Sequence[str],
+    curve: Array,
+    curve_names: Sequence[str],
+    y: Array,
+    level: float,
+) -> bool:
+    """Whether a free drag curve explains the rows better, beyond chance and beyond `MATERIAL`.
+
+    Coast-downs show drag alone, so where there are enough of them they decide: the form fails if
+    it leaves more than `MATERIAL` of their deceleration (they see a millionth of it). Else chance
+    is judged by F with correlation counted, and a free curve must also move the drag by more than
+    `MATERIAL` of itself (rms over the rows).
+    """
+    coasting = rows.kind == COAST
+    if np.count_nonzero(coasting) >= ENOUGH_COASTING:
+        straight_fit = linear_fit(design, y, _balanced(rows, design, y))
+        left = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
+        return bool(left > MATERIAL * np.sqrt(np.mean(y[coasting] ** 2)))
+    sigma = _balanced(rows, curve, y)
+    loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
+    costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
+    tau = autocorrelation_time(loose.residuals / sigma, LONGEST_MEMORY)
+    free = max((y.size - curve.shape[1]) / tau, 1.0)
+    extra = max(len(CURVE) - 2, 1)
+    statistic = (costs[1] - costs[0]) / extra / tau / (costs[0] / (y.size - curve.shape[1]))
+    if fdtrc(extra, free, max(statistic, 0.0)) >= level:
+        return False
+    curved = _drag_part(curve, loose, curve_names)
+    straight = _drag_part(design, strict, names)
+    return bool(np.std(curved - straight) > MATERIAL * np.sqrt(np.mean(curved**2)))
+
+
+def _without_dip(
+    chosen: list[str], base: Array, candidates: Mapping[str, Array], y: Array, sigma: Array
+) -> list[str]:
+    """The columns without Stribeck's where it came out below Coulomb friction: it is an excess."""
+    design = np.column_stack([base, *(candidates[n] for n in chosen)])
+    found = linear_fit(design, y, sigma).coefficients[base.shape[1] :]
+    values = dict(zip(chosen, found, strict=True))
+    return [n for n in chosen if n not in STRIBECK or values[n] > 0.0]
+
+
+def _shape_doubt(
+    base: Array,
+    candidates: Mapping[str, Array],
+    chosen: Sequence[str],
+    coefficients: Array,
+    y: Array,
+    sigma: Array,
+) -> Array:
+    """How far J, T_c and B move with the next best shape of Stribeck's excess: half of that."""
+    bumps = [n for n in chosen if n in STRIBECK]
+    if not bumps:
+        return np.zeros(3)
+    used = bumps[0].split()[1]
+    plain = np.column_stack([base, *(candidates[n] for n in chosen if n not in STRIBECK)])
+    others = [np.column_stack([plain, candidates[n]]) for n in STRIBECK if n.split()[1] != used]
+    fits = [linear_fit(design, y, sigma) for design in others]
+    second = min(fits, key=lambda f: f.chi2_dof).coefficients
+    apart = [
+        abs(second[k] / second[0] - coefficients[k] / coefficients[0]) if k else 0.0
+        for k in range(3)
+    ]
+    return np.array(apart) / 2.0
+
+
+def _implausible(
+    rows: ShaftRows, design: Array, names: Sequence[str], y: Array, sigma: Array
+) -> bool:
+    """Whether the fitted drag is no friction: a negative Coulomb or viscous part."""
+    found = linear_fit(design, y, sigma)
+    u = np.sqrt(np.diag(_covariance(rows, design, found, sigma)[0]))
+    parts = [names.index("coulomb"), names.index("viscous")]
+    return any(found.coefficients[k] < -NEGATIVE * u[k] for k in parts)
+
+
+def _drag_part(design: Array, found: LinearFit, names: Sequence[str]) -> Array:
+    """Drag [w] in torque that a fit gives each row: its drag columns over g."""
+    mine = [k for k, name in enumerate(names) if name in _DRAG_NAMES]
+    part: Array = design[:, mine] @ found.coefficients[mine] / found.coefficients[0]
+    return part
+
+
+def _low_end(curve: Array, fastest: float) -> tuple[float, float]:
+    """Drag extrapolated to standstill from the slowest knots, and the mean slope of the curve."""
+    speeds = np.array(KNOTS) * fastest
+    level = float(np.polyfit(speeds[:3], curve[:3], 1)[1])
+    slope = float(np.polyfit(speeds, curve, 1)[0])
+    return level, slope
+
+
+def _form(coefficients: Array, free: bool, rows: ShaftRows) -> tuple[Array, tuple[str, str, str]]:
+    """Allowance for the form of drag, and why a constant of it has no meaning."""
+    if not free:
+        return np.zeros(3), ("", "", "")
+    inertia = 1.0 / coefficients[0]
+    curve = coefficients[1 : 1 + len(KNOTS)] * inertia
+    slope = np.diff(curve) / (np.diff(KNOTS) * rows.fastest_rad_s)
+    level = _low_end(curve, rows.fastest_rad_s)[0]
+    beyond = float(curve[1] - (curve[2] - curve[1]) * KNOTS[1] / (KNOTS[2] - KNOTS[1]))
+    spread = max(abs(float(curve[0]) - level), abs(beyond - level))
+    why = (
+        "drag is not Coulomb and viscous: its slope runs from "
+        f"{slope.min():.2g} to {slope.max():.2g} N·m·s/rad over the speeds; see the drag curve, "
+        "and record spin_downs with and without the suspected drag"
+    )
+    return np.array([0.0, spread, 0.0]), ("", "", why)
+
+
+def drag_words(found: DragFit) -> str:
+    """What stands in the fit beside Coulomb and viscous drag, in words."""
+    added = [n for n in found.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
+    words = "drag curve left free, its form is not Coulomb and viscous" if found.free else ""
+    return "; ".join(w for w in (words, allowed_for(added)) if w) or "Coulomb and viscous drag hold"

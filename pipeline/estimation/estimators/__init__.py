@@ -1,0 +1,1 @@
+"""One constant's file each; `pipeline.estimation.registry` finds them by their `ESTIMATOR`."""

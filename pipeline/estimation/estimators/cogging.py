@@ -1,0 +1,326 @@
+"""Cogging orders and creep friction from a slow turn at zero current, both ways."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from pipeline.estimation.instruments import instrument_uncertainties, unstated_note
+from pipeline.estimation.measured import measured
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.orders import (
+    TURN_RAD,
+    OrderLine,
+    Spectrum,
+    Turn,
+    detection_limit,
+    find_orders,
+    half_peak_to_peak,
+    largest_order,
+    noise_power,
+    phase_modulated,
+    waveform,
+    whole_turns,
+)
+from pipeline.physics.glossary import CONSTANTS
+from pipeline.physics.mechanics import cogging_order
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, Order, not_identifiable, not_there
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Contribution
+
+NAME = "cogging"
+COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
+GIVES = (*COGGING, "torque_coulomb_nm")
+AIDS = ("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s")
+STRANGER_LEVEL = 1e-6
+EXPERIMENT = (
+    "record a cogging test: zero current, at least one slow whole turn each way, with "
+    "theta_mech_rad and torque_shaft_nm"
+)
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Orders of T(theta) that repeat from turn to turn, and the drag that changes with direction.
+
+    T_shaft = T_0 - T_friction sign(omega) - T_cogging(theta). The mean over both directions holds
+    the cogging, half their difference the friction. References: Zhu and Howe, IEEE Trans. Energy
+    Conversion 15(4), 2000 (which orders a motor makes); numerics.orders (the test).
+    """
+    captures = [c for c in campaign.of("cogging") if c.has("theta_mech_rad", "torque_shaft_nm")]
+    turns: list[Turn] = []
+    for capture in captures:
+        data = capture.arrays("theta_mech_rad", "torque_shaft_nm")
+        there = np.isfinite(data["theta_mech_rad"])
+        turns += whole_turns(data["theta_mech_rad"][there], data["torque_shaft_nm"][there])
+    if len(turns) < 2:
+        note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    highest = largest_order(turns, int(options["highest_order"]))
+    spec, lines = find_orders(turns, highest, options["level"])
+    body, slow = part_orders(lines, known, campaign)
+    estimates = _cogging(captures, spec, body, slow, known, campaign, options)
+    estimates += (_friction(captures, turns, spec, known),)
+    return Fit(estimates, _evidence(turns, spec, body))
+
+
+def part_orders(
+    lines: Sequence[OrderLine], known: Constants, campaign: Campaign
+) -> tuple[list[OrderLine], list[OrderLine]]:
+    """Orders that teeth and magnets can make, and those of once and twice a turn that they cannot.
+
+    Unbalance, a bent shaft and an eccentric coupling make orders 1 and 2 in any motor; they are
+    cogging only in a motor of one or two pole pairs or slots.
+    """
+    pairs = known.best("pole_pairs")
+    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    own = {n for n in (poles, campaign.nameplate("slots")) if isinstance(n, int)}
+    slow = [line for line in lines if line.order <= 2 and not own & {1, line.order}]
+    return [line for line in lines if line not in slow], slow
+
+
+def peak_orders(
+    lines: Sequence[OrderLine],
+    spec: Spectrum,
+    teeth: Sequence[int],
+    sides: Sequence[OrderLine],
+) -> list[OrderLine]:
+    """The orders that the peak is made of: what the motor can make, and strangers past doubt.
+
+    Over a turn the crest of any further order meets that of the others somewhere, so a false one
+    adds its whole height. Multiples of the leading order, of `teeth` (slots, poles) and the
+    encoder's `sides` count as found, others only where p < `STRANGER_LEVEL`. The second and third
+    multiple of the leading order are in whatever their test says: they bend the crests of every
+    real motor, and as measured they are unbiased.
+    """
+    leading = lines[0].order
+    known = [leading, *teeth]
+    kept = [
+        line
+        for line in lines
+        if line in sides
+        or line.p_value < STRANGER_LEVEL
+        or any(line.order % order == 0 for order in known)
+    ]
+    there = {line.order for line in kept}
+    local, _, dof = noise_power(spec)
+    for order in (2 * leading, 3 * leading):
+        if order not in there and order <= int(spec.orders[-1]):
+            mean = complex(spec.coefficients[:, order - 1].mean())
+            u = float(np.sqrt(local[order - 1] / (2.0 * spec.turns)))
+            kept.append(OrderLine(order, mean, u, dof, 1.0))
+    return kept
+
+
+def _teeth(known: Constants, campaign: Campaign) -> list[int]:
+    """Slots and poles a turn, as far as they are known."""
+    pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
+    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    found = [slots, 2 * poles if isinstance(poles, int) else None]
+    return [n for n in found if isinstance(n, int) and n > 1]
+
+
+def name_orders(lines: Sequence[OrderLine], known: Constants, campaign: Campaign) -> str:
+    """What each order found says of the motor, in words."""
+    pairs, slots = known.best("pole_pairs"), campaign.nameplate("slots")
+    p = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    words = []
+    for line in lines[:8]:
+        k = line.order
+        if isinstance(slots, int) and isinstance(p, int) and k % cogging_order(slots, p) == 0:
+            why = " (LCM of slots and poles)"
+        elif isinstance(slots, int) and k % slots == 0:
+            why = " (slots)"
+        elif isinstance(p, int) and k % (2 * p) == 0:
+            why = " (poles)"
+        elif isinstance(p, int) and k % p == 0:
+            why = " (pole pairs)"
+        else:
+            why = ""
+        words.append(f"{k}{why}: {line.amplitude:.3g}")
+    return ", ".join(words)
+
+
+def _cogging(
+    captures: Sequence[Capture],
+    spec: Spectrum,
+    lines: Sequence[OrderLine],
+    slow: Sequence[OrderLine],
+    known: Constants,
+    campaign: Campaign,
+    options: Mapping[str, float],
+) -> tuple[Estimate, ...]:
+    also = f"; also {name_orders(slow, known, campaign)} N·m, of unbalance or coupling" * bool(slow)
+    tested = f"{spec.orders.size} orders tested over {spec.turns} turns at {options['level']:g}"
+    if not lines:
+        limit = detection_limit(spec, options["level"])
+        note = f"no cogging found; an amplitude above {limit:.2g} N·m would have been; {tested}"
+        return tuple(not_there(n, _unit(n), NAME, note + also) for n in COGGING)
+    leading = lines[0]
+    sides = phase_modulated(lines, leading.order)
+    amplitude = float(np.sqrt(sum(line.amplitude**2 for line in [leading, *sides])))
+    note = f"N·m by order: {name_orders(lines, known, campaign)}; {tested}{also}"
+    if sides:
+        note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
+    peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
+    note += "; " * bool(unstated_note(captures, ("torque",))) + unstated_note(captures, ("torque",))
+    paths = tuple(c.path for c in captures)
+    dof = min(line.dof for line in lines)
+    return (
+        Estimate("cogging_order", leading.order, "1", "measured", NAME, captures=paths, note=note,
+                 bounds=(1.0, float(spec.orders[-1]))),
+        replace(
+            _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, captures, note),
+            orders=_published(lines),
+        ),
+        _torque("cogging_peak_nm", peak, u_peak, dof, captures, note),
+    )  # fmt: skip
+
+
+def _published(lines: Sequence[OrderLine]) -> tuple[Order, ...]:
+    """The orders found, by order."""
+    return tuple(
+        Order(line.order, line.amplitude, line.u, float(np.angle(line.coefficient)))
+        for line in sorted(lines, key=lambda line: line.order)
+    )
+
+
+def _torque(
+    name: str,
+    value: float,
+    u: float,
+    dof: float,
+    captures: Sequence[Capture],
+    note: str,
+    speed_rad_s: float | None = None,
+) -> Estimate:
+    parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof)]
+    gains = instrument_uncertainties(captures, ("torque",))
+    parts += [Contribution(source, value * gain, "B") for source, gain in gains.items()]
+    at = {} if speed_rad_s is None else {"omega_mech_rad_s": speed_rad_s}
+    return measured(NAME, name, _unit(name), value, parts, captures, at, [note])
+
+
+def _friction(
+    captures: Sequence[Capture], turns: Sequence[Turn], spec: Spectrum, known: Constants
+) -> Estimate:
+    name = "torque_coulomb_nm"
+    forward, backward = spec.means[spec.senses > 0], spec.means[spec.senses < 0]
+    if forward.size == 0 or backward.size == 0:
+        note = "one sense of rotation only; record the slow turn the other way as well"
+        return not_identifiable(name, _unit(name), NAME, note)
+    value = float(backward.mean() - forward.mean()) / 2.0
+    variance, dof = _variance_of_mean(spec, forward, backward)
+    u = float(np.sqrt(variance * (1.0 / forward.size + 1.0 / backward.size)) / 2.0)
+    if value < -3.0 * u:
+        note = "the shaft torque drives the motion; check the sign of torque_shaft_nm"
+        return not_identifiable(name, _unit(name), NAME, note)
+    zero = float(backward.mean() + forward.mean()) / 2.0
+    speed = _speed(captures)
+    share, words = _viscous_share(speed, known)
+    value, u = value * (1.0 - share), u * (1.0 - share)
+    note = (
+        f"drag at creep speed, with Stribeck's excess in it{words}; transducer zero {zero:.2g} N·m "
+        f"parted by direction; {len(turns)} turns"
+    )
+    return _torque(name, value, u, dof, captures, note, speed)
+
+
+def _viscous_share(speed_rad_s: float | None, known: Constants) -> tuple[float, str]:
+    """Share of the drag at this speed that is viscous, by the coast-down's ratio B/T_c."""
+    coulomb, viscous = known.best("coast_coulomb_rad_s2"), known.best("coast_viscous_1_s")
+    if speed_rad_s is None or coulomb is None or viscous is None or coulomb.number <= 0.0:
+        return 0.0, " and the viscous part"
+    slope = max(viscous.number, 0.0) * speed_rad_s
+    return slope / (coulomb.number + slope), ", the viscous part taken off by the coast-down"
+
+
+def _variance_of_mean(
+    spec: Spectrum, forward: NDArray[np.float64], backward: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Variance of one turn's mean and its dof: the noise at the lowest orders, or the means' own.
+
+    A mean is the coefficient of order 0, whose noise is a quarter of E|c|² next to it.
+    """
+    local, _, dof = noise_power(spec)
+    predicted = float(local[0]) / 4.0
+    free = forward.size + backward.size - 2
+    if free > 0:
+        squares = np.sum((forward - forward.mean()) ** 2) + np.sum(
+            (backward - backward.mean()) ** 2
+        )
+        seen = float(squares) / free
+        if predicted == 0.0 or fdtrc(free, dof, seen / predicted) < 0.01:
+            return seen, float(free)
+    return predicted, dof
+
+
+def _speed(captures: Sequence[Capture]) -> float | None:
+    """Mean speed of the slow turns [rad/s], either sense; None where no angle tells it.
+
+    Rows without an angle are left out. The path is summed over a few hundred points, so that the
+    angle's noise does not lengthen it.
+    """
+    speeds = []
+    for capture in captures:
+        if not capture.has("t_s", "theta_mech_rad"):
+            continue
+        data = capture.arrays("t_s", "theta_mech_rad")
+        there = np.isfinite(data["t_s"]) & np.isfinite(data["theta_mech_rad"])
+        t, theta = data["t_s"][there], data["theta_mech_rad"][there]
+        every = max(1, t.size // 500)
+        t, theta = t[::every], theta[::every]
+        if t.size > 1:
+            speeds.append(float(np.sum(np.abs(np.diff(theta))) / (t[-1] - t[0])))
+    return float(np.mean(speeds)) if speeds else None
+
+
+def _evidence(
+    turns: Sequence[Turn], spec: Spectrum, lines: Sequence[OrderLine]
+) -> tuple[Evidence, ...]:
+    bins = 1800
+    series = []
+    for sense, label in ((1, "forward"), (-1, "backward")):
+        of_sense = [turn for turn in turns if turn.sense == sense]
+        if not of_sense:
+            continue
+        angle = np.concatenate([np.mod(turn.theta_rad, TURN_RAD) for turn in of_sense])
+        torque = np.concatenate([turn.value for turn in of_sense])
+        index = np.minimum((angle * (bins / TURN_RAD)).astype(np.int64), bins - 1)
+        count = np.bincount(index, minlength=bins)
+        at = np.flatnonzero(count)
+        mean = np.bincount(index, weights=torque, minlength=bins)[at] / count[at]
+        where = (at.astype(np.float64) + 0.5) * (TURN_RAD / bins)
+        level = float(np.mean(spec.means[spec.senses == sense]))
+        series.append(Series(label, where, mean, level + waveform(lines, where)))
+    shown = min(spec.orders.size, 2000, max(4 * max((n.order for n in lines), default=0), 200))
+    heights = np.abs(spec.coefficients.mean(axis=0))[:shown]
+    bars = Series("orders", spec.orders[:shown].astype(float), heights, np.array([]))
+    return (
+        Evidence(NAME, "Zero-current torque over one turn", "theta_mech_rad", "torque_shaft_nm",
+                 "line", tuple(series), caption="half the gap between the directions is friction"),
+        Evidence(NAME, "Cogging spectrum", "cogging_order", "cogging_amplitude_nm", "bars",
+                 (bars,), caption="mean over turns and directions"),
+    )  # fmt: skip
+
+
+def _unit(name: str) -> str:
+    return CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("cogging",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=AIDS,
+    aids=AIDS,
+    rank=10,
+    options={"highest_order": 1000.0, "level": 0.01},
+)

@@ -1,0 +1,229 @@
+"""Ld and Lq near zero current from voltage steps on a locked rotor, saturation parted off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.instruments import budget_of, unstated_note
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.step_budget import (
+    birge_ratio,
+    gains,
+    rotor_angles,
+    rounded_levels,
+    unexplained,
+)
+from pipeline.estimation.step_fit import AXES, Offer, Solution, between_models, offers_of, solve
+from pipeline.estimation.step_model import SHARED, SPACE, Drive, StepModel, along_ramp, drive_of
+from pipeline.estimation.step_record import StepRecord, disagreement, read_step
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.plateaus import decimated
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Contribution
+
+NAME = "current_step"
+GIVES = ("ld_h", "lq_h")
+EXPERIMENT = (
+    "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
+    "and 60), both senses of current, two or more amplitudes"
+)
+Array = NDArray[np.float64]
+
+
+def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Least squares of the simulated current on the measured one, all captures together.
+
+    Saturation terms come in where the Bayesian information criterion pays for them; what the
+    rejected ones would still change is in the uncertainty.
+    Gains scale v and i, and L with v/i. References: Schwarz, Ann. Statist. 6(2), 1978 (BIC);
+    Hoeting et al., Statist. Sci. 14(4), 1999, eq. 5 (variance between models).
+    """
+    del known
+    records, notes = _records(campaign.of("current_step"))
+    axes = _axes_told(records, options["least_share"])
+    odd = disagreement(records)
+    if odd or not axes:
+        reason = "; ".join([*notes, odd or EXPERIMENT])
+        return Fit(tuple(not_identifiable(n, "H", NAME, reason) for n in GIVES))
+    model = StepModel(records)
+    solution = solve(model, axes)
+    limit = options["most_unexplained"]
+    bad = [f"{path} ({x:.0%})" for path, x in unexplained(solution).items() if not x <= limit]
+    if bad:
+        words = f"the current of {', '.join(bad)} is no step on a locked rotor; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, "H", NAME, words) for n in GIVES))
+    used = tuple(r.capture for r in records)
+    notes.append(unstated_note(used, ("voltage", "current")))
+    offers = offers_of(solution, axes, solution.sigmas)
+    estimates = []
+    for name in GIVES:
+        if name not in axes:
+            missing = f"no step with enough current on the {name[1]} axis; {EXPERIMENT}"
+            estimates.append(not_identifiable(name, "H", NAME, missing))
+            continue
+        estimates.append(_estimate(name, solution, offers[name], notes, options))
+    return Fit(tuple(estimates), tuple(_evidence(solution, axes)))
+
+
+def _records(captures: Sequence[Capture]) -> tuple[list[StepRecord], list[str]]:
+    records: list[StepRecord] = []
+    notes: list[str] = []
+    for capture in captures:
+        try:
+            record = read_step(capture)
+        except KeyError as error:
+            notes.append(str(error.args[0]))
+            continue
+        if record is None:
+            notes.append(f"{capture.path}: no step stands out of the noise")
+        else:
+            records.append(record)
+    return records, notes
+
+
+def _axes_told(records: Sequence[StepRecord], least_share: float) -> tuple[str, ...]:
+    """Which of Ld and Lq these rotor angles tell apart: L = 2 (cos² Ld + sin² Lq)."""
+    if not records:
+        return ()
+    cos2 = np.array([math.cos(r.axis_rad) ** 2 for r in records])
+    if np.ptp(cos2) > least_share:
+        return GIVES
+    if np.all(cos2 > 1.0 - 0.1 * least_share):
+        return ("ld_h",)
+    return ("lq_h",) if np.all(cos2 < 0.1 * least_share) else ()
+
+
+def _estimate(
+    name: str,
+    solution: Solution,
+    offers: Sequence[Offer],
+    notes: Sequence[str],
+    options: Mapping[str, float],
+) -> Estimate:
+    place, terms = AXES[name]
+    value = float(solution.parameters[place])
+    scatter = math.sqrt(max(float(solution.covariance()[place, place]), 0.0))
+    scatter *= birge_ratio(solution)
+    parts = [Contribution(f"scatter:{NAME}:{name}", scatter, "A")]
+    between = between_models(solution, offers)
+    parts.append(Contribution(f"scatter:{NAME}:saturation:{name}", between, "A"))
+    rounding = rounded_levels(name, solution)
+    parts.append(Contribution(f"scatter:{NAME}:rounding:{name}", rounding, "A"))
+    parts += gains(name, solution)
+    parts += rotor_angles(name, solution, math.radians(options["u_theta_elec_deg"]))
+    largest = max(SPACE * r.largest_a * abs(_share(r, name)) for r in solution.model.records)
+    at: dict[str, float | int | str] = {"current_a": 0.0, "current_largest_a": largest}
+    words = [n for n in notes if n]
+    if any(solution.free[list(terms)]):
+        ratio = _incremental(name, solution, largest) / value
+        words.append(f"incremental {ratio - 1.0:+.1%} at {largest:.3g} A on this axis")
+    else:
+        words.append(f"no saturation seen up to {largest:.3g} A on this axis")
+    bounds = (1e-3 * value, 1e3 * value)
+    paths = tuple(r.capture.path for r in solution.model.records)
+    note = "; ".join(words)
+    return Estimate(name, value, "H", "measured", NAME, budget_of(parts), at, paths, note, bounds)
+
+
+def _share(record: StepRecord, name: str) -> float:
+    return math.cos(record.axis_rad) if name == "ld_h" else math.sin(record.axis_rad)
+
+
+def _incremental(name: str, solution: Solution, current_a: float) -> float:
+    """Incremental inductance of one axis at an axis current [A]."""
+    ramp = np.linspace(0.0, current_a / SPACE, 81)
+    shared = solution.parameters[: len(SHARED)]
+    return float(along_ramp(shared, 1.0 if name == "ld_h" else 0.0, ramp)[-1]) / 2.0
+
+
+def _chord(record: StepRecord, drive: Drive) -> float:
+    """Mean inductance [H] between the terminals over one capture, by the integrated form.
+
+    i = (1/L) ∫v dt - (R/L) ∫i dt + c with the open voltages and the edges found as v, which are
+    exact, and the resistance of pair and supply as R.
+    """
+    edges_s = drive.edges_s[0]
+    areas = np.concatenate([[0.0], np.cumsum(drive.levels_v[0] * np.diff(edges_s))])
+    volts = np.interp(record.t_s, edges_s, areas)
+    mean = 0.5 * (record.i_a[1:] + record.i_a[:-1])
+    amps = np.concatenate([[0.0], np.cumsum(mean * np.diff(record.t_s))])
+    design = np.column_stack([volts, amps, np.ones(volts.size)])
+    fit = linear_fit(design, record.i_a, 1.0 / np.sqrt(record.count))
+    return 1.0 / float(fit.coefficients[0]) if fit.coefficients[0] != 0.0 else math.nan
+
+
+def _evidence(solution: Solution, axes: Sequence[str]) -> list[Evidence]:
+    model = solution.model
+    found = [_saturation_plot(solution, axes)]
+    predicted = model.predict([solution.parameters[None, :]] * len(model.records))
+    for record, current in zip(model.records, predicted, strict=True):
+        rows = decimated(record.t_s.size)
+        found.append(
+            Evidence(
+                NAME,
+                f"Step response on {record.pair}",
+                "t_s",
+                f"i{record.pair[0]}_a",
+                "line",
+                (Series("current", record.t_s[rows], record.i_a[rows], current[rows, 0]),),
+                record.capture.path,
+                "Current of the locked rotor; the fit is one model for all steps.",
+            )
+        )
+    return found
+
+
+def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:
+    """Inductance between the terminals of each step against its largest current."""
+    model = solution.model
+    series = []
+    for name in axes:
+        x, y, fitted = [], [], []
+        for record, at, own in zip(
+            model.records, model.layout.starts, model.layout.own, strict=True
+        ):
+            if abs(_share(record, name)) < math.sqrt(0.5):
+                continue
+            drive = drive_of(record, own, solution.parameters[None, at : at + own.size])
+            peak = float(record.i_a[int(np.argmax(np.abs(record.i_a)))])
+            ramp = np.linspace(0.0, peak, 41)
+            shared = solution.parameters[: len(SHARED)]
+            inside = along_ramp(shared, math.cos(record.axis_rad), ramp)
+            x.append(peak)
+            y.append(_chord(record, drive))
+            fitted.append(float(inside.mean()))
+        order = np.argsort(x)
+        series.append(Series(name, np.array(x)[order], np.array(y)[order], np.array(fitted)[order]))
+    return Evidence(
+        NAME,
+        "Inductance between the terminals against the step's largest current",
+        "current_a",
+        "inductance_ll_h",
+        "scatter",
+        tuple(series),
+        caption="Mean over each step by the integrated form, beside the model; twice Ld or Lq.",
+    )
+
+
+ESTIMATOR = Estimator(
+    NAME,
+    GIVES,
+    ("current_step",),
+    EXPERIMENT,
+    fit_current_step,
+    clock_powers=dict.fromkeys(GIVES, 1),
+    options={
+        "least_share": 0.2,
+        # Rms over the current's span: lag in iron and a warming winding leave a tenth of this.
+        "most_unexplained": 0.02,
+        # A rotor that current aligned stops short by asin(friction / holding torque).
+        "u_theta_elec_deg": 0.5,
+    },
+)

@@ -1,0 +1,368 @@
+"""Back-EMF constant and resistance from the voltages of an everyday drive log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.instruments import (
+    budget_of,
+    contributions,
+    current_source,
+    instrument_uncertainties,
+    temperature_source,
+    unstated_note,
+    voltage_source,
+)
+from pipeline.estimation.integrals import trapezoid
+from pipeline.estimation.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.nuisances import allowed_for
+from pipeline.estimation.operating_points import pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.regimes import (
+    Disagreement,
+    Partition,
+    Regression,
+    disagreement,
+    halves,
+    signs,
+)
+from pipeline.numerics.clusters import cluster_covariance
+from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.plateaus import decimated
+from pipeline.numerics.selection import needed_columns
+from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed, weak_rows
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Budget, Contribution, propagate
+
+Array = NDArray[np.float64]
+
+NAME = "drive_voltage"
+GIVES = ("ke_phase_peak_v_s_rad", "r_phase_ohm")
+EXPERIMENT = (
+    "record a drive with vq_v, iq_a and theta_mech_rad over a wide range of speed and current, or "
+    "better an open_circuit and a resistance test"
+)
+WIDTHS_S = (0.03, 0.1)
+CLUSTER_S = 0.25
+U_UNKNOWN_K = 15.0
+HOLD = "assumed:voltage_hold"
+D_FLUX = "d flux"
+CANDIDATES = ("zero", "acceleration", "turned", "cross flux")
+
+
+@dataclass(frozen=True, slots=True)
+class VoltageRows:
+    """Window means of the q voltage equation; every array is [w].
+
+    `speed_rad_s` and `current_a` come with their products with temperature above 25 degC;
+    `columns` holds the nuisances; `hold_doubt` is what it may matter that an inverter holds its
+    voltage still over a centred period while the rotor turns (relative, of the back-EMF).
+    """
+
+    captures: tuple[Capture, ...]
+    capture: NDArray[np.int64]
+    cluster: NDArray[np.int64]
+    time_s: Array
+    voltage_v: Array
+    current_a: Array
+    speed_rad_s: Array
+    warm_current_k_a: Array
+    warm_speed_k_rad_s: Array
+    columns: Mapping[str, Array]
+    hold_doubt: float
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Ke and R of v_q = R i_q + Ke w + L di_q/dt + V_0 sign(i_q) + w_e L_d i_d + lateness.
+
+    The weak form takes w and di_q/dt without differentiating; w is the angle's own rate, since a
+    bench's speed estimate lags. The flux of the d current stands in the equation wherever i_d is
+    logged and parts from the speed. Lateness of the voltage against the angle shows as Ke tau dw/dt
+    and joins, as a zero error and a turned frame do, where the data demand it. Without
+    temperatures the values hold for those of the log. Reference: Messenger and Bortz 2021 (weak
+    form); dq equations of IEEE Std 1812-2014.
+    """
+    rows = _rows(campaign.of("drive"), pole_pairs_of(known, campaign.nameplate("pole_pairs")))
+    if rows is None or rows.voltage_v.size < 20 or float(np.ptp(rows.speed_rad_s)) == 0.0:
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, EXPERIMENT) for n in GIVES))
+    magnet, magnet_parts = magnet_coefficient(known)
+    chosen = _chosen(rows, magnet, options["level"])
+    design = _design(rows, magnet, chosen, {})
+    found = linear_fit(design, rows.voltage_v)
+    if not found.full_rank:
+        note = f"speed and current of the log go together; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    ones = np.ones(rows.voltage_v.size)
+    covariance, dof = cluster_covariance(design, found.residuals, ones, rows.cluster)
+    regression = Regression(design, rows.voltage_v, ones, rows.cluster)
+    split = partial(_partitions, rows)
+    doubts = [disagreement(regression, k, split, options["level"]) for k in range(len(GIVES))]
+    estimates = _estimates(rows, found, covariance, dof, (magnet, magnet_parts), chosen, doubts)
+    return Fit(estimates, _evidence(rows, found))
+
+
+def _partitions(rows: VoltageRows, information: Array) -> list[Partition]:
+    """Regimes of the rows by speed, senses, current and capture."""
+    every = np.ones(rows.voltage_v.size, dtype=bool)
+    speed, current = rows.speed_rad_s, rows.current_a
+    files = tuple(f"in {capture.path}" for capture in rows.captures)
+    return [
+        halves("speed", np.abs(speed), "slow", "fast", information, every),
+        halves("current", np.abs(current), "small", "large", information, every),
+        signs("sense of rotation", speed, "backward", "forward", every),
+        signs("sense of torque", current, "negative", "positive", every),
+        Partition("capture", rows.capture, files),
+    ]
+
+
+def _rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | None:
+    pieces: list[dict[str, Array]] = []
+    used: list[Capture] = []
+    for capture in captures:
+        piece = _of_capture(capture, len(used), pole_pairs)
+        if piece is not None:
+            pieces.append(piece)
+            used.append(capture)
+    if not pieces:
+        return None
+    shared = set.intersection(*(set(piece) for piece in pieces))
+    joined = {k: np.concatenate([p[k] for p in pieces]) for k in pieces[0] if k in shared}
+    return VoltageRows(
+        captures=tuple(used),
+        capture=joined.pop("capture").astype(np.int64),
+        cluster=joined.pop("cluster").astype(np.int64),
+        time_s=joined.pop("time_s"),
+        voltage_v=joined.pop("voltage_v"),
+        current_a=joined.pop("current_a"),
+        speed_rad_s=joined.pop("speed_rad_s"),
+        warm_current_k_a=joined.pop("warm_current_k_a"),
+        warm_speed_k_rad_s=joined.pop("warm_speed_k_rad_s"),
+        hold_doubt=float(np.sqrt(np.mean(joined.pop("hold") ** 2))),
+        columns=joined,
+    )
+
+
+def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[str, Array] | None:
+    angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
+    if not capture.has("t_s", "vq_v", "iq_a", angle):
+        return None
+    optional = ("id_a", "vd_v", "temp_winding_degc", "temp_magnet_degc")
+    names = ["t_s", "vq_v", "iq_a", angle, *(n for n in optional if capture.has(n))]
+    data = capture.arrays(*names)
+    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    data = {name: column[fine] for name, column in data.items()}
+    t, theta = data["t_s"], data[angle]
+    if t.size < 10 * LEAST_SAMPLES:
+        return None
+    if angle == "omega_mech_rad_s":
+        theta = trapezoid(t, theta)
+    period = float(np.median(np.diff(t)))
+    try:
+        weak = weak_rows(t, min(max(WIDTHS_S[0], 3 * LEAST_SAMPLES * period), WIDTHS_S[1]))
+        speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
+    except ValueError:
+        return None
+    i_q = data["iq_a"]
+    i_d = data.get("id_a", np.zeros(t.size))
+    v_d, v_q = _instant(capture, data, speed, pole_pairs, period)
+    winding = data.get("temp_winding_degc", np.full(t.size, 25.0)) - 25.0
+    rotor = data.get("temp_magnet_degc", np.full(t.size, 25.0)) - 25.0
+    modulus = np.hypot(i_d, i_q)
+    noise = 0.02 * float(np.max(modulus)) if modulus.size else 0.0
+    found = {
+        "capture": np.full(weak.count, float(index)),
+        "cluster": np.floor((weak.centres_s - weak.centres_s[0]) / CLUSTER_S) + 1e6 * index,
+        "time_s": weak.centres_s,
+        "voltage_v": weak.integral(v_q),
+        "current_a": weak.integral(i_q),
+        "speed_rad_s": weak.integral(theta, 1),
+        "warm_current_k_a": weak.integral(i_q * winding),
+        "warm_speed_k_rad_s": weak.integral(speed * rotor),
+        "inductive": weak.integral(i_q, 1),
+        "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
+        "zero": np.ones(weak.count),
+        "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
+        "cross flux": weak.integral(speed * i_q**2),
+        "acceleration": weak.integral(theta, 2),
+    }
+    if capture.has("id_a"):
+        found[D_FLUX] = weak.integral(speed * i_d)
+    if v_d is not None:
+        found["turned"] = weak.integral(speed * v_d)
+    return found
+
+
+def _instant(
+    capture: Capture,
+    data: Mapping[str, Array],
+    speed: Array,
+    pole_pairs: int | None,
+    period_s: float,
+) -> tuple[Array | None, Array]:
+    """Voltages at the sampling instant: period means turned back and undamped (needs p)."""
+    timing = capture.meta.voltage_timing
+    v_d, v_q = data.get("vd_v"), data["vq_v"]
+    if timing == "instant" or pole_pairs is None:
+        return v_d, v_q
+    half = 0.5 * pole_pairs * speed * period_s
+    damping = np.sinc(half / np.pi)
+    if timing == "centred" or v_d is None:
+        return (None if v_d is None else v_d / damping), v_q / damping
+    turned = (v_d + 1j * v_q) * np.exp(-1j * half) / damping
+    return np.real(turned), np.imag(turned)
+
+
+def _hold_doubt(capture: Capture, speed: Array, pole_pairs: int | None, period_s: float) -> float:
+    """(1/cos(w T / 2) - 1)/sqrt(3) at the rms speed: polygon or circle, rectangular (GUM 4.3.7)."""
+    if capture.meta.voltage_timing != "centred":
+        return 0.0
+    half = 0.5 * (pole_pairs or 1) * float(np.sqrt(np.mean(speed**2))) * period_s
+    return float((1.0 / np.cos(min(half, 1.0)) - 1.0) / np.sqrt(3.0))
+
+
+def _gains(rows: VoltageRows, shift: Mapping[str, float]) -> tuple[Array, Array, Array]:
+    metas = [c.meta for c in rows.captures]
+    voltage = np.array([1.0 + shift.get(voltage_source(m), 0.0) for m in metas])
+    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])
+    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])
+    return voltage[rows.capture], current[rows.capture], warmer[rows.capture]
+
+
+def _design(
+    rows: VoltageRows, magnet: float, chosen: Sequence[str], shift: Mapping[str, float]
+) -> Array:
+    _, current, warmer = _gains(rows, shift)
+    cold = (
+        rows.current_a * (1.0 + COPPER_COEFFICIENT_25_1_K * warmer)
+        + COPPER_COEFFICIENT_25_1_K * rows.warm_current_k_a
+    )
+    speed = rows.speed_rad_s * (1.0 + magnet * warmer) + magnet * rows.warm_speed_k_rad_s
+    extra = [rows.columns[name] for name in chosen]
+    columns = [speed, cold * current, rows.columns["inductive"] * current, rows.columns["drop"]]
+    flux = rows.columns.get(D_FLUX)
+    if flux is not None and linear_fit(np.column_stack([*columns, flux]), flux).full_rank:
+        columns.append(flux)
+    return np.column_stack([*columns, *extra])
+
+
+def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
+    base = _design(rows, magnet, [], {})
+    candidates = {name: rows.columns[name] for name in CANDIDATES if name in rows.columns}
+    candidates = {n: c for n, c in candidates.items() if n == "zero" or float(np.ptp(c)) > 0.0}
+    sigma = np.ones(rows.voltage_v.size)
+    rich = np.column_stack([base, *candidates.values()])
+    tau = autocorrelation_time(linear_fit(rich, rows.voltage_v).residuals, 200)
+    return needed_columns(base, candidates, rows.voltage_v, sigma, level, None, tau)
+
+
+def _estimates(
+    rows: VoltageRows,
+    found: LinearFit,
+    covariance: Array,
+    dof: int,
+    coefficient: tuple[float, Budget],
+    chosen: Sequence[str],
+    doubts: Sequence[Disagreement | None],
+) -> tuple[Estimate, ...]:
+    magnet, magnet_parts = coefficient
+
+    def values(shift: Mapping[str, float]) -> Array:
+        voltage = _gains(rows, shift)[0] * rows.voltage_v
+        warm = magnet + shift.get("magnet", 0.0)
+        return linear_fit(_design(rows, warm, chosen, shift), voltage).coefficients[:2]
+
+    gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
+    type_b = contributions(values, gains)
+    moved = _moved(rows, found.coefficients[:2], magnet, chosen)
+    per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
+    paths = tuple(sorted(c.path for c in rows.captures))
+    words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
+    if chosen:
+        words.append(allowed_for(chosen))
+    unstated = unstated_note(rows.captures, ("voltage", "current"))
+    words += [unstated] if unstated else []
+    per_kelvin = {GIVES[0]: abs(magnet), GIVES[1]: COPPER_COEFFICIENT_25_1_K}
+    place = {GIVES[0]: "temp_magnet_degc", GIVES[1]: "temp_winding_degc"}
+    estimates = []
+    for i, name in enumerate(GIVES):
+        value, u = float(found.coefficients[i]), float(np.sqrt(covariance[i, i]))
+        if value <= 2.0 * u:
+            note = f"{value:.3g} ± {u:.2g} {_unit(name)} from this log; {EXPERIMENT}"
+            estimates.append(not_identifiable(name, _unit(name), NAME, note))
+            continue
+        parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof), *type_b[i]]
+        parts += propagate([(float(per_alpha[i]), magnet_parts)])
+        parts.append(Contribution(f"assumed:{NAME}:nuisances", float(moved[i]), "B"))
+        doubt = doubts[i]
+        parts += [] if doubt is None else [doubt.part(f"{NAME}:{name}", value)]
+        told = [] if doubt is None else [doubt.words("the value")]
+        note = "; ".join([*told, *words])
+        if not all(c.has(place[name]) for c in rows.captures):
+            unsure = value * per_kelvin[name] * U_UNKNOWN_K
+            parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))
+            note += f"; {place[name]} not logged, taken as 25 ± {U_UNKNOWN_K:g} K"
+        if i == 0:
+            parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
+        at = {place[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
+        estimates.append(
+            Estimate(name, value, _unit(name), "measured", NAME, budget_of(parts), at, paths, note)
+        )
+    return tuple(estimates)
+
+
+def _moved(rows: VoltageRows, values: Array, magnet: float, chosen: Sequence[str]) -> Array:
+    """How far Ke and R [2] move with one of the nuisances left out, at most.
+
+    On a free shaft q current goes with acceleration, and R with the lateness of the voltage: what
+    little parts them is also what any other error of the model follows.
+    """
+    moved = np.zeros(2)
+    for left in chosen:
+        design = _design(rows, magnet, [n for n in chosen if n != left], {})
+        moved = np.maximum(
+            moved, np.abs(linear_fit(design, rows.voltage_v).coefficients[:2] - values)
+        )
+    return moved
+
+
+def _evidence(rows: VoltageRows, found: LinearFit) -> tuple[Evidence, ...]:
+    plots = []
+    fitted = rows.voltage_v - found.residuals
+    for index, capture in enumerate(rows.captures):
+        mine = np.flatnonzero(rows.capture == index)
+        mine = mine[decimated(mine.size)]
+        series = Series(capture.path, rows.time_s[mine], rows.voltage_v[mine], fitted[mine])
+        plots.append(
+            Evidence(
+                NAME, "Drive voltage and its parts", "t_s", "vq_v", "line", (series,),
+                capture.path, "window means",
+            )
+        )  # fmt: skip
+    return tuple(plots)
+
+
+def _unit(name: str) -> str:
+    return CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("drive",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=("pole_pairs", "temp_coeff_magnet_1_k"),
+    rank=30,
+    clock_powers={"ke_phase_peak_v_s_rad": 1},
+    options={"level": 0.001},
+)

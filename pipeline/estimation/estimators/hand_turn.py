@@ -1,0 +1,178 @@
+"""Pole pairs and magnet flux from one mechanical turn by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.back_emf import read_spin
+from pipeline.estimation.hand_turns import Turn, turns_of
+from pipeline.estimation.instruments import (
+    budget_of,
+    instrument_uncertainties,
+    unstated_note,
+    voltage_source,
+)
+from pipeline.estimation.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.terminals import first_temperature
+from pipeline.numerics.plateaus import decimated
+from pipeline.physics.conventions import POLE_PAIRS_TOLERANCE, pole_pairs_from
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import (
+    Contribution,
+    effective_dof,
+    propagate,
+    standard_uncertainty,
+    type_b,
+)
+
+NAME = "hand_turn"
+GIVES = ("pole_pairs", "psi_pm_wb")
+UNITS = {"pole_pairs": "1", "psi_pm_wb": "Wb"}
+EXPERIMENT = (
+    "record a hand_turn: terminals open, shaft turned by hand through exactly one turn from rest "
+    "to rest, a line voltage, theta_mech_rad if there is a sensor"
+)
+TURN = 2.0 * math.pi
+Array = NDArray[np.float64]
+
+
+def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Flux is the integral of the voltage, so the hand's speed does not enter.
+
+    Cycles are counted against the angle where there, else by the phase of the flux vector where
+    two voltages were read, else by the swings of the one flux; without the angle the capture has
+    to be one whole turn. Amplitude by least squares of flux steps on steps of cos(phase), whose
+    noise is white though that of the flux itself is not.
+    """
+    turns: list[tuple[Capture, Turn]] = []
+    notes: list[str] = []
+    for capture in campaign.of("hand_turn"):
+        try:
+            spin = read_spin(capture, None)
+        except KeyError:
+            notes.append(f"{capture.path}: no terminal voltage")
+            continue
+        found = turns_of(spin)
+        turns += [(capture, turn) for turn in found]
+        if not found:
+            notes.append(
+                f"{capture.path}: the voltage does not stand out of the noise, or not for a cycle"
+            )
+    if not turns:
+        reason = "; ".join([*notes, EXPERIMENT])
+        return Fit(tuple(not_identifiable(n, UNITS[n], NAME, reason) for n in GIVES))
+    pairs = _pole_pairs(turns)
+    psi = _flux(turns, known, options)
+    return Fit((pairs, psi), (_evidence(turns),))
+
+
+def _pole_pairs(turns: Sequence[tuple[Capture, Turn]]) -> Estimate:
+    paths = tuple(sorted({c.path for c, _ in turns}))
+    cycles = float(np.median([t.cycles for _, t in turns]))
+    number = pole_pairs_from(cycles, 1.0).number
+    if number is None:
+        note = (
+            f"{cycles:.3f} electrical cycles a turn, no whole number within "
+            f"{POLE_PAIRS_TOLERANCE}; repeat the hand_turn, exactly once around, from rest to rest"
+        )
+        return not_identifiable("pole_pairs", "1", NAME, note)
+    apart = abs(cycles - number)
+    note = f"{cycles:.4f} electrical cycles a turn, {apart:.1g} from the whole number"
+    return Estimate("pole_pairs", number, "1", "measured", NAME, captures=paths, note=note)
+
+
+def _flux(
+    turns: Sequence[tuple[Capture, Turn]], known: Constants, options: Mapping[str, float]
+) -> Estimate:
+    """Weighted mean of the channels at 25 degC; its scatter is their own, or how they differ."""
+    captures = tuple({c.path: c for c, _ in turns}.values())
+    coefficient = known.best("temp_coeff_magnet_1_k")
+    alpha = options["alpha_assumed_1_k"] if coefficient is None else coefficient.number
+    values, weights, excesses = [], [], []
+    notes = []
+    for capture, turn in turns:
+        column = first_temperature(capture, "magnet", "winding", "case")
+        ambient = capture.meta.ambient_degc
+        temp = options["temp_assumed_degc"] if ambient is None else ambient
+        if column is not None:
+            temp = float(np.nanmean(capture.arrays(column)[column]))
+        excesses.append(temp - 25.0)
+        values.append(turn.psi_wb / (1.0 + alpha * (temp - 25.0)))
+        weights.append(1.0 / max(turn.u_psi_wb, 1e-12) ** 2)
+    if all(first_temperature(c, "magnet") is None for c in captures):
+        notes.append("magnets taken at ambient, no temp_magnet_degc")
+    share = np.array(weights) / np.sum(weights)
+    value = float(share @ np.array(values))
+    own = tuple(
+        Contribution(f"{k}", float(w) * turn.u_psi_wb, "A", turn.dof)
+        for k, (w, (_, turn)) in enumerate(zip(share, turns, strict=True))
+    )
+    u, dof = standard_uncertainty(own), effective_dof(own)
+    if len(values) > 1:
+        spread = math.sqrt(float(share @ (np.array(values) - value) ** 2) / (len(values) - 1))
+        u, dof = max((u, dof), (spread, len(values) - 1.0))
+    excess = float(share @ np.array(excesses))
+    assumed = type_b(SOURCE, options["u_alpha_assumed_1_k"])
+    of_alpha = assumed if coefficient is None else coefficient.budget
+    parts = [Contribution(f"scatter:{NAME}:psi", u, "A", dof)]
+    parts += propagate([(-value * excess, of_alpha)])
+    for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
+        mine = [voltage_source(c.meta) == source for c, _ in turns]
+        parts.append(Contribution(source, value * gain * float(share[mine].sum()), "B"))
+    for source, offset in instrument_uncertainties(captures, ("temperature",)).items():
+        parts.append(Contribution(source, -value * alpha * offset, "B"))
+    notes.append(unstated_note(captures, ("voltage", "temperature")))
+    return Estimate(
+        "psi_pm_wb",
+        value,
+        "Wb",
+        "measured",
+        NAME,
+        budget_of(parts),
+        {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)},
+        tuple(c.path for c in captures),
+        "; ".join(n for n in notes if n),
+    )
+
+
+def _evidence(turns: Sequence[tuple[Capture, Turn]]) -> Evidence:
+    series = []
+    for capture, turn in turns:
+        rows = decimated(turn.t_s.size)
+        fitted = turn.fitted_wb[rows] if turn.fitted_wb.size else turn.fitted_wb
+        label = f"{capture.path} {turn.channel}"
+        series.append(Series(label, turn.t_s[rows], turn.flux_wb[rows], fitted))
+    return Evidence(
+        NAME,
+        "Flux linkage over one turn by hand",
+        "t_s",
+        "psi_pm_wb",
+        "line",
+        tuple(series),
+        caption="Integral of the voltage, phase to star point; each cycle is one pole pair.",
+    )
+
+
+ESTIMATOR = Estimator(
+    NAME,
+    GIVES,
+    ("hand_turn",),
+    EXPERIMENT,
+    fit_hand_turn,
+    uses=("temp_coeff_magnet_1_k",),
+    rank=1,
+    clock_powers={"psi_pm_wb": 1},
+    options={
+        "temp_assumed_degc": 25.0,
+        "alpha_assumed_1_k": USUAL_1_K,
+        "u_alpha_assumed_1_k": U_USUAL_1_K,
+    },
+)

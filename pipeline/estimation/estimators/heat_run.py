@@ -1,0 +1,264 @@
+"""Copper coefficient, and R as the drive sees it, from a winding that warms under current."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.heat_record import (
+    REFERENCE,
+    TURNING,
+    HeatRecord,
+    read_heat,
+    reference_resistance,
+)
+from pipeline.estimation.instruments import (
+    budget_of,
+    current_source,
+    temperature_source,
+    unstated_note,
+    voltage_source,
+)
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Budget, Contribution, propagate
+
+NAME = "heat_run"
+GIVES = ("temp_coeff_copper_1_k", "r_phase_ohm")
+UNITS = {"temp_coeff_copper_1_k": "1/K", "r_phase_ohm": "ohm"}
+EXPERIMENT = (
+    "record a heat_run: steady current on a locked rotor until the winding is 20 K warmer, with "
+    "temp_winding_degc, voltage and current"
+)
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """R(T) = r25 + slope (T - 25) of one heat run [ohm, ohm/K] with scatter and its means."""
+
+    record: HeatRecord
+    r25_ohm: float
+    slope_ohm_k: float
+    covariance: Array
+    temp_mean_degc: float
+    span_k: float
+    rise_rate_1_s: float
+    dof: float
+    fitted: Array
+
+
+def fit_heat_run(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Alpha = (dR/dT)/R25, at 25 degC.
+
+    dR/dT is free of whatever the inverter adds at a constant current. R25 is that of the
+    resistance test where the voltage is a drive's command, so that the drop does not enter;
+    a measured voltage uses its own R25, with which the gains cancel. Of several runs the one
+    whose slope is known best is used.
+    """
+    lines, notes = _lines(campaign, known, options)
+    if not lines:
+        reason = "; ".join([*notes, EXPERIMENT])
+        return Fit(tuple(not_identifiable(n, UNITS[n], NAME, reason) for n in GIVES))
+    line = min(lines, key=lambda one: one.covariance[1, 1] / one.slope_ohm_k**2)
+    resistance = _resistance(line, options, notes)
+    reference = reference_resistance(line.record, known)
+    commanded = line.record.capture.meta.voltage_kind == "commanded"
+    if reference is not None and (commanded or line.record.turning):
+        alpha = _alpha_against(line, reference, options, notes)
+    else:
+        alpha = _alpha_alone(line, resistance, options, notes)
+    return Fit((alpha, resistance), (_evidence(lines),))
+
+
+def _lines(
+    campaign: Campaign, known: Constants, options: Mapping[str, float]
+) -> tuple[list[Line], list[str]]:
+    lines: list[Line] = []
+    notes: list[str] = []
+    for capture in campaign.of("heat_run"):
+        try:
+            record = read_heat(capture, known)
+        except KeyError as error:
+            notes.append(str(error.args[0]))
+            continue
+        if record is None:
+            notes.append(f"{capture.path}: no steady current found")
+            continue
+        line = _line(record)
+        if line is None or line.span_k < options["least_span_k"]:
+            notes.append(f"{capture.path}: the winding warms too little")
+        else:
+            lines.append(line)
+    return lines, notes
+
+
+def _line(record: HeatRecord) -> Line | None:
+    """Straight line of R against T over block means; errors by the residuals' correlation."""
+    excess = record.temp_winding_degc - 25.0
+    design = np.column_stack([np.ones(excess.size), excess])
+    fit = linear_fit(design, record.r_phase_ohm)
+    if not fit.full_rank or fit.dof < 10 or fit.coefficients[1] <= 0.0:
+        return None
+    tau = autocorrelation_time(fit.residuals)
+    rate = linear_fit(
+        np.column_stack([np.ones(excess.size), excess]), np.gradient(excess, record.t_s)
+    )
+    return Line(
+        record,
+        float(fit.coefficients[0]),
+        float(fit.coefficients[1]),
+        fit.covariance * tau,
+        float(excess.mean()) + 25.0,
+        float(np.ptp(excess)),
+        max(-float(rate.coefficients[1]), 0.0),
+        max(fit.dof / tau, 1.0),
+        record.r_phase_ohm - fit.residuals,
+    )
+
+
+def _slope_budget(line: Line, options: Mapping[str, float]) -> Budget:
+    """Contributions to dR/dT: scatter, gains, and a thermometer that lags.
+
+    A lag tau_l behind a temperature that settles at rate k changes the slope by k tau_l; one
+    exponential does not tell it from alpha, so a slow thermometer has to be stated (`u_lag_s`).
+    """
+    meta = line.record.capture.meta
+    slope = line.slope_ohm_k
+    parts = [
+        Contribution(
+            f"scatter:{NAME}:slope", math.sqrt(float(line.covariance[1, 1])), "A", line.dof
+        ),
+        Contribution(voltage_source(meta), slope * meta.instrument_u("u_rel_voltage"), "B"),
+        Contribution(current_source(meta), -slope * meta.instrument_u("u_rel_current"), "B"),
+        Contribution(
+            "assumed:thermometer_lag", slope * line.rise_rate_1_s * options["u_lag_s"], "B"
+        ),
+    ]
+    return budget_of(parts)
+
+
+def _alpha_against(
+    line: Line, reference: Estimate, options: Mapping[str, float], notes: Sequence[str]
+) -> Estimate:
+    r25 = reference.number
+    alpha = line.slope_ohm_k / r25
+    budget = propagate(
+        [(1.0 / r25, _slope_budget(line, options)), (-alpha / r25, reference.budget)]
+    )
+    paths = tuple(sorted({line.record.capture.path, *reference.captures}))
+    return _alpha(line, alpha, budget, paths, [f"R25 from {reference.method}", *notes])
+
+
+def _alpha_alone(
+    line: Line, resistance: Estimate, options: Mapping[str, float], notes: Sequence[str]
+) -> Estimate:
+    """Alpha from one run's own line; its scatter with the correlation of slope and R25."""
+    r25, slope = line.r25_ohm, line.slope_ohm_k
+    alpha = slope / r25
+    gradient = np.array([-alpha / r25, 1.0 / r25])
+    u = math.sqrt(float(gradient @ line.covariance @ gradient))
+    others = [p for p in resistance.budget if p.kind == "B"]
+    budget = propagate(
+        [
+            (1.0 / r25, tuple(p for p in _slope_budget(line, options) if p.kind == "B")),
+            (-alpha / r25, budget_of(others)),
+            (1.0, budget_of([Contribution(f"scatter:{NAME}:alpha", u, "A", line.dof)])),
+        ]
+    )
+    return _alpha(line, alpha, budget, (line.record.capture.path,), ["R25 from the run", *notes])
+
+
+def _alpha(
+    line: Line, alpha: float, budget: Budget, paths: tuple[str, ...], words: Sequence[str]
+) -> Estimate:
+    temps = line.record.temp_winding_degc
+    at = {
+        "temp_winding_degc": 25.0,
+        "temp_low_degc": round(float(temps.min()), 2),
+        "temp_high_degc": round(float(temps.max()), 2),
+        "current_a": round(float(line.record.current_a.mean()), 4),
+    }
+    used = (line.record.capture,)
+    note = "; ".join(w for w in [*words, unstated_note(used)] if w)
+    return Estimate(GIVES[0], alpha, "1/K", "measured", NAME, budget, at, paths, note)
+
+
+def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) -> Estimate:
+    """R at 25 degC by the run's line; an inverter's drop is not told from it at one current."""
+    meta = line.record.capture.meta
+    commanded = meta.voltage_kind == "commanded"
+    drop = options["drop_commanded_v" if commanded else "drop_measured_v"]
+    current = float(line.record.current_a.mean())
+    r25 = line.r25_ohm
+    scatter = math.sqrt(float(line.covariance[0, 0]))
+    parts = [
+        Contribution(f"scatter:{NAME}:r25", scatter, "A", line.dof),
+        Contribution(voltage_source(meta), r25 * meta.instrument_u("u_rel_voltage"), "B"),
+        Contribution(current_source(meta), -r25 * meta.instrument_u("u_rel_current"), "B"),
+        Contribution(
+            temperature_source(meta), -line.slope_ohm_k * meta.instrument_u("u_temp_degc"), "B"
+        ),
+        Contribution("assumed:voltage_offset_v", drop / current, "B"),
+    ]
+    at = {"temp_winding_degc": 25.0, "current_a": round(current, 4)}
+    words = [*notes]
+    if commanded:
+        words.append(f"commanded voltage: an inverter's drop up to {drop:g} V (k=1) is in u_b")
+    return Estimate(
+        "r_phase_ohm",
+        r25,
+        "ohm",
+        "measured",
+        NAME,
+        budget_of(parts),
+        at,
+        (line.record.capture.path,),
+        "; ".join(words),
+    )
+
+
+def _evidence(lines: Sequence[Line]) -> Evidence:
+    series = tuple(
+        Series(
+            line.record.capture.path,
+            line.record.temp_winding_degc,
+            line.record.r_phase_ohm,
+            line.fitted,
+        )
+        for line in lines
+    )
+    return Evidence(
+        NAME,
+        "Resistance against winding temperature",
+        "temp_winding_degc",
+        "r_phase_ohm",
+        "scatter",
+        series,
+        caption="Voltage along the current over current, block means.",
+    )
+
+
+ESTIMATOR = Estimator(
+    NAME,
+    GIVES,
+    ("heat_run",),
+    EXPERIMENT,
+    fit_heat_run,
+    uses=("temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
+    options={
+        "least_span_k": 5.0,
+        # A bead of half a millimetre in the winding follows within a tenth of a second.
+        "u_lag_s": 0.05,
+        "drop_measured_v": 0.0005,
+        "drop_commanded_v": 0.3,
+    },
+)

@@ -1,0 +1,227 @@
+"""Cogging orders from the current that holds a rotor still at many angles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.estimators.cogging import name_orders, part_orders
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.torque_constant import USES, torque_constant
+from pipeline.numerics.bootstrap import block_bootstrap, block_length
+from pipeline.numerics.harmonics import harmonic_design
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.orders import (
+    TURN_RAD,
+    OrderLine,
+    Spectrum,
+    Turn,
+    detection_limit,
+    even_positions,
+    find_orders,
+    half_peak_to_peak,
+    largest_order,
+    waveform,
+    whole_turns,
+)
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.physics.mechanics import cogging_order
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable, not_there
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import propagate, type_a
+
+Array = NDArray[np.float64]
+
+NAME = "holding_current"
+RESIDUAL = Term(
+    "holding_residual_a",
+    "A",
+    "rms of holding current that the cogging orders leave in sectors they were not fitted to",
+    "constant",
+    0.0,
+    5e3,
+)
+TORQUES = ("cogging_amplitude_nm", "cogging_peak_nm")
+GIVES = ("cogging_order", *TORQUES, RESIDUAL.name)
+EXPERIMENT = (
+    "hold the rotor at many angles over a whole turn, once forward and once backward, "
+    "logging theta_mech_rad and iq_a"
+)
+SECTORS = 61
+REPLICATES = 200
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Orders of i_q(theta) that both directions share; times Kt they are cogging torque.
+
+    At rest Kt i_q = T_cogging(theta) ± what static friction carries, so orders are sure, and
+    amplitudes as good as friction repeats. Reference: numerics.orders.
+    """
+    captures = [c for c in campaign.of("holding_current") if c.has("theta_mech_rad", "iq_a")]
+    turns: list[Turn] = []
+    for capture in captures:
+        data = capture.arrays("theta_mech_rad", "iq_a")
+        there = np.isfinite(data["theta_mech_rad"])
+        turns += whole_turns(data["theta_mech_rad"][there], data["iq_a"][there])
+    highest = largest_order(turns, int(options["highest_order"]))
+    if len(turns) < 2 or highest < 1:
+        note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    spec, present = find_orders(turns, highest, options["level"])
+    lines, slow = part_orders(present, known, campaign)
+    positions = even_positions(turns)
+    left = held_out_residual(turns, [line.order for line in [*lines, *slow]])
+    rms_a = None if left is None else float(np.sqrt(np.mean(left**2)))
+    estimates = _cogging(captures, spec, lines, rms_a, positions, known, campaign)
+    if left is None or rms_a is None:
+        note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
+        residual = not_identifiable(RESIDUAL.name, "A", NAME, note)
+    else:
+        before = float(np.std(np.concatenate([turn.value for turn in turns])))
+        note = f"{before:.3g} A before any order is taken off; half of the turn's sectors held out"
+        paths = tuple(c.path for c in captures)
+        scatter = type_a(f"scatter:{NAME}:{RESIDUAL.name}", _u_rms(left))
+        residual = Estimate(RESIDUAL.name, rms_a, "A", "measured", NAME, scatter, {}, paths, note)
+    return Fit((*estimates, residual), _evidence(turns, spec, lines))
+
+
+def _u_rms(residual: Array) -> float:
+    """Standard uncertainty of the rms, with the residual's correlation."""
+    draws = block_bootstrap(
+        lambda part: np.sqrt(np.mean(part**2, keepdims=True)),
+        residual,
+        block_length(residual),
+        REPLICATES,
+        np.random.default_rng(0),
+    )
+    return float(np.std(draws, ddof=1))
+
+
+def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | None:
+    """The current [n, A] left in sectors of the turn that the fit did not see; None if too few.
+
+    The turn is cut into `SECTORS` (a prime); the orders, with one offset a direction, are fitted
+    to those whose number is a square modulo the prime and judged on the others, then the other
+    way round. That pattern has a flat spectrum, so it starves no order of its phases.
+    Reference: Schroeder, Number Theory in Science and Communication, 15.
+    """
+    angle = np.concatenate([turn.theta_rad for turn in turns])
+    value = np.concatenate([turn.value for turn in turns])
+    sense = np.concatenate([np.full(turn.value.size, float(turn.sense)) for turn in turns])
+    design = np.column_stack([harmonic_design(angle, list(orders)), sense])
+    squared = np.isin(np.arange(SECTORS), np.arange(SECTORS) ** 2 % SECTORS).astype(np.int64)
+    number = np.floor(np.mod(angle, TURN_RAD) * (SECTORS / TURN_RAD)).astype(np.int64)
+    sector = squared[np.minimum(number, SECTORS - 1)]
+    left = np.zeros(value.size)
+    for part in (0, 1):
+        seen, unseen = sector == part, sector != part
+        if np.count_nonzero(seen) < 4 * design.shape[1]:
+            return None
+        model = linear_fit(design[seen], value[seen])
+        left[unseen] = value[unseen] - design[unseen] @ model.coefficients
+    return left
+
+
+def _cogging(
+    captures: Sequence[Capture],
+    spec: Spectrum,
+    lines: Sequence[OrderLine],
+    rms_a: float | None,
+    positions: int | None,
+    known: Constants,
+    campaign: Campaign,
+) -> tuple[Estimate, ...]:
+    names = ("cogging_order", *TORQUES)
+    if not lines:
+        limit = detection_limit(spec)
+        note = f"no order found; an amplitude above {limit:.2g} A would have been"
+        return tuple(not_there(n, _unit(n), NAME, note) for n in names)
+    paths = tuple(c.path for c in captures)
+    note = f"A by order: {name_orders(lines, known, campaign)}"
+    if rms_a is not None:
+        note += f"; {rms_a:.3g} A rms left in held-out sectors"
+    leading, alias = _true_order(lines[0].order, positions, known, campaign)
+    note += alias
+    order = Estimate(
+        names[0], leading, "1", "measured", NAME, captures=paths, note=note,
+        bounds=(1.0, float(spec.orders[-1])),
+    )  # fmt: skip
+    kt = torque_constant(known)
+    if kt is None:
+        why = f"{lines[0].amplitude:.4g} A of order {lines[0].order}; a torque constant is missing"
+        return (order, *(not_identifiable(n, _unit(n), NAME, why) for n in TORQUES))
+    peak, u_peak = half_peak_to_peak(lines)
+    sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
+    torques = []
+    for name, (amps, u) in sizes.items():
+        scatter = type_a(f"scatter:{NAME}:{name}", u, lines[0].dof)
+        budget = propagate([(amps, kt.budget), (kt.number, scatter)])
+        torques.append(
+            Estimate(name, amps * kt.number, _unit(name), "measured", NAME, budget, {}, paths, note)
+        )
+    return (order, *torques)
+
+
+def _true_order(
+    seen: int, positions: int | None, known: Constants, campaign: Campaign
+) -> tuple[int, str]:
+    """The order behind one seen on even positions, and a note where it could be another.
+
+    On n positions the orders k and m n ± k look alike; the one that slots and poles make is taken
+    if there is exactly one of them.
+    """
+    slots, pairs = campaign.nameplate("slots"), known.best("pole_pairs")
+    poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
+    if positions is None or not isinstance(slots, int) or not isinstance(poles, int):
+        return seen, ""
+    own = cogging_order(slots, poles)
+    alike = [seen, *(m * positions + s * seen for m in (1, 2, 3) for s in (-1, 1))]
+    made = [k for k in alike if k % own == 0]
+    if seen % own == 0 or len(made) != 1:
+        return seen, ""
+    return made[0], f"; {positions} even positions show order {made[0]} as {seen}: hold at more"
+
+
+def _evidence(
+    turns: Sequence[Turn], spec: Spectrum, lines: Sequence[OrderLine]
+) -> tuple[Evidence, ...]:
+    series = []
+    for index, turn in enumerate(turns):
+        keep = slice(None, None, -(-turn.value.size // 2000))
+        angle = np.mod(turn.theta_rad[keep], TURN_RAD)
+        order = np.argsort(angle, kind="stable")
+        angle = angle[order]
+        label = "forward" if turn.sense > 0 else "backward"
+        fitted = spec.means[index] + waveform(lines, angle)
+        series.append(Series(f"{label} {index + 1}", angle, turn.value[keep][order], fitted))
+    shown = min(spec.orders.size, 1000)
+    heights: Array = np.abs(spec.coefficients.mean(axis=0))[:shown]
+    bars = Series("orders", spec.orders[:shown].astype(float), heights, np.array([]))
+    return (
+        Evidence(NAME, "Holding current over one turn", "theta_mech_rad", "iq_a", "scatter",
+                 tuple(series)),
+        Evidence(NAME, "Holding-current spectrum", "cogging_order", "iq_a", "bars", (bars,)),
+    )  # fmt: skip
+
+
+def _unit(name: str) -> str:
+    return RESIDUAL.unit if name == RESIDUAL.name else CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("holding_current",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=("pole_pairs", *USES),
+    either=USES,
+    aids=("pole_pairs",),
+    rank=20,
+    terms=(RESIDUAL,),
+    options={"highest_order": 1000.0, "level": 0.01},
+)

@@ -1,0 +1,304 @@
+"""Apparent inductances at the largest current of a constant-speed torque map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.flux_pairs import SAME, Flux, flux_pairs, frame_of, instant_voltage
+from pipeline.estimation.instruments import (
+    contributions,
+    instrument_uncertainties,
+    unstated_note,
+)
+from pipeline.estimation.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.measured import measured
+from pipeline.estimation.operating_points import Point, operating_points, pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Contribution
+
+Array = NDArray[np.float64]
+
+NAME = "inductance_rated"
+GIVES = ("ld_rated_h", "lq_rated_h")
+EXPERIMENT = (
+    "record a torque_map at constant speed with vd_v and vq_v: q current stepped to plus and minus "
+    "rated, at zero d current and at rated d current"
+)
+FRAME = "assumed:frame_angle"
+HOLD = "assumed:voltage_hold"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """An inductance [H], its scatter [H] and the currents that it holds for."""
+
+    value_h: float
+    u_h: float
+    id_a: float
+    iq_a: float
+
+
+_Find = Callable[[Sequence[Flux], float], Result | None]
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """L_q = psi_q / i_q at i_d = 0 and L_d = (psi_d - psi_d at i_d = 0) / i_d, both at rated.
+
+    psi_d = (v_q+ + v_q-) / 2 w, psi_q = (v_d- - v_d+) / 2 w of points with +i_q and -i_q, so that
+    R and odd inverter errors cancel. The voltage's timing and the angle it is late by are taken
+    out first. Reference: Armando, Bojoi, Guglielmi, Pellegrino, Pastorelli, IEEE Trans. Ind. Appl.
+    49(5), 2013. In a frame turned by e the drop of R is taken off along the pair's own current
+    (fit.flux_pairs), which leaves L_other tan² e on each axis; that is taken off here.
+    """
+    del options
+    captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    table = operating_points(captures, pairs)
+    points = [
+        p for p in table.points if np.isfinite(p.vd_v) and np.isfinite(p.vq_v) and not p.standing
+    ]
+    if pairs is None or not points:
+        why = "pole pairs unknown" if points else "no settled points with voltages at speed"
+        note = f"{why}; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, "H", NAME, note) for n in GIVES))
+    magnet = magnet_coefficient(known)[0]
+    points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
+    look = _Look(points, pairs, magnet, captures, *frame_of(points, pairs))
+    fluxes = flux_pairs(points, pairs)
+    own = _direct(fluxes, magnet), _quadrature(fluxes, magnet)
+    words = (
+        f"{table.note()}; {_timing_words(captures)}; frame turned by {look.angle_rad:.3f} rad, "
+        f"currents {1e6 * look.behind_s:.3g} µs late, taken out"
+    )
+    estimates = (
+        _estimate("ld_rated_h", _direct, *own, look, words),
+        _estimate("lq_rated_h", _quadrature, *own[::-1], look, words),
+    )
+    return Fit(estimates, _evidence(fluxes, *own))
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What both axes are judged on: points, and how far the frame is turned and currents late."""
+
+    points: Sequence[Point]
+    pole_pairs: int
+    magnet_1_k: float
+    captures: Sequence[Capture]
+    angle_rad: float
+    behind_s: float
+
+    @property
+    def behind_rad(self) -> float:
+        """What the fastest point turns while the currents are late."""
+        return self.behind_s * self.pole_pairs * max(abs(p.omega_mech_rad_s) for p in self.points)
+
+
+def _estimate(
+    name: str, find: _Find, found: Result | None, other: Result | None, look: _Look, words: str
+) -> Estimate:
+    """The inductance of one axis, less what the `other` leaves on it in a turned frame."""
+    if found is None:
+        why = "no settled pair of plus and minus q current at the currents needed"
+        return not_identifiable(name, "H", NAME, f"{why}; {EXPERIMENT}")
+
+    def value(shift: Mapping[str, float]) -> Array:
+        moved = flux_pairs([p.shifted(shift) for p in look.points], look.pole_pairs)
+        return np.array([(find(moved, look.magnet_1_k) or found).value_h])
+
+    parts = contributions(value, instrument_uncertainties(look.captures, ("voltage", "current")))[0]
+    hold = _hold_doubt(look.points, look.pole_pairs)
+    across = found.value_h if other is None else other.value_h
+    angle, behind = look.angle_rad, look.behind_rad
+    doubt = 2.0 * abs(angle * behind) + behind**2 + (other is None) * angle**2
+    parts += [
+        Contribution(HOLD, found.value_h * hold, "B"),
+        Contribution(FRAME, across * doubt, "B"),
+        Contribution(f"scatter:{NAME}:{name}", found.u_h, "A"),
+    ]
+    inductance = found.value_h - across * float(np.tan(angle)) ** 2
+    used = {p.capture.path: p.capture for p in look.points}
+    notes = [words, unstated_note(look.captures, ("voltage", "current"))]
+    if name == "ld_rated_h":
+        fluxes = flux_pairs(look.points, look.pole_pairs)
+        notes.append(_other_side(fluxes, look.magnet_1_k, found))
+    at = {"id_a": found.id_a, "iq_a": found.iq_a}
+    return measured(NAME, name, "H", inductance, parts, [used[k] for k in sorted(used)], at, notes)
+
+
+def _without_ripple(
+    points: Sequence[Point], pole_pairs: int, magnet: float, resistance: Estimate | None
+) -> list[Point]:
+    """Points with held voltages less the drop R of the ripple current between samples.
+
+    While the inverter holds its vector v still, flux bends by -j w R i only and not by -w² psi as
+    on its circle. With x = w T / 2 the period's mean flux is short by x²/3 v/(j w), the mean
+    current by that over L of each axis. Inductances of a first pass are good enough. Without R
+    nothing is done.
+    """
+    first = flux_pairs(points, pole_pairs)
+    direct, quadrature = _direct(first, magnet), _quadrature(first, magnet)
+    if resistance is None or direct is None or quadrature is None:
+        return list(points)
+    corrected = []
+    for point in points:
+        if point.capture.meta.voltage_timing != "held":
+            corrected.append(point)
+            continue
+        omega = pole_pairs * point.omega_mech_rad_s
+        half = 0.5 * omega * point.period_s
+        bend = instant_voltage(point, pole_pairs) / (1j * omega)
+        short = complex(bend.real / direct.value_h, bend.imag / quadrature.value_h)
+        drop = -resistance.number * short * half**2 / 3.0 * np.exp(1j * half)
+        voltage = complex(point.vd_v, point.vq_v) - drop
+        corrected.append(replace(point, vd_v=voltage.real, vq_v=voltage.imag))
+    return corrected
+
+
+def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
+    """psi_q over i_q at the largest q current without d current."""
+    del magnet
+    largest = max((f.iq_a for f in fluxes), default=0.0)
+    near = [f for f in fluxes if abs(f.id_a) < SAME * max(largest, 1e-300)]
+    rated = max((f.iq_a for f in near), default=0.0)
+    if rated <= 0.0:
+        return None
+    used = [f for f in near if f.iq_a > (1.0 - SAME) * rated]
+    weights = np.array([1.0 / max(f.u_q_wb, 1e-300) ** 2 for f in used])
+    weights /= weights.sum()
+    value = float(sum(w * f.psi_q_wb / f.iq_a for w, f in zip(weights, used, strict=True)))
+    u = float(
+        np.sqrt(sum((w * f.u_q_wb / f.iq_a) ** 2 for w, f in zip(weights, used, strict=True)))
+    )
+    return Result(value, u, used[0].id_a, rated)
+
+
+def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
+    """Change of psi_d from no d current to the largest, at the smallest q current that has both.
+
+    Of two d currents of one size the negative, which a drive uses: iron saturates on the other.
+    Some q current is preferred: with none at all the inverter's dead time has no sign to cancel.
+    """
+    reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
+    both = [
+        (f, zero)
+        for f in fluxes
+        for zero in fluxes
+        if f.group == zero.group
+        and abs(zero.id_a) < SAME * reach < abs(f.id_a)
+        and abs(f.iq_a - zero.iq_a) < SAME * reach
+    ]
+    if not both:
+        return None
+    rated = max(abs(f.id_a) for f, _ in both)
+    side = 1.0 if min(f.id_a for f, _ in both) > -(1.0 - SAME) * rated else -1.0
+    at_rated = [(f, zero) for f, zero in both if side * f.id_a > (1.0 - SAME) * rated]
+    driven = [f.iq_a for f, _ in at_rated if f.iq_a > SAME * reach]
+    smallest = min(driven, default=0.0)
+    used = [(f, zero) for f, zero in at_rated if abs(f.iq_a - smallest) < SAME * reach]
+    values, variances = [], []
+    for f, zero in used:
+        warm = magnet * (f.temp_magnet_degc - zero.temp_magnet_degc) * zero.psi_d_wb
+        step = f.id_a - zero.id_a
+        values.append((f.psi_d_wb - zero.psi_d_wb - warm) / step)
+        variances.append((f.u_d_wb**2 + zero.u_d_wb**2) / step**2)
+    weights = 1.0 / np.maximum(variances, 1e-300)
+    weights /= weights.sum()
+    u = float(np.sqrt(np.sum(weights**2 * variances)))
+    return Result(float(weights @ values), u, used[0][0].id_a, smallest)
+
+
+def _other_side(fluxes: Sequence[Flux], magnet: float, found: Result) -> str:
+    """L_d at the largest d current of the other sign in words, empty where there is none."""
+    across = [f for f in fluxes if f.id_a * found.id_a <= 0.0]
+    reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
+    near = [f for f in fluxes if abs(f.id_a) < SAME * reach and f not in across]
+    other = _direct([*across, *near], magnet)
+    if other is None:
+        return ""
+    return f"{1e6 * other.value_h:.4g} µH at {other.id_a:.3g} A of d current"
+
+
+def _hold_doubt(points: Sequence[Point], pole_pairs: int) -> float:
+    """Relative doubt of period means: a held vector's flux runs on a polygon, a turned one's not.
+
+    Seen from the middle of a side the two differ by 1/cos(w T / 2) - 1; rectangular, GUM 4.3.7.
+    """
+    late = [
+        0.5 * pole_pairs * abs(p.omega_mech_rad_s) * p.period_s
+        for p in points
+        if p.capture.meta.voltage_timing == "centred"
+    ]
+    if not late:
+        return 0.0
+    return float(np.mean(1.0 / np.cos(np.minimum(late, 1.0)) - 1.0) / np.sqrt(3.0))
+
+
+def _timing_words(captures: Sequence[Capture]) -> str:
+    timings = sorted({c.meta.voltage_timing for c in captures})
+    return f"voltage timing {', '.join(timings)} and its lateness taken out"
+
+
+def _evidence(
+    fluxes: Sequence[Flux], direct: Result | None, quadrature: Result | None
+) -> tuple[Evidence, ...]:
+    """Flux linkages with the line of the published inductance through the flux at no current."""
+    if not fluxes:
+        return ()
+    reach = max(max(abs(f.id_a), f.iq_a) for f in fluxes)
+    plots = []
+    for axis, current, flux, found in (
+        ("q", "iq_a", "psi_q_wb", quadrature),
+        ("d", "id_a", "psi_d_wb", direct),
+    ):
+        other = "id_a" if axis == "q" else "iq_a"
+        series = []
+        levels = sorted({round(getattr(f, other) / (SAME * reach)) for f in fluxes})
+        for level in levels:
+            mine = [f for f in fluxes if round(getattr(f, other) / (SAME * reach)) == level]
+            mine.sort(key=lambda f: (getattr(f, current), f.group))
+            x = np.array([getattr(f, current) for f in mine])
+            y = np.array([getattr(f, flux) for f in mine])
+            amps = float(np.mean([getattr(f, other) for f in mine])) if level else 0.0
+            label = f"{other} {amps:.3g} A"
+            line = np.array([])
+            if found is not None:
+                still = x[np.abs(x) < SAME * reach], y[np.abs(x) < SAME * reach]
+                start = (
+                    float(np.mean(still[1] - found.value_h * still[0])) if still[0].size else 0.0
+                )
+                line = start + found.value_h * x if axis == "q" or still[0].size else line
+            series.append(Series(label, x, y, line))
+        title = f"Flux linkage of the {axis} axis at constant speed"
+        plots.append(
+            Evidence(
+                NAME,
+                title,
+                current,
+                flux,
+                "scatter",
+                tuple(series),
+                caption="line: the published apparent inductance",
+            )
+        )
+    return tuple(plots)
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("torque_map",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", "r_phase_ohm"),
+    rank=0,
+    clock_powers=dict.fromkeys(GIVES, 1),
+)

@@ -1,0 +1,377 @@
+"""Rotor inertia, Coulomb and viscous friction from everyday drives and coast-downs together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.drag import (
+    DRAG_FORMS,
+    DragFit,
+    drag_of,
+    drag_words,
+    too_short,
+    torque_is_parted,
+)
+from pipeline.estimation.instruments import (
+    budget_of,
+    contributions,
+    current_source,
+    instrument_uncertainties,
+    temperature_source,
+    torque_source,
+    unstated_note,
+)
+from pipeline.estimation.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.operating_points import pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.regimes import Disagreement
+from pipeline.estimation.shaft_regimes import drag_disagreements
+from pipeline.estimation.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
+from pipeline.estimation.torque_constant import USES, torque_constant
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.plateaus import decimated
+from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import BETWEEN, Budget, Contribution, propagate
+
+Array = NDArray[np.float64]
+
+NAME = "inertia"
+GIVES = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
+EXPERIMENT = (
+    "record a drive with iq_a and theta_mech_rad that accelerates and brakes hard in both senses "
+    "(torque_shaft_nm if a load is coupled), and a spin_down from full speed"
+)
+LONGER = (
+    "record a drive of at least a second and a turn that accelerates and brakes in both senses, "
+    "with iq_a and theta_mech_rad"
+)
+LOAD = "log torque_shaft_nm in the drives, or record them with nothing coupled to the shaft"
+# J may be too large by this share, twice what a torque transducer of unstated gain leaves open.
+# Loads of a third of rated torque left 38 to 60 % in drives of three motors; none, on a real
+# bench, 0.6 %.
+MATERIAL = 0.02
+AIDS = (
+    "kt_reluctance_nm_a2",
+    "temp_coeff_magnet_1_k",
+    "ld_h",
+    "lq_h",
+    "pole_pairs",
+    "cogging_order",
+)
+NUISANCES = (
+    "offset", "load friction", "load lag", "current lag", "d current", "d current cos",
+    "d current sin", "q current cubed", "d squared q current", "d q current cubed",
+    "eccentric cos", "eccentric sin", "unbalance cos", "unbalance sin",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Torque:
+    """What turns currents into torque, and whose uncertainty the inertia inherits."""
+
+    kt_nm_a: float
+    kt_budget: Budget
+    reluctance_nm_a2: float
+    reluctance_budget: Budget
+    magnet_1_k: float
+    magnet_budget: Budget
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Doubts:
+    """What speaks against the law: the acceleration's `share` that the torque does not explain,
+    and where regimes differ in J, T_c/J, B/J.
+    """
+
+    share: float
+    regimes: tuple[Disagreement | None, Disagreement | None, Disagreement | None]
+
+    def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
+        """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
+        share = f"{BETWEEN}{NAME}:unexplained" if logged else "assumed:free_shaft"
+        parts = [Contribution(share, self.share * value, "B")]
+        for k in {0, index}:
+            found = self.regimes[k]
+            if found is not None:
+                parts.append(found.part(f"{NAME}:{GIVES[k]}", value))
+        return parts
+
+    def words(self, logged: bool) -> list[str]:
+        """What the regimes and the share say, where they say something."""
+        names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
+        words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
+        if logged and self.share > MATERIAL:
+            words.append(
+                f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
+                "neither current nor load"
+            )
+        return words
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """J, T_c and B of J dw/dt = K i_q + K_rel i_d i_q - T_load - T_c sign(w) - B w.
+
+    Rows of drives and coast-downs (fit.shaft_rows) are regressed together on g = 1/J, T_c/J, B/J:
+    coast-downs fix the ratios, drives the scale. Where drag has another form, J comes from the
+    drag curve left free, T = J (a_driven - a_coasting) at each speed. References: IEEE Std 115-2019
+    4.4 (retardation); Messenger and Bortz 2021 (weak form).
+    """
+    torque = _torque(known)
+    rows = _rows(known, campaign) if torque is not None else None
+    if torque is None or rows is None or not np.any(rows.kind == DRIVE):
+        missing = "a torque constant is not known" if torque is None else "no usable drive log"
+        note = f"{missing}; {EXPERIMENT}"
+        return _refused(note)
+    nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
+    y, driving = rows.acceleration_rad_s2, _driving_nm(rows, torque, {})
+    if float(np.ptp(driving)) == 0.0:
+        note = f"the drive log holds no torque; {EXPERIMENT}"
+        return _refused(note)
+    short = too_short(rows)
+    if short:
+        return _refused(f"{short}; {LONGER}")
+    found = drag_of(rows, driving, nuisances, options["level"])
+    if not torque_is_parted(found.design, found.sigma):
+        return _refused(f"the drive's torque cannot be told from its friction; {EXPERIMENT}")
+    strange = _share_of_no_torque(rows, found)
+    if strange > MATERIAL and not _load_logged(rows):
+        return _refused(f"{_of_no_torque(strange)}; {LOAD}")
+    doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
+    estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))
+    inertia = estimates[0]
+    if inertia.known and inertia.u >= abs(inertia.number):
+        estimates = _refused(
+            f"the acceleration does not follow the torque: the inertia came out as "
+            f"{inertia.number:.3g} ± {inertia.u:.2g} kg·m²; look at the signs of iq_a and "
+            f"torque_shaft_nm, else {EXPERIMENT}"
+        ).estimates
+    return Fit(estimates, _evidence(rows, y, found))
+
+
+def _rows(known: Constants, campaign: Campaign) -> ShaftRows | None:
+    """Rows of the drives that log their load, of all drives where none does; and of coast-downs."""
+    orders, ripple = _orders(known, campaign)
+    logged = [c for c in campaign.of("drive", "spin_down") if not _loadless(c)]
+    rows = shaft_rows(logged, DRAG_FORMS, orders, ripple)
+    if rows is not None and np.any(rows.kind == DRIVE):
+        return rows
+    return shaft_rows(campaign.of("drive", "spin_down"), DRAG_FORMS, orders, ripple)
+
+
+def _loadless(capture: Capture) -> bool:
+    """Whether this is a drive that does not say what loads the shaft."""
+    return capture.meta.test == "drive" and not capture.has("torque_shaft_nm")
+
+
+def _load_logged(rows: ShaftRows) -> bool:
+    return not any(_loadless(capture) for capture in rows.captures)
+
+
+def _share_of_no_torque(rows: ShaftRows, found: DragFit) -> float:
+    """Share of the drives' acceleration, squared, that follows the torque in no way.
+
+    A torque that is not logged is an error of the driving torque, and where a speed loop fights it
+    the current goes with it: it makes g too small, and J too large, by this share at most.
+    Reference: Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
+    """
+    drives = rows.kind == DRIVE
+    without = linear_fit(np.delete(found.design[drives], 0, axis=1), found.target[drives])
+    costs = [float(np.sum(r**2)) for r in (found.residuals[drives], without.residuals)]
+    return min(costs[0] / costs[1], 1.0) if costs[1] > 0.0 else 1.0
+
+
+def _of_no_torque(share: float) -> str:
+    return (
+        f"no drive logs its load, and {100.0 * share:.2g} % of the square of the acceleration "
+        "does not follow the current, as with a load"
+    )
+
+
+def _left_out(rows: ShaftRows, campaign: Campaign) -> tuple[str, ...]:
+    """Paths of drives that do not log their load, beside ones that do."""
+    if not _load_logged(rows):
+        return ()
+    return tuple(capture.path for capture in campaign.of("drive") if _loadless(capture))
+
+
+def _refused(note: str) -> Fit:
+    return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+
+
+def _torque(known: Constants) -> Torque | None:
+    kt = torque_constant(known)
+    if kt is None:
+        return None
+    magnet = magnet_coefficient(known)
+    words = f"torque constant from {kt.method}"
+    reluctance = known.best("kt_reluctance_nm_a2")
+    if reluctance is not None:
+        return Torque(
+            kt.number, kt.budget, reluctance.number, reluctance.budget, *magnet, words
+        )  # fmt: skip
+    ld, lq, pairs = known.best("ld_h"), known.best("lq_h"), known.best("pole_pairs")
+    if ld is not None and lq is not None and pairs is not None:
+        scale = 1.5 * pairs.number
+        budget = propagate([(scale, ld.budget), (-scale, lq.budget)])
+        value = scale * (ld.number - lq.number)
+        return Torque(kt.number, kt.budget, value, budget, *magnet, words)
+    return Torque(kt.number, kt.budget, 0.0, (), *magnet, f"{words}, reluctance torque unknown")
+
+
+def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Orders a turn of cogging, and of the torque ripple that six-fold back-EMF harmonics make."""
+    order = known.best("cogging_order")
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    cogging = () if order is None else (round(order.number),)
+    return cogging, () if pairs is None else (6 * pairs,)
+
+
+def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> Array:
+    """Electromagnetic less load torque [w], as it would be with instruments off by `shift`."""
+    metas = [capture.meta for capture in rows.captures]
+    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
+    load = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
+    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])[rows.capture]
+    kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
+    reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
+    magnet = torque.magnet_1_k + shift.get("magnet", 0.0)
+    warm = rows.warm_current_k_a + rows.q_current_a * warmer
+    driven: Array = (
+        kt * current * (rows.q_current_a + magnet * warm)
+        + reluctance * current**2 * rows.product_a2
+        - load * rows.load_nm
+    )
+    return driven
+
+
+def _estimates(
+    rows: ShaftRows, torque: Torque, found: DragFit, doubts: Doubts, left_out: Sequence[str]
+) -> tuple[Estimate, ...]:
+    """J, T_c and B with their budgets."""
+
+    def values(shift: Mapping[str, float]) -> Array:
+        return found.constants(found.refit(_driving_nm(rows, torque, shift)))
+
+    gains = instrument_uncertainties(rows.captures, ("current", "torque", "temperature"))
+    type_b = contributions(values, gains)
+    per_kt, per_rel, per_alpha = _slopes(values, torque)
+    constants, scatter = found.constants(found.coefficients), found.scatter()
+    paths = tuple(sorted(c.path for c in rows.captures))
+    logged = _load_logged(rows)
+    words = [*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out)]
+    note = "; ".join([*doubts.words(logged), *words])
+    at = {"omega_mech_rad_s": rows.fastest_rad_s, "temp_magnet_degc": 25.0}
+    estimates = []
+    for i, name in enumerate(GIVES):
+        reason = found.reasons[i]
+        if reason:
+            estimates.append(not_identifiable(name, _unit(name), NAME, reason))
+            continue
+        parts = [
+            Contribution(f"scatter:{NAME}:{k}", float(scatter[i, k]), "A", found.dof)
+            for k in range(scatter.shape[1])
+        ]
+        parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
+        parts += doubts.parts(i, float(constants[i]), logged)
+        budget = propagate(
+            [
+                (1.0, (*parts, *type_b[i])),
+                (float(per_kt[i]), torque.kt_budget),
+                (float(per_rel[i]), torque.reluctance_budget),
+                (float(per_alpha[i]), torque.magnet_budget),
+            ]
+        )
+        value = float(constants[i])
+        estimates.append(
+            Estimate(name, value, _unit(name), "measured", NAME, budget_of(budget), at, paths, note)
+        )
+    return tuple(estimates)
+
+
+def _slopes(
+    values: Callable[[Mapping[str, float]], Array], torque: Torque
+) -> tuple[Array, Array, Array]:
+    """What J, T_c and B [3] change by the torque constant, the reluctance and the magnet's law."""
+    step = max(abs(torque.reluctance_nm_a2), 1e-9) * 1e-2
+    return (
+        (values({"kt": 1e-3}) - values({"kt": -1e-3})) / (2e-3 * torque.kt_nm_a),
+        (values({"reluctance": step}) - values({"reluctance": -step})) / (2.0 * step),
+        (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4,
+    )
+
+
+def _words(rows: ShaftRows, torque: Torque, found: DragFit) -> list[str]:
+    words = [torque.words, drag_words(found)]
+    words.append("what iron loss there is under the magnet's flux counts as drag")
+    words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
+    if not np.any(rows.kind == COAST):
+        words.append("no spin_down: friction from driven motion alone")
+    unstated = unstated_note(rows.captures, ("current", "torque"))
+    return [*words, *([unstated] if unstated else [])]
+
+
+def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> list[str]:
+    """What is not known of the load, in words."""
+    if left_out:
+        return [f"without {', '.join(left_out)}, whose load is not logged (torque_shaft_nm)"]
+    if _load_logged(rows):
+        return []
+    return [
+        f"no drive logs its load: all but {100.0 * strange:.2g} % of the square of the "
+        "acceleration follows the current, so the shaft is taken as free",
+        "what turns with it counts to the inertia, and what brakes it to friction",
+    ]
+
+
+def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidence, ...]:
+    fitted = measured - found.residuals
+    plots = []
+    for index, capture in enumerate(rows.captures):
+        mine = np.flatnonzero(rows.capture == index)
+        mine = mine[decimated(mine.size)]
+        word = "coast" if capture.meta.test == "spin_down" else "drive"
+        series = Series(capture.path, rows.time_s[mine], measured[mine], fitted[mine])
+        title = f"Acceleration in the {word}"
+        caption = "window means, no derivative taken"
+        plots.append(
+            Evidence(
+                NAME, title, "t_s", "acceleration_rad_s2", "line", (series,), capture.path, caption
+            )
+        )
+    speed, drag, line = found.curve(rows)
+    curve = Series("drag", speed, drag, line)
+    plots.append(
+        Evidence(
+            NAME, "Drag against speed", "omega_mech_rad_s", "torque_coulomb_nm", "scatter",
+            (curve,), caption="driving torque less J times acceleration; line: Coulomb and viscous",
+        )
+    )  # fmt: skip
+    return tuple(plots)
+
+
+def _unit(name: str) -> str:
+    return CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("drive", "spin_down"),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=(*USES, *AIDS),
+    either=USES,
+    aids=AIDS,
+    rank=0,
+    clock_powers={"j_rotor_kgm2": 2, "b_visc_nm_s_rad": 1},
+    options={"level": 0.001},
+)

@@ -1,0 +1,341 @@
+"""Magnet flux, back-EMF constants and harmonics, pole pairs from the open-circuit spin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.back_emf import (
+    LEAST_CYCLES,
+    flux_of,
+    read_spin,
+    steady_stretches,
+)
+from pipeline.estimation.instruments import (
+    budget_of,
+    instrument_uncertainties,
+    temperature_source,
+    unstated_note,
+    voltage_source,
+)
+from pipeline.estimation.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.spin_angle import METHOD, Group, angle_offset, count_pole_pairs
+from pipeline.estimation.terminals import first_temperature
+from pipeline.numerics.least_squares import LinearFit, linear_fit
+from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
+from pipeline.physics.glossary import Term
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Budget, Contribution, propagate
+
+NAME = METHOD
+EXPERIMENT = (
+    "record an open_circuit capture: shaft driven at three or more speeds, two line voltages, "
+    "theta_mech_rad, temp_magnet_degc"
+)
+WARM = "repeat an open_circuit capture with the magnets at least 10 K warmer, temp_magnet_degc in"
+ORDERS = (5, 7, 11, 13)
+KE_NAMES: tuple[CouplingName, ...] = (
+    "ke_phase_peak_v_s_rad",
+    "ke_ll_peak_v_s_rad",
+    "ke_ll_rms_v_s_rad",
+    "ke_ll_peak_v_krpm",
+    "kv_ll_peak_rpm_v",
+)
+Array = NDArray[np.float64]
+
+TERMS = (
+    *(
+        Term(
+            f"bemf_harmonic_{k}",
+            "1",
+            f"order {k} of the back-EMF over its fundamental",
+            "constant",
+            0.0,
+            1.0,
+        )
+        for k in ORDERS
+    ),
+    Term(
+        "angle_offset_elec_rad",
+        "rad",
+        "d axis less pole pairs times theta_mech_rad",
+        "constant",
+        -math.pi,
+        math.pi,
+    ),
+    Term(
+        "phase_order",
+        "1",
+        "1: positive rotation runs a, b, c; -1: it runs a, c, b",
+        "constant",
+        -1,
+        1,
+        True,
+    ),
+)
+GIVES = (
+    "psi_pm_wb",
+    "temp_coeff_magnet_1_k",
+    *KE_NAMES,
+    "pole_pairs",
+    *(term.name for term in TERMS),
+)
+UNITS = {"psi_pm_wb": "Wb", "temp_coeff_magnet_1_k": "1/K", "angle_offset_elec_rad": "rad"} | {
+    name: COUPLINGS[name].unit for name in KE_NAMES
+}
+
+
+def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Psi = |v|/omega_e of every steady speed of every capture, brought to 25 degC together.
+
+    psi(T) = psi25 (1 + alpha (T - 25)); alpha is fitted where the magnets were at two
+    temperatures, else assumed with its own uncertainty. Ke in every convention is p psi times
+    that convention's factor (conventions.coupling_as).
+    """
+    del known
+    captures = campaign.of("open_circuit")
+    groups, notes = _groups(captures, options)
+    if not groups:
+        reason = "; ".join([*notes, EXPERIMENT])
+        return Fit(tuple(not_identifiable(n, UNITS.get(n, "1"), NAME, reason) for n in GIVES))
+    used = tuple(c for c in captures if any(g.capture is c for g in groups))
+    notes.append(unstated_note(used, ("voltage", "temperature")))
+    found = _flux_estimates(groups, used, notes, options)
+    pairs, order = count_pole_pairs(groups)
+    found["pole_pairs"] = pairs
+    found["phase_order"] = order
+    found |= _couplings(found["psi_pm_wb"], pairs)
+    found |= _harmonics(groups, used)
+    found["angle_offset_elec_rad"] = angle_offset(groups, pairs, order, used)
+    return Fit(tuple(found[name] for name in GIVES), tuple(_evidence(groups, found["psi_pm_wb"])))
+
+
+def _groups(
+    captures: Sequence[Capture], options: Mapping[str, float]
+) -> tuple[list[Group], list[str]]:
+    groups: list[Group] = []
+    notes: list[str] = []
+    for capture in captures:
+        column = first_temperature(capture, "magnet", "winding", "case")
+        if column != "temp_magnet_degc":
+            other = column or "ambient_degc"
+            notes.append(f"{capture.path}: magnets taken at {other}, no temp_magnet_degc")
+        ambient = capture.meta.ambient_degc
+        fallback = options["temp_assumed_degc"] if ambient is None else ambient
+        try:
+            spin = read_spin(capture, column)
+            stretches = steady_stretches(spin, options["speed_change"])
+        except (KeyError, ValueError):
+            notes.append(f"{capture.path}: needs two line voltages")
+            continue
+        if not stretches:
+            notes.append(
+                f"{capture.path}: no steady stretch of {LEAST_CYCLES} electrical cycles found"
+            )
+        for stretch in stretches:
+            flux = flux_of(spin, stretch, ORDERS)
+            temp = fallback if flux.temp_degc is None else flux.temp_degc
+            groups.append(Group(capture, spin, stretch, flux, temp))
+    return groups, notes
+
+
+def _flux_estimates(
+    groups: Sequence[Group],
+    used: Sequence[Capture],
+    notes: Sequence[str],
+    options: Mapping[str, float],
+) -> dict[str, Estimate]:
+    psi = np.array([g.flux.psi_wb for g in groups])
+    sigma = np.array([max(g.flux.u_psi_wb, 1e-9 * g.flux.psi_wb) for g in groups])
+    excess = np.array([g.temp_degc - 25.0 for g in groups])
+    free = linear_fit(np.column_stack([np.ones(psi.size), excess]), psi, sigma)
+    alpha, u_alpha = _slope(free)
+    wide = float(np.ptp(excess)) >= options["least_span_k"] and free.full_rank
+    measured = wide and u_alpha <= options["worst_u_alpha_1_k"]
+    shared = _instrument_shares(groups, used)
+    at = {
+        "temp_magnet_degc": 25.0,
+        "temp_measured_low_degc": round(float(excess.min()) + 25.0, 3),
+        "temp_measured_high_degc": round(float(excess.max()) + 25.0, 3),
+        "speed_elec_low_rad_s": min(abs(g.flux.speed_elec_rad_s) for g in groups),
+        "speed_elec_high_rad_s": max(abs(g.flux.speed_elec_rad_s) for g in groups),
+    }
+    paths = tuple(c.path for c in used)
+    extra: list[Contribution] = []
+    words = [n for n in notes if n]
+    if measured:
+        value, chosen = float(free.coefficients[0]), free
+    else:
+        alpha = options["alpha_assumed_1_k"]
+        factor = 1.0 + alpha * excess
+        fixed = linear_fit(factor[:, None], psi, sigma)
+        value, chosen = float(fixed.coefficients[0]), fixed
+        weight = 1.0 / sigma**2
+        lever = float(np.sum(weight * excess * factor) / np.sum(weight * factor**2))
+        extra = [Contribution(SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
+        words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
+    widened, dof = _birge(chosen)
+    parts = [Contribution(f"scatter:{NAME}:psi", chosen.u(0) * math.sqrt(widened), "A", dof)]
+    parts += extra
+    parts += [Contribution(source, value * u, "B") for source, u in shared["voltage"]]
+    parts += [Contribution(source, -value * alpha * u, "B") for source, u in shared["temperature"]]
+    note = "; ".join(words)
+    found = {
+        "psi_pm_wb": Estimate(
+            "psi_pm_wb", value, "Wb", "measured", NAME, budget_of(parts), at, paths, note
+        )
+    }
+    name = "temp_coeff_magnet_1_k"
+    if not measured:
+        found[name] = not_identifiable(name, "1/K", NAME, WARM)
+        return found
+    scatter = Contribution(f"scatter:{NAME}:alpha", u_alpha * math.sqrt(widened), "A", dof)
+    offset = [Contribution(s, alpha**2 * u, "B") for s, u in shared["temperature"]]
+    budget = budget_of([scatter, *offset])
+    found[name] = Estimate(name, alpha, "1/K", "measured", NAME, budget, at, paths, note)
+    return found
+
+
+def _slope(fit: LinearFit) -> tuple[float, float]:
+    """Alpha = slope/intercept and its standard uncertainty from the scatter."""
+    value, slope = (float(c) for c in fit.coefficients)
+    alpha = slope / value
+    gradient = np.array([-alpha / value, 1.0 / value])
+    return alpha, math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0))
+
+
+def _birge(fit: LinearFit) -> tuple[float, float]:
+    """Variance factor where the speeds scatter more than their noise (Birge), else 1; and its dof.
+
+    The noise of a speed is known from all its rows; what widens it, from the few speeds alone.
+    """
+    wide = _beyond_chance(fit.chi2_dof, fit.dof)
+    return (fit.chi2_dof, float(fit.dof)) if wide else (1.0, math.inf)
+
+
+def _beyond_chance(chi2_dof: float, dof: int) -> bool:
+    """Whether chi squared per degree of freedom lies three of its standard deviations over 1."""
+    return dof >= 2 and chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / dof)
+
+
+def _instrument_shares(
+    groups: Sequence[Group], used: Sequence[Capture]
+) -> dict[str, list[tuple[str, float]]]:
+    """Each source's standard uncertainty times the share of the weight read through it."""
+    weights = np.array([1.0 / max(g.flux.u_psi_wb, 1e-300) ** 2 for g in groups])
+    weights = weights / weights.sum()
+    shares: dict[str, list[tuple[str, float]]] = {"voltage": [], "temperature": []}
+    for kind, source_of in (("voltage", voltage_source), ("temperature", temperature_source)):
+        for source, u in instrument_uncertainties(used, (kind,)).items():
+            own = [source_of(g.capture.meta) == source for g in groups]
+            shares[kind].append((source, u * float(weights[own].sum())))
+    return shares
+
+
+def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:
+    found: dict[str, Estimate] = {}
+    for name in KE_NAMES:
+        unit = COUPLINGS[name].unit
+        if not pairs.known:
+            found[name] = not_identifiable(name, unit, NAME, f"needs pole_pairs: {pairs.note}")
+            continue
+        k = psi.number * pairs.number
+        value = coupling_as(name, k)
+        slope = COUPLINGS[name].power * value / psi.number
+        budget: Budget = propagate([(slope, psi.budget)])
+        found[name] = Estimate(
+            name, value, unit, "measured", NAME, budget, psi.at, psi.captures, psi.note
+        )
+    return found
+
+
+def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Estimate]:
+    """Weighted mean of the complex ratios, so that noise averages out before the magnitude.
+
+    Speeds that differ by more than their noise widen it, and beyond chance it has their freedom.
+    """
+    found = {}
+    for order in ORDERS:
+        name = f"bemf_harmonic_{order}"
+        own = [g for g in groups if order in g.flux.harmonics]
+        if not own:
+            note = f"repeat the open_circuit at a rate above {3 * order} samples a cycle"
+            found[name] = not_identifiable(name, "1", NAME, note)
+            continue
+        ratios = np.array([g.flux.harmonics[order] for g in own])
+        weights = np.array([g.flux.u_harmonic**-2 for g in own])
+        mean = complex(np.sum(weights * ratios) / weights.sum())
+        spread = np.abs(ratios - mean) ** 2 * weights
+        free = 2 * len(own) - 2
+        excess = float(spread.sum()) / max(free, 1)
+        u = math.sqrt(max(1.0, excess) / float(weights.sum()))
+        dof = float(free) if _beyond_chance(excess, free) else math.inf
+        budget = budget_of([Contribution(f"scatter:{NAME}:{name}", u, "A", dof)])
+        note = "" if abs(mean) > 3.0 * u else "within noise of zero"
+        paths = tuple(c.path for c in used)
+        found[name] = Estimate(name, abs(mean), "1", "measured", NAME, budget, {}, paths, note)
+    return found
+
+
+def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:
+    alpha = 0.0
+    temps = np.array([g.temp_degc for g in groups])
+    psis = np.array([g.flux.psi_wb for g in groups])
+    if psi.at["temp_measured_low_degc"] != psi.at["temp_measured_high_degc"]:
+        line = np.column_stack([np.ones(temps.size), temps - 25.0])
+        alpha = float(linear_fit(line, psis / psi.number).coefficients[1])
+    amplitude, flux = [], []
+    for path in dict.fromkeys(g.capture.path for g in groups):
+        own = [g for g in groups if g.capture.path == path]
+        own.sort(key=lambda g: g.flux.speed_elec_rad_s)
+        speed = np.array([g.flux.speed_elec_rad_s for g in own])
+        volts = np.array([g.flux.amplitude_v for g in own])
+        model = np.array([psi.number * (1.0 + alpha * (g.temp_degc - 25.0)) for g in own])
+        amplitude.append(Series(path, speed, volts, model * np.abs(speed)))
+        flux.append(Series(path, speed, np.array([g.flux.psi_wb for g in own]), model))
+    return [
+        Evidence(
+            NAME,
+            "Back-EMF amplitude against speed",
+            "omega_elec_rad_s",
+            "back_emf_phase_peak_v",
+            "scatter",
+            tuple(amplitude),
+            caption="Fundamental of the phase voltage; the line is psi times electrical speed.",
+        ),
+        Evidence(
+            NAME,
+            "Flux linkage found at each speed",
+            "omega_elec_rad_s",
+            "psi_pm_wb",
+            "scatter",
+            tuple(flux),
+            caption="Flat where amplitude is proportional to speed; the steps are temperature.",
+        ),
+    ]
+
+
+ESTIMATOR = Estimator(
+    NAME,
+    GIVES,
+    ("open_circuit",),
+    EXPERIMENT,
+    fit_open_circuit,
+    terms=TERMS,
+    clock_powers={"psi_pm_wb": 1, **dict.fromkeys(KE_NAMES, 1), "kv_ll_peak_rpm_v": -1},
+    options={
+        "speed_change": 0.02,
+        "temp_assumed_degc": 25.0,
+        "least_span_k": 8.0,
+        "worst_u_alpha_1_k": 3e-4,
+        "alpha_assumed_1_k": USUAL_1_K,
+        "u_alpha_assumed_1_k": U_USUAL_1_K,
+    },
+)

@@ -1,0 +1,354 @@
+"""Friction over inertia from coast-downs: what deceleration says without any torque known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.drag import DRAG_FORMS, STRIBECK
+from pipeline.estimation.instruments import budget_of
+from pipeline.estimation.integrals import trapezoid
+from pipeline.estimation.nuisances import allowed_for
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.coasting import coast_down, coasting_rows
+from pipeline.numerics.least_squares import (
+    NonlinearFit,
+    autocorrelation_time,
+    central_jacobian,
+    gauss_newton,
+)
+from pipeline.numerics.plateaus import block_means, white_noise_sigma
+from pipeline.numerics.selection import needed_columns
+from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
+from pipeline.physics.glossary import Term
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Contribution
+
+Array = NDArray[np.float64]
+
+NAME = "spin_down"
+TERMS = (
+    Term("coast_coulomb_rad_s2", "rad/s²", "Coulomb friction over inertia, from coasting",
+         "constant", 0.0, 1e7),
+    Term("coast_viscous_1_s", "1/s", "viscous friction over inertia, from coasting", "constant",
+         -1e3, 1e6),
+)  # fmt: skip
+EXPERIMENT = (
+    "record a spin_down: terminals open, let the shaft coast from full speed to rest with "
+    "theta_mech_rad logged, once in each sense"
+)
+MOST_SAMPLES = 4000
+SHARED = ("coulomb", "viscous")
+EXTRAS = ("windage", *STRIBECK[::3])
+EXPLAINED = 1.05
+RIPPLES = ("cos", "sin", "cos 2", "sin 2")
+UNEXPLAINED = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Coast:
+    """One coast: time from its start [n], angle travelled or speed [n], absolute angle [n]."""
+
+    path: str
+    start_s: float
+    t_s: Array
+    measured: Array
+    theta_rad: Array
+    sense: int
+    speed_rad_s: float
+    of_angle: bool
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """The parameters: shared drag first, then start angle, speed and ripple of each coast."""
+
+    extras: tuple[str, ...]
+    ripples: tuple[str, ...]
+    fastest_rad_s: float
+
+    def of_coast(self, index: int, parameters: Array) -> tuple[Array, Array]:
+        """Drag parameters and those of one coast."""
+        shared = len(SHARED) + len(self.extras)
+        own = 2 + len(self.ripples)
+        return parameters[:shared], parameters[shared + index * own : shared + (index + 1) * own]
+
+    def predict(self, index: int, coast: Coast, parameters: Array) -> Array:
+        """What the encoder (or tachometer) should read [n]."""
+        drag, own = self.of_coast(index, parameters)
+        fast = self.fastest_rad_s
+
+        def deceleration(speed: Array) -> Array:
+            total: Array = drag[0] + drag[1] * speed
+            for value, name in zip(drag[2:], self.extras, strict=True):
+                total = total + value * DRAG_FORMS[name](speed / fast)
+            return total
+
+        theta, speed = coast_down(coast.t_s, max(float(own[1]), 1e-6 * fast), deceleration)
+        # A tachometer's zero error looks as T_c/B does, so it is taken as none.
+        out = own[0] + theta if coast.of_angle else speed
+        for value, name in zip(own[2:], self.ripples, strict=True):
+            out = out + value * _ripple(name, coast.theta_rad)
+        predicted: Array = out
+        return predicted
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """T_c/J and B/J from dw/dt = -T_c/J - (B/J) w, fitted to the angle itself.
+
+    The trajectory is integrated, the record never differentiated; windage, Stribeck's bump and an
+    eccentric encoder join where the residuals demand them. J is not in it: that needs a known
+    torque (estimator inertia). Reference: IEEE Std 115-2019, 4.4 (retardation test).
+    """
+    del known
+    coasts = [c for capture in campaign.of("spin_down") for c in _coasts(capture)]
+    if not coasts:
+        note = f"no coast-down of {LEAST_SAMPLES} samples or more; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(t.name, t.unit, NAME, note) for t in TERMS))
+    fastest = max(c.speed_rad_s for c in coasts)
+    motion = Motion((), (), fastest)
+    found = _solve(motion, coasts, None)
+    for _ in range(2):
+        free = found.residuals.size - found.parameters.size
+        if found.residuals @ found.residuals < EXPLAINED**2 * free:
+            break
+        wider = _wider(motion, coasts, found, options["level"])
+        if wider == motion:
+            break
+        found = _solve(wider, coasts, _carry(motion, wider, found.parameters, len(coasts)))
+        motion = wider
+    if not np.isfinite([found.u(0), found.u(1)]).all():
+        note = f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(t.name, t.unit, NAME, note) for t in TERMS))
+    return Fit(_estimates(motion, coasts, found), _evidence(motion, coasts, found))
+
+
+def _coasts(capture: Capture) -> list[Coast]:
+    """The stretches from the highest speed down to (nearly) rest, thinned by block means."""
+    of_angle = capture.has("theta_mech_rad")
+    column = "theta_mech_rad" if of_angle else "omega_mech_rad_s"
+    if not capture.has("t_s", column):
+        return []
+    data = capture.arrays("t_s", column)
+    fine = np.isfinite(data["t_s"]) & np.isfinite(data[column])
+    t, y = data["t_s"][fine], data[column][fine]
+    if t.size < 3 * LEAST_SAMPLES:
+        return []
+    angle = y if of_angle else trapezoid(t, y)
+    try:
+        speed = smooth_speed(t, angle, max(0.01, 20.0 * float(np.median(np.diff(t)))))
+    except ValueError:
+        return []
+    return [
+        _coast(capture.path, t[rows], y[rows], sense, sense * speed[rows], of_angle)
+        for rows, sense in coasting_rows(speed)
+        if rows.stop - rows.start >= 3 * LEAST_SAMPLES
+    ]
+
+
+def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bool) -> Coast:
+    block = -(-t.size // MOST_SAMPLES)
+    sigma = white_noise_sigma(y) / np.sqrt(block)
+    start = float(t[0])
+    t, y = block_means(t - start, block), block_means(y, block)
+    travelled = (y - y[0]) * sense if of_angle else y * sense
+    theta = y if of_angle else np.cumsum(np.gradient(t) * y)
+    return Coast(path, start, t, travelled, theta, sense, float(speed[0]), of_angle, float(sigma))
+
+
+def _ripple(name: str, theta: Array) -> Array:
+    order = 2.0 if name.endswith("2") else 1.0
+    wave: Array = np.cos(order * theta) if name.startswith("cos") else np.sin(order * theta)
+    return wave
+
+
+def _weights(coasts: Sequence[Coast]) -> Array:
+    return np.concatenate([np.full(c.t_s.size, 1.0 / max(c.sigma, 1e-300)) for c in coasts])
+
+
+def _solve(motion: Motion, coasts: Sequence[Coast], start: Array | None) -> NonlinearFit:
+    measured = np.concatenate([c.measured for c in coasts])
+    weights = _weights(coasts)
+    if start is None:
+        start = _first_guess(motion, coasts)
+
+    def predict(parameters: Array) -> Array:
+        return np.concatenate([motion.predict(i, c, parameters) for i, c in enumerate(coasts)])
+
+    width = _widths(motion, coasts, start)
+
+    def model(parameters: Array) -> tuple[Array, Array]:
+        jacobian = central_jacobian(predict, parameters, width)
+        return (predict(parameters) - measured) * weights, jacobian * weights[:, None]
+
+    return gauss_newton(model, start, iterations=15)
+
+
+def _first_guess(motion: Motion, coasts: Sequence[Coast]) -> Array:
+    span = max(float(c.t_s[-1]) for c in coasts)
+    parts = [np.array([0.5 * motion.fastest_rad_s / span, 0.5 / span])]
+    parts += [np.array([0.0, c.speed_rad_s]) for c in coasts]
+    return np.concatenate(parts)
+
+
+def _widths(motion: Motion, coasts: Sequence[Coast], start: Array) -> Array:
+    """Steps of the finite differences: a ten-thousandth of what matters over the record."""
+    drag = 1e-4 * max(abs(start[0]), abs(start[1]) * motion.fastest_rad_s)
+    shared = [drag, drag / motion.fastest_rad_s, *([drag] * len(motion.extras))]
+    own = [1e-3, 1e-5 * motion.fastest_rad_s, *([1e-3] * len(motion.ripples))]
+    return np.array(shared + own * len(coasts))
+
+
+def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: float) -> Motion:
+    """The motion with the additions that the residuals demand."""
+    extras = tuple(n for n in EXTRAS if n not in motion.extras)
+    of_angle = all(c.of_angle for c in coasts)
+    ripples = tuple(n for n in RIPPLES if n not in motion.ripples) if of_angle else ()
+    sigma = np.ones(found.residuals.size)
+    tau = autocorrelation_time(found.residuals)
+    trial = Motion(motion.extras + extras, motion.ripples, motion.fastest_rad_s)
+    start = _carry(motion, trial, found.parameters, len(coasts))
+    weights = _weights(coasts)
+
+    def predict(parameters: Array) -> Array:
+        return np.concatenate([trial.predict(i, c, parameters) for i, c in enumerate(coasts)])
+
+    jacobian = central_jacobian(predict, start, _widths(trial, coasts, start)) * weights[:, None]
+    at = len(SHARED) + len(motion.extras)
+    candidates = {name: jacobian[:, at + k] for k, name in enumerate(extras)}
+    theta = np.concatenate([c.theta_rad for c in coasts])
+    candidates |= {name: _ripple(name, theta) * weights for name in ripples}
+    chosen = needed_columns(
+        found.jacobian, candidates, -found.residuals, sigma, level, 3, min(tau, 50.0)
+    )
+    return Motion(
+        motion.extras + tuple(n for n in extras if n in chosen),
+        motion.ripples + tuple(n for n in ripples if n in chosen),
+        motion.fastest_rad_s,
+    )
+
+
+def _carry(old: Motion, new: Motion, parameters: Array, coasts: int) -> Array:
+    """Parameters of the old motion in the places of the new one, additions at zero."""
+    drag = parameters[: len(SHARED) + len(old.extras)]
+    parts = [drag, np.zeros(len(new.extras) - len(old.extras))]
+    for index in range(coasts):
+        own = old.of_coast(index, parameters)[1]
+        parts += [own, np.zeros(len(new.ripples) - len(old.ripples))]
+    return np.concatenate(parts)
+
+
+def _estimates(
+    motion: Motion, coasts: Sequence[Coast], found: NonlinearFit
+) -> tuple[Estimate, ...]:
+    free = found.residuals.size - found.parameters.size
+    spread = float(found.residuals @ found.residuals) / free
+    tau = autocorrelation_time(found.residuals)
+    joint = found.covariance[:2, :2] * spread * tau
+    scale = np.sqrt(np.diag(joint))
+    lower = np.linalg.cholesky(joint / np.outer(scale, scale) + 1e-12 * np.eye(2)) * scale[:, None]
+    paths = tuple(sorted({c.path for c in coasts}))
+    added = [*motion.extras, *motion.ripples]
+    note = f"{len(coasts)} coasts; residual {np.sqrt(spread):.2g} times the encoder's own noise"
+    note += f"; {allowed_for(added)}" if added else ""
+    form = np.zeros(2)
+    if np.sqrt(spread) > UNEXPLAINED:
+        form = _form(motion, coasts, found)
+        note += "; drag has another form: allowance from the fast and the slow half apart"
+    dof = max(free / tau, 1.0)
+    estimates = []
+    for i, term in enumerate(TERMS):
+        parts = [Contribution(f"scatter:{NAME}:{k}", float(lower[i, k]), "A", dof) for k in (0, 1)]
+        parts.append(Contribution("assumed:drag_form", float(form[i]), "B"))
+        value = float(found.parameters[i])
+        at = {"omega_mech_rad_s": motion.fastest_rad_s}
+        estimates.append(
+            Estimate(
+                term.name, value, term.unit, "measured", NAME, budget_of(parts), at, paths, note
+            )
+        )
+    return tuple(estimates)
+
+
+def _form(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> Array:
+    """How far the halves of the coasts disagree on the two ratios, each fitted by itself."""
+    values = []
+    plain = Motion((), motion.ripples, motion.fastest_rad_s)
+    for late in (False, True):
+        halves = []
+        for i, coast in enumerate(coasts):
+            half = coast.t_s.size // 2
+            rows = slice(half, None) if late else slice(0, half)
+            speed = np.gradient(motion.predict(i, coast, found.parameters), coast.t_s)
+            offset = coast.measured[rows][0] if coast.of_angle else 0.0
+            halves.append(
+                Coast(
+                    coast.path, coast.start_s, coast.t_s[rows] - coast.t_s[rows][0],
+                    coast.measured[rows] - offset, coast.theta_rad[rows], coast.sense,
+                    float(speed[rows][0]) if coast.of_angle else float(coast.measured[rows][0]),
+                    coast.of_angle, coast.sigma,
+                )
+            )  # fmt: skip
+        first = _first_guess(plain, halves)
+        start = _carry(Motion((), (), plain.fastest_rad_s), plain, first, len(halves))
+        values.append(_solve(plain, halves, start).parameters[:2])
+    apart = np.abs(values[1] - values[0])
+    beside = np.abs(0.5 * (values[0] + values[1]) - found.parameters[:2])
+    allowance: Array = np.maximum(apart, beside)
+    return allowance
+
+
+def _evidence(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> tuple[Evidence, ...]:
+    plots = []
+    for i, coast in enumerate(coasts):
+        fitted = motion.predict(i, coast, found.parameters)
+        keep = slice(None, None, -(-coast.t_s.size // 2000))
+        t = coast.t_s[keep] + coast.start_s
+        word = "forward" if coast.sense > 0 else "backward"
+        if coast.of_angle:
+            seen = np.gradient(coast.measured, coast.t_s)[keep]
+            modelled = np.gradient(fitted, coast.t_s)[keep]
+        else:
+            seen, modelled = coast.measured[keep], fitted[keep]
+        speed = Series(word, t, seen * coast.sense, modelled * coast.sense)
+        plots.append(
+            Evidence(
+                NAME, f"Coast-down {word}", "t_s", "omega_mech_rad_s", "line", (speed,), coast.path,
+                "speed for the eye only; the fit is to the angle",
+            )
+        )  # fmt: skip
+        if coast.of_angle:
+            angle = Series(word, t, coast.measured[keep], fitted[keep])
+            plots.append(
+                Evidence(
+                    NAME,
+                    f"Angle travelled {word}",
+                    "t_s",
+                    "theta_mech_rad",
+                    "line",
+                    (angle,),
+                    coast.path,
+                    "angle from the start of the coast",
+                )
+            )
+    return tuple(plots)
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=tuple(term.name for term in TERMS),
+    tests=("spin_down",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    rank=0,
+    terms=TERMS,
+    clock_powers={"coast_coulomb_rad_s2": -2, "coast_viscous_1_s": -1},
+    options={"level": 0.001},
+)

@@ -1,0 +1,310 @@
+"""Thermal resistance from winding to ambient, from the heat balance of a heat run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.heat_record import (
+    REFERENCE,
+    TURNING,
+    HeatRecord,
+    ambient_degc,
+    read_heat,
+    reference_resistance,
+)
+from pipeline.estimation.instruments import (
+    budget_of,
+    current_source,
+    temperature_source,
+    voltage_source,
+)
+from pipeline.estimation.integrals import trapezoid
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.least_squares import (
+    LinearFit,
+    autocorrelation_time,
+    gauss_newton,
+    linear_fit,
+)
+from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Contribution, propagate, type_b
+
+NAME = "thermal"
+GIVEN = "rth_winding_k_w"
+EXPERIMENT = (
+    "record a heat_run of at least three thermal time constants with temp_winding_degc, "
+    "temp_ambient_degc or ambient_degc, and temp_case_degc or temp_magnet_degc"
+)
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """Steady thermal resistance [K/W] with its scatter, and the winding temperature it predicts."""
+
+    rth_k_w: float
+    u_rth_k_w: float
+    dof: float
+    fitted_degc: Array
+    covered: float
+    words: str
+
+
+def fit_thermal(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Heat balance in integral form, so that no temperature is differentiated.
+
+    One node:   T_w - T_w0 = (1/C) ∫P - (1/CR) ∫(T_w - T_a)
+    Two nodes:  the winding also gives to a body whose temperature was measured, and that body to
+    ambient; the steady resistance is R_wa beside R_wm + R_ma. P = 1.5 R(T_w) i², from the
+    resistance test, so that an inverter's loss is not counted. Of several runs the best is used.
+    Reference: Boglietti et al., IEEE Trans. Ind. Electron. 56(3), 2009 (lumped networks).
+    """
+    reasons: list[str] = []
+    best: tuple[Balance, HeatRecord, Array] | None = None
+    for capture in campaign.of("heat_run"):
+        try:
+            record = read_heat(capture, known)
+        except KeyError as error:
+            reasons.append(str(error.args[0]))
+            continue
+        ambient = None if record is None else ambient_degc(record)
+        if record is None or ambient is None:
+            reasons.append(f"{capture.path}: no steady current, or ambient not known")
+            continue
+        balance = _balance(record, _losses_w(record, known), ambient)
+        if balance is None or balance.u_rth_k_w > options["worst_u_rel"] * balance.rth_k_w:
+            reasons.append(f"{capture.path}: too short for the slowest part of the rise")
+        elif best is None or balance.u_rth_k_w < best[0].u_rth_k_w:
+            best = balance, record, np.array([ambient])
+    if best is None:
+        reason = "; ".join([*reasons, EXPERIMENT])
+        return Fit((not_identifiable(GIVEN, "K/W", NAME, reason),))
+    return Fit((_estimate(*best, known),), (_evidence(*best[:2]),))
+
+
+def _losses_w(record: HeatRecord, known: Constants) -> Array:
+    """Copper loss [n]: 1.5 R(T) (i_d² + i_q²), R as measured where no resistance test is there."""
+    r25, alpha = reference_resistance(record, known), known.best("temp_coeff_copper_1_k")
+    if r25 is None:
+        return 1.5 * record.r_phase_ohm * record.square_a2
+    coefficient = COPPER_COEFFICIENT_25_1_K if alpha is None else alpha.number
+    r_ohm = r25.number * (1.0 + coefficient * (record.temp_winding_degc - 25.0))
+    losses: Array = 1.5 * r_ohm * record.square_a2
+    return losses
+
+
+def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | None:
+    """The two-node balance where a second body was measured and takes heat, else one node."""
+    t, winding = record.t_s, record.temp_winding_degc
+    ones, power = np.ones(t.size), trapezoid(t, losses_w)
+    outward = -trapezoid(t, winding - ambient)
+    single = linear_fit(np.column_stack([ones, power, outward]), winding)
+    if record.temp_second_degc is not None and np.isfinite(record.temp_second_degc).all():
+        second = record.temp_second_degc
+        across = -trapezoid(t, winding - second)
+        double = _winding_fit(np.column_stack([ones, power, across, outward]), winding)
+        body = linear_fit(np.column_stack([ones, -across, -trapezoid(t, second - ambient)]), second)
+        start, direct = _start(double, body)
+        found = None
+        if start is not None:
+            found = _two_nodes(record, losses_w, ambient, start, direct)
+        if found is not None:
+            return found
+    tau = autocorrelation_time(single.residuals)
+    inverse_c, rate = float(single.coefficients[1]), float(single.coefficients[2])
+    if not single.full_rank or inverse_c <= 0.0 or rate <= 0.0:
+        return None
+    covered = float(t[-1] - t[0]) * rate
+    rth = inverse_c / rate
+    gradient = np.array([0.0, 1.0 / rate, -rth / rate])
+    u = math.sqrt(float(gradient @ single.covariance @ gradient) * tau)
+    # One exponential is a guess about what follows the end of the record: its weight there.
+    u = math.hypot(u, rth * math.exp(-covered))
+    words = f"one time constant of {1.0 / rate:.3g} s, {covered:.1f} of them recorded"
+    fitted = winding - single.residuals
+    return Balance(rth, u, max(single.dof / tau, 1.0), fitted, covered, words)
+
+
+def _start(double: LinearFit, body: LinearFit) -> tuple[Array | None, bool]:
+    """Rates k, a, b, c, d by the integral form, and whether heat goes straight to ambient.
+
+    None where the second body does not take heat beyond doubt.
+    """
+    direct = double.coefficients.size > 3
+    k, b = (float(v) for v in double.coefficients[1:3])
+    a = float(double.coefficients[3]) if direct else 0.0
+    c, d = (float(v) for v in body.coefficients[1:])
+    told = double.full_rank and body.full_rank and min(k, b, c, d) > 0.0
+    if not told or b < 3.0 * double.u(2) or c < 3.0 * body.u(1):
+        return None, direct
+    return np.array([k, a, b, c, d]), direct
+
+
+def _winding_fit(design: Array, winding: Array) -> LinearFit:
+    """Winding's balance; heat straight to ambient, the last column, only where it shows."""
+    full = linear_fit(design, winding)
+    if full.coefficients[-1] > 3.0 * full.u(3) * math.sqrt(autocorrelation_time(full.residuals)):
+        return full
+    return linear_fit(design[:, :3], winding)
+
+
+def _two_nodes(
+    record: HeatRecord, losses_w: Array, ambient: float, start: Array, direct: bool
+) -> Balance | None:
+    """Least squares of the simulated network on both temperatures, from the integral form's rates.
+
+    R = k/(a + b d/(c + d)) with k = 1/C_w, a to ambient, b to the body, which gains c and loses d
+    [1/s]. The integral form alone is far from the bound, because its noise is not white.
+    """
+    second = record.temp_second_degc
+    if second is None:
+        return None
+    t, winding = record.t_s, record.temp_winding_degc
+    sigmas = [max(white_noise_sigma(x), 1e-6) for x in (winding, second)]
+    measured = np.concatenate([winding / sigmas[0], second / sigmas[1]])
+    free = np.array([True, direct, True, True, True, True, True])
+    x0 = np.concatenate([start, [winding[0] - ambient, second[0] - ambient]])
+    widths = 1e-5 * np.where(x0 != 0.0, np.abs(x0), np.abs(x0[:5]).max())
+
+    def residuals_and_jacobian(values: Array) -> tuple[Array, Array]:
+        full = x0.copy()
+        full[free] = values
+        places = np.flatnonzero(free)
+        variants = np.tile(full, (places.size + 1, 1))
+        variants[np.arange(1, places.size + 1), places] += widths[places]
+        course = network(t, losses_w, variants) + ambient
+        course = course / np.array(sigmas)[:, None, None]
+        predicted = course.transpose(1, 0, 2).reshape(places.size + 1, -1)
+        slopes = (predicted[1:] - predicted[0]) / widths[places][:, None]
+        return predicted[0] - measured, slopes.T
+
+    low = np.full(int(free.sum()), -np.inf)
+    low[:-2] = 0.0
+    fit = gauss_newton(residuals_and_jacobian, x0[free], low, tolerance=1e-4)
+    full = x0.copy()
+    full[free] = fit.parameters
+    k, a, b, c, d = (float(v) for v in full[:5])
+    total = a + b * d / (c + d) if c + d > 0.0 else 0.0
+    if k <= 0.0 or total <= 0.0 or d <= 0.0:
+        return None
+    rth = k / total
+    slope = np.zeros(7)
+    slope[:3] = 1.0 / total, -rth / total, -rth / total * d / (c + d)
+    slope[3:5] = -rth / total * b * np.array([-d, c]) / (c + d) ** 2
+    halves = fit.residuals[: t.size], fit.residuals[t.size :]
+    tau = max(autocorrelation_time(half) for half in halves)
+    spread = fit.cost / max(fit.residuals.size - int(free.sum()), 1) * tau
+    u = fit.u_of(slope[free]) * math.sqrt(spread)
+    if not math.isfinite(u):
+        return None
+    words = f"winding {1.0 / (a + b):.3g} s and body {1.0 / (c + d):.3g} s, two nodes"
+    dof = max((fit.residuals.size - int(free.sum())) / tau, 1.0)
+    covered = float(t[-1] - t[0]) * (a + b)
+    return Balance(rth, u, dof, winding + halves[0] * sigmas[0], covered, words)
+
+
+def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
+    """Rise over ambient of winding and body [2, m, n] at times [n] under losses [n].
+
+    variants [m, 7]: k, a, b, c, d, first rises. dT_w = k P - a T_w - b (T_w - T_m),
+    dT_m = c (T_w - T_m) - d T_m; exact over each step for the mean loss of its ends.
+    """
+    k, a, b, c, d = (variants[:, j] for j in range(5))
+    matrix = np.empty((variants.shape[0], 2, 2))
+    matrix[:, 0, 0], matrix[:, 0, 1] = -(a + b), b
+    matrix[:, 1, 0], matrix[:, 1, 1] = c, -(c + d)
+    half_trace = 0.5 * (matrix[:, 0, 0] + matrix[:, 1, 1])
+    root = np.sqrt(0.25 * (matrix[:, 0, 0] - matrix[:, 1, 1]) ** 2 + b * c) + 1e-12
+    steps = np.diff(t_s)[:, None]
+    fast, slow = np.exp((half_trace - root) * steps), np.exp((half_trace + root) * steps)
+    # Sylvester's formula for the exponential of a 2 x 2 matrix with two real rates.
+    shifted = matrix - (half_trace - root)[:, None, None] * np.eye(2)
+    exponential = (
+        fast[..., None, None] * np.eye(2)
+        + ((slow - fast) / (2.0 * root))[..., None, None] * shifted
+    )
+    determinant = (a + b) * (c + d) - b * c + 1e-300
+    steady = np.stack([k * (c + d) / determinant, k * c / determinant], axis=1)
+    drive = steady - np.einsum("nmij,mj->nmi", exponential, steady)
+    means = 0.5 * (losses_w[1:] + losses_w[:-1])
+    course = np.empty((t_s.size, variants.shape[0], 2))
+    course[0] = state = variants[:, 5:7]
+    for row, watt in enumerate(means):
+        state = np.einsum("mij,mj->mi", exponential[row], state) + drive[row] * watt
+        course[row + 1] = state
+    turned: Array = course.transpose(2, 1, 0)
+    return turned
+
+
+def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Constants) -> Estimate:
+    """Budget: the loss by the errors of R and i², or of v and i; the rise by the thermometer.
+
+    A thermometer's offset leaves the loss alone, for R25 is low by what R(T) of it is high, and
+    the rise as well where it measured the ambient too.
+    """
+    meta = record.capture.meta
+    rth = balance.rth_k_w
+    thermometer = temperature_source(meta)
+    current = type_b(current_source(meta), meta.instrument_u("u_rel_current"))
+    resistance = reference_resistance(record, known)
+    if resistance is None:
+        volts = type_b(voltage_source(meta), meta.instrument_u("u_rel_voltage"))
+        loss = propagate([(-rth, volts), (-rth, current)])
+    else:
+        others = tuple(part for part in resistance.budget if part.source != thermometer)
+        loss = propagate([(-2.0 * rth, current), (-rth / resistance.number, others)])
+    parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof), *loss]
+    rise = float(record.temp_winding_degc.max()) - float(ambient[0])
+    if record.temp_ambient_degc is None and rise > 0.0:
+        parts.append(Contribution(thermometer, rth * meta.instrument_u("u_temp_degc") / rise, "B"))
+    at = {
+        "current_a": round(float(record.current_a.mean()), 4),
+        "temp_ambient_degc": round(float(ambient[0]), 2),
+        "temp_high_degc": round(float(record.temp_winding_degc.max()), 2),
+    }
+    return Estimate(
+        GIVEN,
+        rth,
+        "K/W",
+        "measured",
+        NAME,
+        budget_of(parts),
+        at,
+        (record.capture.path,),
+        f"steady state by {balance.words}; the motor as mounted on this bench",
+    )
+
+
+def _evidence(balance: Balance, record: HeatRecord) -> Evidence:
+    series = Series("winding", record.t_s, record.temp_winding_degc, balance.fitted_degc)
+    return Evidence(
+        NAME,
+        "Winding temperature of the heat run",
+        "t_s",
+        "temp_winding_degc",
+        "line",
+        (series,),
+        record.capture.path,
+        f"Heat balance: {balance.words}.",
+    )
+
+
+ESTIMATOR = Estimator(
+    NAME,
+    (GIVEN,),
+    ("heat_run",),
+    EXPERIMENT,
+    fit_thermal,
+    uses=("temp_coeff_copper_1_k", "temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
+    options={"worst_u_rel": 0.25},
+)

@@ -1,0 +1,393 @@
+"""Torque constant and reluctance torque from a dynamometer's torque against currents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from pipeline.estimation.instruments import (
+    budget_of,
+    contributions,
+    instrument_uncertainties,
+    unstated_note,
+)
+from pipeline.estimation.locked_rotor import HARMONICS, angle_doubt, standstill_words
+from pipeline.estimation.magnet_coefficient import SOURCE, magnet_coefficient
+from pipeline.estimation.nuisances import allowed_for
+from pipeline.estimation.operating_points import Point, PointTable, operating_points, pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.torque_slope import Slope, slope_without_d
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.numerics.selection import needed_columns
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Budget, Contribution, propagate
+
+Array = NDArray[np.float64]
+
+NAME = "torque_map"
+RELUCTANCE = Term(
+    "kt_reluctance_nm_a2",
+    "N·m/A²",
+    "torque per product of d and q current, 1.5 p (Ld - Lq), from the torque test",
+    "constant",
+    -1e4,
+    1e4,
+)
+DRAG = ("torque_coulomb_nm", "b_visc_nm_s_rad")
+GIVES = ("kt_peak_nm_a", RELUCTANCE.name, *DRAG)
+EXPERIMENT = (
+    "record a torque_map: the dynamometer holds a speed while positive and negative q currents "
+    "are stepped, at two or more d currents, in both senses of rotation"
+)
+FORM_SHARE = 0.1
+BY_CHANCE = 0.01
+BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
+
+
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """Fitted torque: coefficients by column name, their covariance, residuals [n, N·m]."""
+
+    names: tuple[str, ...]
+    coefficients: Array
+    covariance: Array
+    residuals: Array
+    dof: int
+
+    def index(self, name: str) -> int:
+        """Position of a column."""
+        return self.names.index(name)
+
+    @property
+    def kt_nm_a(self) -> float:
+        """Slope at small current in the true frame.
+
+        A frame off by e shows K cos(e) i_q + K sin(e) i_d; an eccentric encoder makes
+        e = A sin(theta + phi), so K i_d A appears once a turn and the mean of cos(e) is 1 - A²/4.
+        """
+        kt = self.of("iq")
+        wobble = (self.of("id cos") ** 2 + self.of("id sin") ** 2) / kt**2 if kt else 0.0
+        return float(np.copysign(np.hypot(kt, self.of("id")), kt)) * (1.0 + wobble / 4.0)
+
+    def of(self, name: str) -> float:
+        """Coefficient of a column, 0 where it did not join."""
+        return float(self.coefficients[self.index(name)]) if name in self.names else 0.0
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """K, K_rel of T = K(T_m) i_q + K_rel i_d i_q + (odd terms of saturation) + drag of the speed.
+
+    Each constant-speed stretch, or angle of a locked rotor, has an offset of its own, so friction,
+    iron loss at no current, cogging at rest and the transducer's zero never reach K. Points at
+    standstill join where those at speed do not suffice. Columns of saturation and of sensor faults
+    join only where the data demand them, so K is the slope at small current, 1.5 p psi at 25 degC.
+    Reference: IEEE Std 1812-2014, 4.4 (torque against current).
+    """
+    captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "torque_shaft_nm")]
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    table = operating_points(captures, pairs)
+    points = [
+        p for p in table.points if np.isfinite(p.torque_nm) and np.isfinite(p.temp_magnet_degc)
+    ]
+    turning = [p for p in points if not p.standing]
+    if _enough(turning):
+        points = turning
+    if not _enough(points):
+        groups = len({p.group for p in points})
+        note = f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
+        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+    alpha, alpha_parts = magnet_coefficient(known)
+    chosen = _chosen(points, alpha, options["level"])
+    model = _regress(points, alpha, chosen)
+    still = angle_doubt(points, model.kt_nm_a, pairs, known)
+    estimates = _estimates(captures, points, table, model, chosen, alpha, alpha_parts, still)
+    return Fit(estimates, _evidence(points, model, alpha, chosen))
+
+
+def _enough(points: Sequence[Point]) -> bool:
+    """Whether offsets and slopes leave a point over, and the q current moves."""
+    groups = len({p.group for p in points})
+    return len(points) >= groups + 3 and bool(np.ptp([p.iq_a for p in points]) != 0.0)
+
+
+def _base(points: Sequence[Point], alpha_1_k: float) -> tuple[list[str], Array]:
+    i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
+    warm = 1.0 + alpha_1_k * (_column(points, "temp_magnet_degc") - 25.0)
+    group = _column(points, "group")
+    numbers = sorted({p.group for p in points})
+    names = [f"speed {g}" for g in numbers] + ["iq"]
+    columns = [(group == g).astype(float) for g in numbers] + [i_q * warm]
+    if _has_reluctance(points):
+        names.append("id iq")
+        columns.append(i_d * i_q)
+    return names, np.column_stack(columns)
+
+
+def _has_reluctance(points: Sequence[Point]) -> bool:
+    i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
+    return bool(np.ptp(i_d) > 0.1 * np.ptp(i_q))
+
+
+def _candidates(points: Sequence[Point]) -> dict[str, Array]:
+    """Columns that saturation, cross-saturation, an angle error, iron and load friction make."""
+    i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
+    sense = np.sign(_column(points, "omega_mech_rad_s"))
+    columns = {
+        "iq^3": i_q**3,
+        "iq^5": i_q**5,
+        "|iq| sense": np.abs(i_q) * sense,
+    }
+    if _has_reluctance(points):
+        columns |= {
+            "id": i_d,
+            "id sense": i_d * sense,
+            "id cos": i_d * _column(points, "cos_turn"),
+            "id sin": i_d * _column(points, "sin_turn"),
+            "id^2 iq": i_d**2 * i_q,
+            "id iq^3": i_d * i_q**3,
+            "id^3 iq": i_d**3 * i_q,
+            "id^2 iq^3": i_d**2 * i_q**3,
+            "iq^2 - id^2": i_q**2 - i_d**2,
+        }
+    return columns
+
+
+def _chosen(points: Sequence[Point], alpha_1_k: float, level: float) -> list[str]:
+    _, base = _base(points, alpha_1_k)
+    return needed_columns(
+        base, _candidates(points), _column(points, "torque_nm"), _sigma(points), level
+    )
+
+
+def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -> Regression:
+    names, base = _base(points, alpha_1_k)
+    extra = _candidates(points)
+    design = np.column_stack([base, *(extra[name] for name in chosen)])
+    sigma = _sigma(points)
+    found = linear_fit(design, _column(points, "torque_nm"), sigma)
+    scale = max(found.chi2_dof, 0.0) if found.dof > 0 else np.inf
+    return Regression(
+        (*names, *chosen), found.coefficients, found.covariance * scale, found.residuals, found.dof
+    )
+
+
+def _sigma(points: Sequence[Point]) -> Array:
+    """Relative weights: the noise of a mean falls with the root of its rows."""
+    rows = _column(points, "rows")
+    sigma: Array = np.sqrt(rows.mean() / rows)
+    return sigma
+
+
+def _estimates(
+    captures: Sequence[Capture],
+    points: Sequence[Point],
+    table: PointTable,
+    model: Regression,
+    chosen: Sequence[str],
+    alpha: float,
+    alpha_parts: Budget,
+    still: Budget,
+) -> tuple[Estimate, ...]:
+    gains = instrument_uncertainties(captures, ("current", "torque", "temperature"))
+
+    def values(shift: Mapping[str, float]) -> Array:
+        shifted = [p.shifted(shift) for p in points]
+        again = _regress(shifted, alpha + shift.get(SOURCE, 0.0), chosen)
+        bent = _slope(shifted, alpha + shift.get(SOURCE, 0.0), chosen, again)
+        return np.array([bent.kt_nm_a, _reluctance(again), *_drag(points, again)[0]])
+
+    slope_k = _slope(points, alpha, chosen, model)
+    type_b = contributions(values, gains)
+    slope = float((values({SOURCE: 1e-4}) - values({}))[0]) / 1e-4
+    type_b[0] += propagate([(slope, alpha_parts)])
+    type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
+    note = _note(captures, table, points, chosen)
+    paths = tuple(sorted({p.capture.path for p in points}))
+    at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
+
+    def estimate(
+        name: str, value: float, u: float, dof: int, parts: Sequence[Contribution]
+    ) -> Estimate:
+        scatter = Contribution(f"scatter:{NAME}:{name}", u, "A", dof)
+        budget = budget_of([scatter, *parts])
+        return Estimate(name, value, _unit(name), "measured", NAME, budget, at, paths, note)
+
+    u = np.sqrt(np.diag(model.covariance))
+    found = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])]
+    if "id iq" in model.names:
+        u_rel = float(u[model.index("id iq")])
+        found.append(estimate(GIVES[1], _reluctance(model), u_rel, model.dof, type_b[1]))
+    else:
+        why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
+        found.append(not_identifiable(GIVES[1], RELUCTANCE.unit, NAME, why))
+    drag, covariance, dof, why = _drag(points, model)
+    for index, name in enumerate(DRAG):
+        if why:
+            found.append(not_identifiable(name, _unit(name), NAME, why))
+        else:
+            u_drag = float(np.sqrt(covariance[index, index]))
+            form = _untested_form(points, model, index)
+            parts = [*type_b[2 + index], *form]
+            found.append(estimate(name, float(drag[index]), u_drag, dof, parts))
+    return tuple(found)
+
+
+def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, int, str]:
+    """Coulomb and viscous drag from the offsets of the speeds: values, covariance, dof, why not.
+
+    A shaft that stands has no drag: its offset is cogging and static friction. Offsets that miss
+    the line by more than their scatter widen it, and beyond chance it has the speeds' freedom.
+    """
+    turning = sorted({p.group for p in points if not p.standing})
+    speeds = np.array(
+        [np.mean([p.omega_mech_rad_s for p in points if p.group == g]) for g in turning]
+    )
+    blank = np.zeros(2), np.zeros((2, 2)), 0
+    if np.unique(np.sign(speeds)).size < 2 or speeds.size < 3:
+        return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
+    design = np.column_stack([-np.sign(speeds), -speeds, np.ones(speeds.size)])
+    rows = [model.index(f"speed {g}") for g in turning]
+    offsets, block = model.coefficients[rows], model.covariance[np.ix_(rows, rows)]
+    part = linear_fit(design, offsets)
+    if not part.full_rank:
+        return *blank, f"drag and transducer zero need three speeds, both senses; {EXPERIMENT}"
+    inverse = np.linalg.pinv(design)
+    covariance = inverse @ block @ inverse.T
+    dof = model.dof
+    if part.dof > 0:
+        lack = _lack(part.residuals, block, part.dof)
+        covariance = np.maximum(1.0, lack) * covariance
+        dof = part.dof if fdtrc(part.dof, model.dof, lack) < BY_CHANCE else dof
+    if np.any(part.coefficients[:2] < -4.0 * np.sqrt(np.diag(covariance)[:2])):
+        return *blank, "drag is not Coulomb and viscous: a fitted coefficient is negative"
+    return part.coefficients[:2], covariance[:2, :2], dof, ""
+
+
+def _lack(residuals: Array, block: Array, dof: int) -> float:
+    return float(np.sum(residuals**2) / np.mean(np.diag(block)) / dof)
+
+
+def _untested_form(
+    points: Sequence[Point], model: Regression, index: int
+) -> tuple[Contribution, ...]:
+    """Allowance for drag of another form where no speed is left over to test it.
+
+    `FORM_SHARE` of the drag at the slowest speed may be Stribeck's, iron's or windage.
+    """
+    turning = [p for p in points if not p.standing]
+    if len({p.group for p in turning}) > 3:
+        return ()
+    speeds = _column(turning, "omega_mech_rad_s")
+    drag = _drag(points, model)[0]
+    slowest = float(np.min(np.abs(speeds)))
+    torque = FORM_SHARE * abs(drag[0] + drag[1] * slowest)
+    u = torque if index == 0 else torque / slowest
+    return (Contribution("assumed:drag_form", float(u), "B"),)
+
+
+def _reluctance(model: Regression) -> float:
+    return model.of("id iq")
+
+
+def _form_doubt(points: Sequence[Point], alpha: float, chosen: Sequence[str]) -> float:
+    """How far K moves with one of the last two columns that bend the torque: the series may go on.
+
+    Without any the torque is straight and there is no doubt.
+    """
+    bent = [name for name in chosen if name in BENDING]
+    if not bent:
+        return 0.0
+    full = _regress(points, alpha, chosen).kt_nm_a
+    shorter = [
+        _regress(points, alpha, [name for name in chosen if name != left]).kt_nm_a
+        for left in bent[-2:]
+    ]
+    return max(abs(full - value) for value in shorter) / 2.0
+
+
+def _slope(
+    points: Sequence[Point], alpha: float, chosen: Sequence[str], model: Regression
+) -> Slope:
+    """K at small current: of all points, or of those without d current where the torque bends."""
+    u = float(np.sqrt(model.covariance[model.index("iq"), model.index("iq")]))
+    if not any(name in BENDING for name in chosen):
+        return Slope(model.kt_nm_a, u, model.dof, 0.0)
+    turned = any(name in chosen for name in ("id", "id sense", "iq^2 - id^2"))
+    found = slope_without_d(points, alpha, turned, "|iq| sense" in chosen)
+    if found is None:
+        return Slope(model.kt_nm_a, u, model.dof, _form_doubt(points, alpha, chosen))
+    return found.times(model.kt_nm_a / model.of("iq"))
+
+
+def _note(
+    captures: Sequence[Capture],
+    table: PointTable,
+    points: Sequence[Point],
+    chosen: Sequence[str],
+) -> str:
+    words = [table.note()]
+    if still := standstill_words(points, table.points):
+        words.append(still)
+    if chosen:
+        words.append(allowed_for(chosen))
+    if not any(c.has("temp_magnet_degc") for c in captures):
+        words.append("magnet temperature not logged, taken as ambient or 25 degC")
+    if np.unique(np.sign(_column(points, "iq_a").round(6))).size < 2:
+        words.append("one sign of q current only")
+    unstated = unstated_note(captures, ("current", "torque"))
+    return "; ".join([*words, *([unstated] if unstated else [])])
+
+
+def _evidence(
+    points: Sequence[Point], model: Regression, alpha: float, chosen: Sequence[str]
+) -> tuple[Evidence, ...]:
+    torque = _column(points, "torque_nm")
+    fitted = torque - model.residuals
+    i_q = _column(points, "iq_a")
+    group = _column(points, "group")
+    series = []
+    for number in sorted({p.group for p in points}):
+        rows = np.flatnonzero(group == number)
+        rows = rows[np.argsort(i_q[rows], kind="stable")]
+        own = [points[int(k)] for k in rows]
+        speed = float(np.mean([p.omega_mech_rad_s for p in own]))
+        label = f"{speed:.0f} rad/s" if speed else f"standstill, angle {number}"
+        series.append(Series(label, i_q[rows], torque[rows], fitted[rows]))
+    extra = f", {', '.join(chosen)}" if chosen else ""
+    caption = f"offset a speed, iq, id iq{extra}; magnet coefficient {alpha:.2g} 1/K"
+    return (
+        Evidence(
+            NAME, "Shaft torque against q current", "iq_a", "torque_shaft_nm", "scatter",
+            tuple(series), caption=caption,
+        ),
+    )  # fmt: skip
+
+
+def _column(points: Sequence[Point], name: str) -> Array:
+    return np.array([getattr(p, name) for p in points], dtype=np.float64)
+
+
+def _unit(name: str) -> str:
+    return RELUCTANCE.unit if name == RELUCTANCE.name else CONSTANTS[name].unit
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=GIVES,
+    tests=("torque_map",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),
+    rank=5,
+    terms=(RELUCTANCE,),
+    clock_powers={"b_visc_nm_s_rad": 1},
+    options={"level": 0.01},
+)

@@ -1,0 +1,206 @@
+"""Torque constant from a static table of torque and current: no clock, no voltage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.instruments import (
+    contributions,
+    current_source,
+    instrument_uncertainties,
+    torque_source,
+    unstated_note,
+)
+from pipeline.estimation.locked_rotor import HARMONICS, SOURCE, ripple_share
+from pipeline.estimation.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.measured import measured
+from pipeline.estimation.operating_points import pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.least_squares import LinearFit, linear_fit
+from pipeline.numerics.selection import needed_columns
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import not_identifiable
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.uncertainty import Contribution, propagate
+
+Array = NDArray[np.float64]
+
+NAME = "torque_table"
+EXPERIMENT = (
+    "record a torque_table: torque against q current in both senses, four levels or more up to "
+    "rated current, at several rotor angles"
+)
+LEAST_ROWS, LEAST_LEVELS = 5, 4
+SAME = 0.01
+REFERENCE_DEGC = 25.0
+STEP_1_K = 1e-5
+
+
+def torque(iq_a: Array, id_a: Array, warm: Array) -> tuple[Array, dict[str, Array]]:
+    """What a clamped shaft's torque is linear in.
+
+    T = T0 + Kt (1 + α (T_m - 25)) i_q + K_r i_d i_q - s i_q³ - c sign(i_q)
+
+    Parameters
+    ----------
+    iq_a, id_a : array [n], A
+        Rotor-frame currents, amplitude-invariant.
+    warm : array [n], 1
+        1 + α (T_m - 25 °C) of the magnets.
+
+    Returns
+    -------
+    base : array [n, 2 or 3]
+        Columns of T0, Kt, and K_r where i_d moves.
+    candidates : dict of array [n]
+        Columns that enter where a test asks for them: saturation (i_q³, i_q⁵), and friction that
+        holds torque back from the transducer.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (tests of permanent magnet machines: torque of a blocked rotor).
+
+    """
+    base = [np.ones(iq_a.size), iq_a * warm]
+    if np.ptp(id_a) > 0.1 * np.ptp(iq_a):
+        base.append(id_a * iq_a)
+    candidates = {"iq^3": iq_a**3, "iq^5": iq_a**5, "sign iq": np.sign(iq_a)}
+    return np.column_stack(base), candidates
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Kt at small current: the slope of torque in q current, saturation taken out.
+
+    Tables of one campaign are one fit with an offset each. Rows at one rotor angle carry the
+    torque ripple of that angle (`locked_rotor`).
+    """
+    captures = [c for c in campaign.of(NAME) if c.has("iq_a", "torque_shaft_nm")]
+    rows = _Rows.of(captures)
+    if rows.iq_a.size < LEAST_ROWS + len(captures) or rows.levels < LEAST_LEVELS:
+        note = f"{rows.iq_a.size} rows of {rows.levels} currents; {EXPERIMENT}"
+        return Fit((not_identifiable("kt_peak_nm_a", "N·m/A", NAME, note),))
+    alpha, alpha_budget = magnet_coefficient(known)
+    base, candidates = rows.columns(alpha)
+    chosen = needed_columns(
+        base, candidates, rows.torque_nm, np.ones(rows.iq_a.size), options["level"]
+    )
+    found = _solve(rows, alpha, chosen)
+    kt = float(found.coefficients[1])
+    if not found.full_rank or found.dof < 1 or kt == 0.0:
+        return Fit((not_identifiable("kt_peak_nm_a", "N·m/A", NAME, EXPERIMENT),))
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    warmer = _solve(rows, alpha + STEP_1_K, chosen).coefficients[1]
+    parts = [
+        *_instruments(rows, captures, alpha, chosen),
+        *propagate([((float(warmer) - kt) / STEP_1_K, alpha_budget)]),
+        Contribution(f"scatter:{NAME}:kt", found.u(1), "A", found.dof),
+        Contribution(SOURCE, ripple_share(rows.theta_rad, pairs, known) * abs(kt), "B"),
+    ]
+    sags = "; sags with current" if {"iq^3", "iq^5"} & set(chosen) else ""
+    notes = [f"slope at small current{sags}", unstated_note(captures, ("current", "torque"))]
+    at = {"iq_a": float(np.max(np.abs(rows.iq_a)))}
+    estimate = measured(NAME, "kt_peak_nm_a", "N·m/A", kt, parts, captures, at, notes)
+    return Fit((estimate,), _evidence(captures, rows, rows.torque_nm - found.residuals))
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Rows [n] of all tables, one after the other; `table` is the number of each row's table."""
+
+    iq_a: Array
+    id_a: Array
+    torque_nm: Array
+    excess_k: Array
+    theta_rad: Array
+    table: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, captures: Sequence[Capture]) -> _Rows:
+        """The rows that hold current and torque."""
+        parts = [_table(capture) for capture in captures]
+        joined = {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
+        table = np.repeat(np.arange(len(parts)), [one["iq_a"].size for one in parts])
+        return cls(**joined, table=table)
+
+    @property
+    def levels(self) -> int:
+        """How many currents there are that differ by more than 1 % of their range."""
+        reach = float(np.ptp(self.iq_a)) if self.iq_a.size else 0.0
+        return np.unique(np.round(self.iq_a / (SAME * reach))).size if reach > 0.0 else 0
+
+    def columns(self, alpha_1_k: float) -> tuple[Array, dict[str, Array]]:
+        """`torque` of these rows, with an offset a further table."""
+        base, candidates = torque(self.iq_a, self.id_a, 1.0 + alpha_1_k * self.excess_k)
+        offsets = [(self.table == n).astype(float) for n in range(1, int(self.table[-1]) + 1)]
+        return np.column_stack([base, *offsets]), candidates
+
+
+def _table(capture: Capture) -> dict[str, Array]:
+    names = ("iq_a", "torque_shaft_nm", "id_a", "temp_magnet_degc", "theta_mech_rad")
+    data = capture.arrays(*(name for name in names if capture.has(name)))
+    fine = np.isfinite(data["iq_a"]) & np.isfinite(data["torque_shaft_nm"])
+    usual = {"id_a": 0.0, "temp_magnet_degc": REFERENCE_DEGC, "theta_mech_rad": np.nan}
+    data = {n: data.get(n, np.full(fine.size, usual.get(n, np.nan)))[fine] for n in names}
+    return {
+        "iq_a": data["iq_a"],
+        "id_a": np.nan_to_num(data["id_a"]),
+        "torque_nm": data["torque_shaft_nm"],
+        "excess_k": np.nan_to_num(data["temp_magnet_degc"] - REFERENCE_DEGC),
+        "theta_rad": data["theta_mech_rad"],
+    }
+
+
+def _solve(rows: _Rows, alpha_1_k: float, chosen: Sequence[str]) -> LinearFit:
+    base, candidates = rows.columns(alpha_1_k)
+    design = np.column_stack([base, *(candidates[name] for name in chosen)])
+    return linear_fit(design, rows.torque_nm)
+
+
+def _instruments(
+    rows: _Rows, captures: Sequence[Capture], alpha_1_k: float, chosen: Sequence[str]
+) -> list[Contribution]:
+    """What the gains of clamp and transducer do to Kt, by refitting with each shifted."""
+
+    def kt(shift: Mapping[str, float]) -> Array:
+        amps, force = (
+            np.array([1.0 + shift.get(source(c.meta), 0.0) for c in captures])[rows.table]
+            for source in (current_source, torque_source)
+        )
+        moved = replace(
+            rows, iq_a=amps * rows.iq_a, id_a=amps * rows.id_a, torque_nm=force * rows.torque_nm
+        )
+        return _solve(moved, alpha_1_k, chosen).coefficients[1:2]
+
+    return contributions(kt, instrument_uncertainties(captures, ("current", "torque")))[0]
+
+
+def _evidence(captures: Sequence[Capture], rows: _Rows, fitted_nm: Array) -> tuple[Evidence, ...]:
+    series = []
+    for number, capture in enumerate(captures):
+        mine = np.flatnonzero(rows.table == number)
+        order = mine[np.argsort(rows.iq_a[mine], kind="stable")]
+        points = rows.iq_a[order], rows.torque_nm[order], fitted_nm[order]
+        series.append(Series(capture.path, *points))
+    title = "Torque of the clamped shaft against q current"
+    return (Evidence(NAME, title, "iq_a", "torque_shaft_nm", "scatter", tuple(series)),)
+
+
+ESTIMATOR = Estimator(
+    name=NAME,
+    gives=("kt_peak_nm_a",),
+    tests=(NAME,),
+    experiment=EXPERIMENT,
+    fit=fit,
+    uses=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),
+    aids=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),
+    rank=6,
+    options={
+        # False alarm of a term of saturation or friction, over all candidates.
+        "level": 0.01,
+    },
+)

@@ -1,0 +1,196 @@
+"""Flux linkages from pairs of settled points with opposite q current, in the magnet's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+
+import numpy as np
+
+from pipeline.estimation.operating_points import Point
+from pipeline.numerics.least_squares import linear_fit
+
+SAME = 0.03
+SEEN = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Flux:
+    """Flux linkages of one pair of points with +i_q and -i_q at one speed and one d current."""
+
+    group: int
+    id_a: float
+    iq_a: float
+    psi_d_wb: float
+    psi_q_wb: float
+    u_d_wb: float
+    u_q_wb: float
+    temp_magnet_degc: float
+
+
+def frame_of(points: Sequence[Point], pole_pairs: int) -> tuple[float, float]:
+    """Angle of the drive's frame against the magnet's [rad] and delay of its currents [s]."""
+    matched, largest = _matched(points)
+    offset = _lateness(matched, pole_pairs, largest)[0]
+    return -offset, current_lag(points, pole_pairs, offset)
+
+
+def _matched(points: Sequence[Point]) -> tuple[list[tuple[Point, Point]], float]:
+    """Pairs of opposite q current at one speed and one d current, and the largest current [A]."""
+    largest = max(max(abs(p.iq_a), abs(p.id_a)) for p in points)
+    matched = [
+        (one, other)
+        for one, other in combinations_with_replacement(points, 2)
+        if one.group == other.group
+        and abs(one.id_a - other.id_a) < SAME * largest
+        and abs(one.iq_a + other.iq_a) < SAME * largest
+        and (one is not other or abs(one.iq_a) < SAME * largest)
+    ]
+    return matched, largest
+
+
+def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
+    """Flux linkages from every pair of settled points with opposite q current.
+
+    A point with no q current is a pair with itself. Voltages are first brought to the sampling
+    instant (`voltage_timing`) and turned back by the angle delta + tau w_e that the pairs without
+    d current show: there v+ + v- = 2 j w_e psi_d, whatever R and L. What of that angle differs
+    from pair to pair (an eccentric encoder) goes into the uncertainty.
+    """
+    matched, largest = _matched(points)
+    offset, late_s, wobble = _lateness(matched, pole_pairs, largest)
+    behind_s = current_lag(points, pole_pairs, offset)
+    least = SAME * largest
+    fluxes = []
+    for one, other in matched:
+        plus, minus = (one, other) if one.iq_a >= other.iq_a else (other, one)
+        first, v_first = _corrected(plus, pole_pairs, offset, late_s, behind_s)
+        second, v_second = _corrected(minus, pole_pairs, offset, late_s, behind_s)
+        omega = 0.5 * pole_pairs * (plus.omega_mech_rad_s + minus.omega_mech_rad_s)
+        half = _less_drop((v_first + v_second) / 2.0, first + second, 1.0, least)
+        gap = _less_drop((v_second - v_first) / 2.0, second - first, 1.0j, least)
+        share = 0.5 if plus is not minus else np.sqrt(0.5)
+        fluxes.append(
+            Flux(
+                plus.group,
+                float((first + second).real) / 2.0,
+                float((first - second).imag) / 2.0,
+                half.imag / omega,
+                gap.real / omega,
+                _root_sum(
+                    share * plus.u_vq_v,
+                    share * minus.u_vq_v,
+                    wobble * (abs(half.real) + abs(gap.real)) / np.sqrt(2.0),
+                )
+                / abs(omega),
+                _root_sum(
+                    share * plus.u_vd_v,
+                    share * minus.u_vd_v,
+                    wobble * (abs(half.imag) + abs(gap.imag)) / np.sqrt(2.0),
+                )
+                / abs(omega),
+                0.5 * (plus.temp_magnet_degc + minus.temp_magnet_degc),
+            )
+        )
+    return fluxes
+
+
+def _less_drop(voltage: complex, current: complex, axis: complex, least_a: float) -> complex:
+    """A voltage less what its drop along a current beside the `axis` (1 d, j q) adds across it.
+
+    In a frame turned by e the current of a pair leaves its axis by tan e, and R i of that part
+    would count as flux, by R tan(e) / w. The drop of the axis's own part is in the voltage along
+    it, so R and odd inverter errors cancel as they do without e; what is left is
+    tan² e of the other axis's inductance.
+    """
+    along, aside = (current / axis).real, (current / axis).imag
+    if abs(along) < 2.0 * least_a:
+        return voltage
+    drop = (voltage / axis).real * aside / along
+    return voltage - 1j * axis * drop
+
+
+def _root_sum(*parts: float) -> float:
+    return float(np.sqrt(sum(part**2 for part in parts)))
+
+
+def instant_voltage(point: Point, pole_pairs: int) -> complex:
+    """The dq voltage at the sampling instant, of a mean over the period about or after it.
+
+    Over one period T the mean of a vector turning at w is sinc(w T / 2) exp(j w T / 2) of what it
+    is at the start of the period, and sinc alone of what it is in the middle.
+    """
+    voltage = complex(point.vd_v, point.vq_v)
+    timing = point.capture.meta.voltage_timing
+    if timing == "instant":
+        return voltage
+    half = 0.5 * pole_pairs * point.omega_mech_rad_s * point.period_s
+    turned = np.exp(1j * half) if timing == "held" else 1.0
+    return complex(voltage / (np.sinc(half / np.pi) * turned))
+
+
+def _lateness(
+    matched: Sequence[tuple[Point, Point]], pole_pairs: int, largest: float
+) -> tuple[float, float, float]:
+    """Angle offset [rad] and delay [s] of the voltages, and the rms angle left [rad].
+
+    With one speed alone the two are one, and all of it is taken as delay.
+    """
+    omegas, angles = [], []
+    for one, other in matched:
+        if max(abs(one.id_a), abs(other.id_a)) > SAME * largest:
+            continue
+        omega = 0.5 * pole_pairs * (one.omega_mech_rad_s + other.omega_mech_rad_s)
+        total = (instant_voltage(one, pole_pairs) + instant_voltage(other, pole_pairs)) / (
+            1j * omega
+        )
+        omegas.append(omega)
+        angles.append(float(np.angle(total)))
+    if not omegas:
+        return 0.0, 0.0, 0.0
+    spread = np.ptp(omegas) > 0.1 * np.max(np.abs(omegas))
+    columns = [np.ones(len(omegas)), np.array(omegas)] if spread else [np.array(omegas)]
+    design = np.column_stack(columns)
+    found = np.linalg.lstsq(design, np.array(angles), rcond=None)[0]
+    free = len(angles) - design.shape[1]
+    left = np.array(angles) - design @ found
+    wobble = float(np.sqrt(left @ left / free)) if free > 0 else 0.0
+    return (float(found[0]) if spread else 0.0), float(found[-1]), wobble
+
+
+def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> float:
+    """How late the currents are sampled [s], from the torque of d current; 0 where not seen.
+
+    A current sampled d late is turned by w_e d against the rotor. The voltages at no d current do
+    not show it, the torque does: T = K (i_q cos a + i_d sin a) with a = w_e d beside the `offset`
+    [rad] of the frame. Without it R d counts as inductance on both axes. Only a delay past four
+    times its own scatter is taken out.
+    """
+    torque = np.array([p.torque_nm for p in points])
+    i_d, i_q = (np.array([getattr(p, name) for p in points]) for name in ("id_a", "iq_a"))
+    groups = sorted({p.group for p in points})
+    if not np.all(np.isfinite(torque)) or np.ptp(i_d) < 0.1 * np.ptp(i_q):
+        return 0.0
+    rows = [np.array([p.group == g for p in points], dtype=float) for g in groups]
+    omega = pole_pairs * np.array([p.omega_mech_rad_s for p in points])
+    shared = [*rows, i_q, i_d * i_q, i_d, i_q**2, i_q**3, i_d * i_q**3, i_d**2 * i_q]
+    found = linear_fit(np.column_stack([*shared, omega * i_d]), torque, np.ones(torque.size))
+    if not found.full_rank or found.dof < 3:
+        return 0.0
+    kt, slope = float(found.coefficients[len(groups)]), float(found.coefficients[-1])
+    u = float(np.sqrt(found.covariance[-1, -1] * found.chi2_dof))
+    return slope / (kt * np.cos(offset)) if abs(slope) > SEEN * u else 0.0
+
+
+def _corrected(
+    point: Point, pole_pairs: int, offset: float, late_s: float, behind_s: float
+) -> tuple[complex, complex]:
+    """Current and voltage in the magnet's frame."""
+    turn = np.exp(-1j * offset)
+    late = np.exp(-1j * late_s * pole_pairs * point.omega_mech_rad_s)
+    current = complex(point.id_a, point.iq_a)
+    ahead = np.exp(1j * behind_s * pole_pairs * point.omega_mech_rad_s)
+    return complex(current * turn * ahead), complex(
+        instant_voltage(point, pole_pairs) * turn * late
+    )

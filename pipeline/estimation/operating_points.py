@@ -1,0 +1,272 @@
+"""A constant-speed dq test as a table: one settled operating point a step of current."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.instruments import current_source, temperature_source, torque_source
+from pipeline.estimation.instruments import voltage_source as source_of_voltage
+from pipeline.estimation.terminals import bridged
+from pipeline.numerics.least_squares import autocorrelation_time
+from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
+from pipeline.records.capture import Capture
+from pipeline.records.constants import Constants
+
+Array = NDArray[np.float64]
+MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
+# Whole turns, or cycles, are kept where they cost no more than a fifth of a point's rows.
+WORTHWHILE = 0.8
+# Ten levels a side step by a twentieth of the span; less than this is ripple, not a step.
+TOLERANCE = 0.03
+# The error of a mean is then known to a sixth (JCGM 100:2008, E.4.3).
+LEAST_ROWS = 20
+TURN_RAD = 2.0 * np.pi
+SAME_SPEED = 0.02
+# What a sensor's noise makes of a held shaft's speed is some thousandths of a turn, in one point
+# and in a whole capture; a shaft that turns passes more, or none of its ripple would average out.
+STILL_TURN, STILL_CAPTURE_TURN = 0.01, 0.1
+# A twelfth of a cogging period of 84 a turn: cogging there is one constant.
+SAME_ANGLE_TURN = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Means over one settled step; NaN where a column is missing.
+
+    `omega_mech_rad_s` is the slope of the angle where it is there; `u_torque_nm`, `u_vd_v` and
+    `u_vq_v` are standard errors of means, correlation included. `cos_turn`, `sin_turn` are means
+    over the shaft angle (0 where it is missing), `period_s` the sampling period. `group` numbers
+    the constant-speed stretches, and of a shaft that stands (speed 0) its angles.
+    """
+
+    group: int
+    rows: int
+    omega_mech_rad_s: float
+    id_a: float
+    iq_a: float
+    vd_v: float
+    vq_v: float
+    torque_nm: float
+    u_torque_nm: float
+    u_vd_v: float
+    u_vq_v: float
+    temp_magnet_degc: float
+    cos_turn: float
+    sin_turn: float
+    period_s: float
+    capture: Capture
+
+    @property
+    def standing(self) -> bool:
+        """Whether the shaft is held still."""
+        return self.omega_mech_rad_s == 0.0
+
+    @property
+    def angle_rad(self) -> float:
+        """Mean shaft angle in a turn; NaN where no angle was logged."""
+        known = self.cos_turn != 0.0 or self.sin_turn != 0.0
+        return float(np.arctan2(self.sin_turn, self.cos_turn)) if known else float("nan")
+
+    def shifted(self, shift: Mapping[str, float]) -> Point:
+        """This point as it was if each instrument were off by `shift` (gains relative, K)."""
+        meta = self.capture.meta
+        current = 1.0 + shift.get(current_source(meta), 0.0)
+        voltage = 1.0 + shift.get(source_of_voltage(meta), 0.0)
+        torque = 1.0 + shift.get(torque_source(meta), 0.0)
+        return replace(
+            self,
+            id_a=self.id_a * current,
+            iq_a=self.iq_a * current,
+            vd_v=self.vd_v * voltage,
+            vq_v=self.vq_v * voltage,
+            torque_nm=self.torque_nm * torque,
+            temp_magnet_degc=self.temp_magnet_degc + shift.get(temperature_source(meta), 0.0),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PointTable:
+    """All points of several captures, and how many rows were settled of how many."""
+
+    points: tuple[Point, ...]
+    settled_rows: int
+    rows: int
+
+    def column(self, name: str) -> Array:
+        """One attribute of every point [n]."""
+        return np.array([getattr(point, name) for point in self.points], dtype=np.float64)
+
+    def note(self) -> str:
+        """The mask, counted."""
+        dropped = self.rows - self.settled_rows
+        return f"{len(self.points)} settled points; {dropped} of {self.rows} rows were transient"
+
+
+def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> PointTable:
+    """Settled points of the captures; transients after each step of current or torque are left out.
+
+    A stretch is settled where i_d, i_q and the torque all are; where the torque never is (it rings
+    on in a soft coupling), the currents decide. It is cut to whole turns, or to
+    whole electrical cycles where that would cost too much, so that ripple averages out.
+    """
+    found: list[Point] = []
+    total = 0
+    for capture in captures:
+        data = _columns(capture)
+        n = data["iq_a"].size
+        total += n
+        if n < LEAST_ROWS:
+            continue
+        for rows in _settled(data, ("id_a", "iq_a", "torque_shaft_nm")) or _settled(
+            data, ("id_a", "iq_a")
+        ):
+            kept = _whole_cycles(rows, data, pole_pairs)
+            found.append(_point(capture, data, kept))
+    numbered = _numbered(found)
+    return PointTable(tuple(numbered), sum(p.rows for p in numbered), total)
+
+
+def _numbered(points: Sequence[Point]) -> list[Point]:
+    """The points with their groups: those of one speed, or of one angle where the shaft stands."""
+    firsts: list[Point] = []
+    numbered = []
+    for point in points:
+        near = next((g for g, first in enumerate(firsts) if _alike(point, first)), len(firsts))
+        if near == len(firsts):
+            firsts.append(point)
+        numbered.append(replace(point, group=near))
+    return numbered
+
+
+def _alike(point: Point, first: Point) -> bool:
+    """Whether two points share drag, or cogging at rest: one speed, one angle, else one capture."""
+    if point.standing or first.standing:
+        apart = abs(np.angle(np.exp(1j * (point.angle_rad - first.angle_rad)))) / TURN_RAD
+        near = point.capture is first.capture if np.isnan(apart) else apart < SAME_ANGLE_TURN
+        return point.standing and first.standing and bool(near)
+    speed = first.omega_mech_rad_s
+    return abs(point.omega_mech_rad_s - speed) <= SAME_SPEED * abs(speed)
+
+
+def magnet_temperature(capture: Capture) -> tuple[float, str]:
+    """Where no magnet temperature was logged: the ambient one, or 25 degC, and a note."""
+    if capture.meta.ambient_degc is not None:
+        return capture.meta.ambient_degc, "magnet taken at ambient temperature"
+    return 25.0, "magnet temperature unknown, taken as 25 degC"
+
+
+def pole_pairs_of(known: Constants, nameplate: object) -> int | None:
+    """Measured pole pairs, else those of the nameplate."""
+    pairs = known.best("pole_pairs")
+    if pairs is not None:
+        return round(pairs.number)
+    return nameplate if isinstance(nameplate, int) else None
+
+
+def _columns(capture: Capture) -> dict[str, Array]:
+    there = [n for n in (*MEANS, "t_s", "theta_mech_rad", "omega_mech_rad_s") if capture.has(n)]
+    data = capture.arrays(*there)
+    blank = np.full(data["t_s"].size, np.nan)
+    for name in (*MEANS, "theta_mech_rad", "omega_mech_rad_s"):
+        data.setdefault(name, blank)
+    if not capture.has("id_a"):
+        data["id_a"] = np.zeros(blank.size)
+    data["temp_magnet_degc"] = bridged(data["t_s"], data["temp_magnet_degc"])
+    ok = np.isfinite(data["iq_a"]) & np.isfinite(data["id_a"])
+    return {name: column[ok] for name, column in data.items()}
+
+
+def _settled(data: Mapping[str, Array], names: Sequence[str]) -> list[slice]:
+    """Rows after each step of these columns, less twice the time that the step took to settle."""
+    size = data["iq_a"].size
+    flags = np.ones(size, dtype=bool)
+    edges = {0, size}
+    for name in names:
+        if not np.all(np.isfinite(data[name])):
+            continue
+        inside = np.zeros(size, dtype=bool)
+        for plateau in find_plateaus(data[name], LEAST_ROWS, tolerance=TOLERANCE):
+            inside[plateau.rows] = True
+            edges |= {plateau.start, plateau.stop}
+        flags &= inside
+    found, last = [], 0
+    for a, b in pairwise(sorted(edges)):
+        if b - a < LEAST_ROWS or not flags[a:b].all():
+            continue
+        start = a + min(a - last, (b - a) // 2)
+        last = b
+        if b - start >= LEAST_ROWS and _steady(data, slice(start, b), names):
+            found.append(slice(start, b))
+    return found
+
+
+def _steady(data: Mapping[str, Array], rows: slice, names: Sequence[str]) -> bool:
+    """Whether the halves of a stretch agree to 2 % of the signal's span, or to its noise."""
+    for name in names:
+        signal, part = data[name], data[name][rows]
+        if not np.all(np.isfinite(signal)):
+            continue
+        half = part.size // 2
+        drift = abs(float(np.mean(part[half:]) - np.mean(part[:half])))
+        noise = 6.0 * white_noise_sigma(part) / np.sqrt(half)
+        if drift > max(0.02 * float(np.ptp(signal)), noise):
+            return False
+    return True
+
+
+def _whole_cycles(rows: slice, data: Mapping[str, Array], pole_pairs: int | None) -> slice:
+    theta = data["theta_mech_rad"][rows]
+    if not np.all(np.isfinite(theta)):
+        return rows
+    turns = abs(float(theta[-1] - theta[0])) / (2.0 * np.pi)
+    for cycles in (turns, turns * (pole_pairs or 1)):
+        whole = np.floor(cycles)
+        if whole >= 1 and whole / cycles >= WORTHWHILE:
+            return slice(rows.stop - round(theta.size * whole / cycles), rows.stop)
+    return rows
+
+
+def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
+    t, theta = data["t_s"][rows], data["theta_mech_rad"][rows]
+    cos_turn = sin_turn = 0.0
+    if np.all(np.isfinite(theta)):
+        cos_turn, sin_turn = float(np.mean(np.cos(theta))), float(np.mean(np.sin(theta)))
+        omega = float(np.polyfit(t - t.mean(), theta - theta.mean(), 1)[0])
+    else:
+        omega = float(np.mean(data["omega_mech_rad_s"][rows]))
+    travel = abs(omega) * np.array([t[-1] - t[0], data["t_s"][-1] - data["t_s"][0]]) / TURN_RAD
+    if travel[0] < STILL_TURN and (cos_turn == 0.0 or travel[1] < STILL_CAPTURE_TURN):
+        omega = 0.0
+    means = {name: float(np.mean(data[name][rows])) for name in MEANS}
+    u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}
+    if not np.isfinite(means["temp_magnet_degc"]):
+        means["temp_magnet_degc"] = magnet_temperature(capture)[0]
+    return Point(
+        group=0,
+        rows=t.size,
+        omega_mech_rad_s=omega,
+        id_a=means["id_a"],
+        iq_a=means["iq_a"],
+        vd_v=means["vd_v"],
+        vq_v=means["vq_v"],
+        torque_nm=means["torque_shaft_nm"],
+        u_torque_nm=u["torque_shaft_nm"],
+        u_vd_v=u["vd_v"],
+        u_vq_v=u["vq_v"],
+        temp_magnet_degc=means["temp_magnet_degc"],
+        cos_turn=cos_turn,
+        sin_turn=sin_turn,
+        period_s=float(np.median(np.diff(t))),
+        capture=capture,
+    )
+
+
+def _error_of_mean(part: Array) -> float:
+    if not np.all(np.isfinite(part)):
+        return float("nan")
+    return float(np.std(part) * np.sqrt(autocorrelation_time(part) / part.size))

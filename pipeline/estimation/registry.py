@@ -1,0 +1,212 @@
+"""Finds the estimators (one file each in `estimators/`) and runs them in dependency order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from graphlib import TopologicalSorter
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.estimation.agreement import reconciled
+from pipeline.estimation.instruments import with_clock
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.identifiability import within
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.plugins import PlugIn, discover
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.evidence import Evidence
+from pipeline.records.stated import stated_constants
+from pipeline.records.uncertainty import without_between
+
+BROKEN = (ValueError, ArithmeticError, LookupError, TypeError, np.linalg.LinAlgError)
+REPORT = "the other constants stand; report the capture with this line"
+
+
+class Failure(NamedTuple):
+    """An estimator that broke: the code, message and remedy of a finding."""
+
+    code: str
+    message: str
+    remedy: str
+
+
+def homes() -> Mapping[str, str]:
+    """The module of every estimator, by the estimator's name."""
+    return {one.name: one.module for one in _found()}
+
+
+def _found() -> tuple[PlugIn, ...]:
+    return discover("pipeline.estimation.estimators", "ESTIMATOR", Estimator)
+
+
+@cache
+def estimators() -> tuple[Estimator, ...]:
+    """Every estimator, ordered so that each comes after those it uses."""
+    found: dict[str, Estimator] = {one.name: one.value for one in _found()}
+    givers: dict[str, list[str]] = {}
+    for estimator in found.values():
+        for constant in estimator.gives:
+            givers.setdefault(constant, []).append(estimator.name)
+    graph = {
+        e.name: sorted({g for used in e.uses for g in givers.get(used, ()) if g != e.name})
+        for e in sorted(found.values(), key=lambda e: (e.rank, e.name))
+    }
+    return tuple(found[name] for name in TopologicalSorter(graph).static_order())
+
+
+Recall = Callable[[Estimator, Constants, Mapping[str, float], Callable[[], Fit]], Fit]
+"""Gives a fit that was kept, or does it: (estimator, the constants it uses, options, fit)."""
+
+
+def fit_all(
+    campaign: Campaign,
+    options: Mapping[str, Mapping[str, float]],
+    recall: Recall | None = None,
+) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
+    """Runs every estimator on one motor's campaign, or recalls what it gave before.
+
+    An estimator sees those constants alone that it declares to use. Stated constants come after
+    all that is measured: they serve where nothing else is known.
+
+    Returns all estimates in order of preference (rank, then dependency order), the evidence, and
+    the estimators that broke on this data: their constants are then not_identifiable.
+    """
+    found: list[tuple[int, int, Fit]] = []
+    failures: list[Failure] = []
+    stated = stated_constants(campaign)
+    known = Constants(stated)
+    for order, estimator in enumerate(estimators()):
+        if campaign.of(*estimator.tests):
+            chosen = {**estimator.options, **options.get(estimator.name, {})}
+            try:
+                result = _timed(
+                    estimator, campaign, _fitted(estimator, campaign, known, chosen, recall)
+                )
+            except BROKEN as error:
+                reason = f"{estimator.name} broke on this data: {type(error).__name__}: {error}"
+                failures.append(Failure("estimator_failed", reason, REPORT))
+                result = Fit(_missing(estimator, reason))
+        else:
+            result = Fit(_missing(estimator, estimator.experiment))
+        found.append((estimator.rank, order, _possible(estimator, result)))
+        ranked = sorted(found, key=lambda item: item[:2])
+        measured = reconciled(Constants(tuple(e for _, _, fit in ranked for e in fit.estimates)))
+        known = Constants((*measured.estimates, *stated))
+    known = Constants(tuple(_untorn(e) for e in known.estimates))
+    evidence = tuple(e for _, _, fit in found for e in fit.evidence)
+    return known, evidence, tuple(failures)
+
+
+def _fitted(
+    estimator: Estimator,
+    campaign: Campaign,
+    known: Constants,
+    options: Mapping[str, float],
+    recall: Recall | None,
+) -> Fit:
+    used = known.only(estimator.uses)
+    if recall is None:
+        return estimator.fit(campaign, used, options)
+    return recall(estimator, used, options, lambda: estimator.fit(campaign, used, options))
+
+
+def _timed(estimator: Estimator, campaign: Campaign, result: Fit) -> Fit:
+    """The result with the uncertainty of the time bases in its budgets."""
+    if not estimator.clock_powers:
+        return result
+    timed = []
+    for estimate in result.estimates:
+        power = estimator.clock_powers.get(estimate.name, 0)
+        used = [c for c in campaign.captures if c.path in estimate.captures]
+        known = power and estimate.known
+        timed.append(with_clock(estimate, power, used) if known else estimate)
+    return replace(result, estimates=tuple(timed))
+
+
+def _missing(estimator: Estimator, note: str) -> tuple[Estimate, ...]:
+    return tuple(
+        not_identifiable(name, _unit(estimator, name), estimator.name, note)
+        for name in estimator.gives
+    )
+
+
+def _possible(estimator: Estimator, result: Fit) -> Fit:
+    """The result with what is not finite, out of range or of no known size not identifiable."""
+    own = {term.name: term for term in estimator.terms}
+    return Fit(
+        tuple(
+            _possible_estimate(e, own.get(e.name) or CONSTANTS.get(e.name))
+            for e in result.estimates
+        ),
+        result.evidence,
+    )
+
+
+def _possible_estimate(estimate: Estimate, term: Term | None) -> Estimate:
+    if not estimate.known:
+        return estimate
+    if not estimate.finite:
+        wrong = f"came out as {estimate.number:.4g} {estimate.unit} with no finite uncertainty"
+    elif term is not None and not _in_range(estimate.number, term):
+        low, high = ("any" if end is None else f"{end:g}" for end in (term.low, term.high))
+        wrong = f"came out as {estimate.number:.4g} {estimate.unit}, outside {low} to {high}"
+    elif term is not None and _unknown_size(estimate, term):
+        wrong = (
+            f"came out as {estimate.number:.3g} ± {estimate.u:.2g} {estimate.unit}, no known size"
+        )
+    else:
+        return estimate
+    note = f"{wrong}: look at clock, signs and units of {', '.join(estimate.captures[:3])}"
+    gone = not_identifiable(estimate.name, estimate.unit, estimate.method, note)
+    return replace(gone, impossible=_beyond(estimate, term))
+
+
+def _beyond(estimate: Estimate, term: Term | None) -> bool:
+    """Whether a value is out of its range by more than three of its own standard uncertainties."""
+    if term is None or not estimate.finite:
+        return False
+    three = 3.0 * estimate.u
+    return not any(_in_range(estimate.number + part, term) for part in (-three, 0.0, three))
+
+
+def _untorn(estimate: Estimate) -> Estimate:
+    """The estimate, or the reason why what disagrees leaves no use in it."""
+    if not estimate.known or not _torn(estimate):
+        return estimate
+    note = (
+        f"came out as {estimate.number:.4g} {estimate.unit}, and what it rests on disagrees beyond "
+        f"use: {estimate.note}; diagnose tells what the model lacks"
+    )
+    return not_identifiable(estimate.name, estimate.unit, estimate.method, note)
+
+
+def _torn(estimate: Estimate) -> bool:
+    """Whether disagreement alone makes the 95 % interval span more than a factor of two.
+
+    The ends of value (1 ± 1/3) are a factor of two apart: not even the first digit is known then.
+    """
+    beyond = abs(estimate.number) / 3.0
+    plain = replace(estimate, budget=without_between(estimate.budget))
+    wide, narrow = (e.interval()[1] - e.number for e in (estimate, plain))
+    return wide > beyond >= narrow
+
+
+def _unknown_size(estimate: Estimate, term: Term) -> bool:
+    """Whether the 95 % interval of what no motor is without holds zero; zero friction is found."""
+    if term.low is None or term.low <= 0.0:
+        return False
+    return not within(np.array(estimate.u), np.array(abs(estimate.number)))
+
+
+def _in_range(value: float, term: Term) -> bool:
+    return (term.low is None or value >= term.low) and (term.high is None or value <= term.high)
+
+
+def _unit(estimator: Estimator, name: str) -> str:
+    own = {term.name: term for term in estimator.terms}
+    return (own.get(name) or CONSTANTS[name]).unit

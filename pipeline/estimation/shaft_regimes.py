@@ -1,0 +1,61 @@
+"""Regimes of a shaft's equation of motion: do they have one inertia, one Coulomb, one viscous drag.
+
+Reference: Ljung, System Identification, 2nd ed., 16.6 (validation by parts of the data).
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.drag import DragFit
+from pipeline.estimation.regimes import (
+    Disagreement,
+    Partition,
+    Regression,
+    disagreement,
+    halves,
+    signs,
+)
+from pipeline.estimation.shaft_rows import DRIVE, ShaftRows
+
+Array = NDArray[np.float64]
+
+
+def shaft_partitions(rows: ShaftRows, information: Array) -> list[Partition]:
+    """Regimes of the rows by speed, sense, acceleration, current, time and capture."""
+    speed = rows.speed_rad_s
+    gaining, current = rows.acceleration_rad_s2 * np.sign(speed), np.abs(rows.q_current_a)
+    every, drives = np.ones(rows.count, dtype=bool), rows.kind == DRIVE
+    late = np.zeros(rows.count)
+    for k in range(len(rows.captures)):
+        own = rows.capture == k
+        if own.any():
+            late[own] = rows.time_s[own] - np.median(rows.time_s[own])
+    files = tuple(f"in {capture.path}" for capture in rows.captures)
+    return [
+        halves("speed", np.abs(speed), "slow", "fast", information, every),
+        signs("sense of rotation", speed, "backward", "forward", every),
+        signs("acceleration", gaining, "braking", "accelerating", every),
+        signs("sense of torque", rows.q_current_a, "negative", "positive", drives),
+        halves("current", current, "small", "large", information, drives),
+        signs("time", late, "in first halves", "in second halves", every),
+        Partition("capture", rows.capture, files),
+    ]
+
+
+def drag_disagreements(
+    rows: ShaftRows, found: DragFit, level: float
+) -> tuple[Disagreement | None, Disagreement | None, Disagreement | None]:
+    """What regimes scatter in the inertia, and in Coulomb and viscous drag over it, each or None.
+
+    With the drag curve left free only the inertia is one number.
+    """
+    regression = Regression(found.design, found.target, found.sigma, rows.cluster)
+    names = ("torque",) if found.free else ("torque", "coulomb", "viscous")
+    split = partial(shaft_partitions, rows)
+    told = [disagreement(regression, found.names.index(name), split, level) for name in names]
+    inertia, coulomb, viscous, *_ = (*told, None, None)
+    return inertia, coulomb, viscous

@@ -1,0 +1,281 @@
+"""The equation of motion as weak-form rows: what drives, coast-downs and their sensors say of J.
+
+One row a window: A = g (K i_q + K_rel i_d i_q - T_load) - a_0 sign(w) - a_1 w - ..., with A the
+angular acceleration, g = 1/J, a_0 = T_c/J, a_1 = B/J. No derivative is taken: A and w are integrals
+of the angle against derivatives of the window.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.integrals import trapezoid
+from pipeline.estimation.operating_points import magnet_temperature
+from pipeline.numerics.coasting import coasting_rows
+from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
+from pipeline.records.capture import Capture
+
+Array = NDArray[np.float64]
+
+DRIVE, COAST = 0, 1
+# Windows of a drive: the shortest in which the angle's noise is `QUIET`, as torque changes in them.
+WIDTHS_S = (0.02, 0.04, 0.08)
+# A coast only slows down: windows of a twentieth resolve its curve. Half or twice that moved T_c
+# and B by a ninth of their u at most, half or twice the longest window by nothing.
+COAST_SHARE = 0.05
+LONGEST_COAST_S = 0.5
+# Rows of a drive forget within seven windows, 0.07 s: a cluster is over three times that.
+CLUSTER_S = 0.25
+# The sign of friction is not known where the shaft may stand; twice that moved T_c and B by an
+# eighth of their u, where there is a Stribeck's excess to lose, and half of it nothing.
+SLOWEST_SHARE = 0.01
+# A fiftieth of the acceleration adds 0.02 % to its scatter.
+QUIET = 0.02
+# Half, as in Welch's spectra: no sample counts less than another, and more only repeats.
+OVERLAP = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftRows:
+    """Rows of several captures; every array is [w].
+
+    `q_current_a`, `warm_current_k_a` and `product_a2` are window means of i_q, i_q (T_m - 25) and
+    i_d i_q; `load_nm` that of the shaft torque. `speed_rad_s` [w] is signed; `columns` holds what
+    a nuisance adds to the acceleration per unit. `kind` is DRIVE or COAST.
+    """
+
+    captures: tuple[Capture, ...]
+    capture: NDArray[np.int64]
+    kind: NDArray[np.int64]
+    cluster: NDArray[np.int64]
+    time_s: Array
+    acceleration_rad_s2: Array
+    q_current_a: Array
+    warm_current_k_a: Array
+    product_a2: Array
+    load_nm: Array
+    speed_rad_s: Array
+    sense: Array
+    columns: Mapping[str, Array]
+    fastest_rad_s: float
+    dropped: int
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return int(self.sense.size)
+
+    def disjoint(self, kind: int) -> int:
+        """How many windows of a kind share no sample with another: those that count as one each."""
+        return math.ceil(np.count_nonzero(self.kind == kind) * (1.0 - OVERLAP))
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One capture on its own clock, with its windows."""
+
+    capture: Capture
+    kind: int
+    weak: WeakRows
+    theta: Array
+    speed: Array
+    current: Array
+    direct: Array
+    warm: Array
+    load: Array
+
+
+SpeedFunction = Callable[[Array], Array]
+
+
+def shaft_rows(
+    captures: Sequence[Capture],
+    speed_functions: Mapping[str, SpeedFunction],
+    cogging_orders: Sequence[int] = (),
+    ripple_orders: Sequence[int] = (),
+) -> ShaftRows | None:
+    """Rows of drive and spin_down captures, or None where none can be made.
+
+    `speed_functions` are functions of speed over the fastest, f(w / w_max) [n], whose window
+    means become columns. `cogging_orders` and `ripple_orders` [per mechanical turn] make columns of
+    torque against angle, the latter in proportion to q current.
+    Windows in which the shaft all but stands (friction undetermined), and those of a coast-down in
+    which it is still being driven or held at its speed, are dropped and counted.
+    """
+    parts = [part for part in map(_part, captures) if part is not None]
+    if not parts:
+        return None
+    fastest = max(float(np.max(np.abs(part.speed))) for part in parts)
+    pieces = [
+        _rows(i, part, fastest, speed_functions, cogging_orders, ripple_orders)
+        for i, part in enumerate(parts)
+    ]
+    joined = {name: np.concatenate([piece[name] for piece, _ in pieces]) for name in pieces[0][0]}
+    rows = ShaftRows(
+        captures=tuple(part.capture for part in parts),
+        capture=joined.pop("capture").astype(np.int64),
+        kind=joined.pop("kind").astype(np.int64),
+        cluster=joined.pop("cluster").astype(np.int64),
+        time_s=joined.pop("time_s"),
+        acceleration_rad_s2=joined.pop("acceleration_rad_s2"),
+        q_current_a=joined.pop("q_current_a"),
+        warm_current_k_a=joined.pop("warm_current_k_a"),
+        product_a2=joined.pop("product_a2"),
+        load_nm=joined.pop("load_nm"),
+        speed_rad_s=joined.pop("speed_rad_s"),
+        sense=joined.pop("sense"),
+        columns=joined,
+        fastest_rad_s=fastest,
+        dropped=sum(dropped for _, dropped in pieces),
+    )
+    return rows if rows.count else None
+
+
+def _part(capture: Capture) -> _Part | None:
+    kind = COAST if capture.meta.test == "spin_down" else DRIVE
+    angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
+    if not capture.has("t_s", angle) or (kind == DRIVE and not capture.has("iq_a")):
+        return None
+    wanted = ["t_s", angle]
+    optional = ["iq_a", "id_a", "torque_shaft_nm", "temp_magnet_degc"] if kind == DRIVE else []
+    data = capture.arrays(*wanted, *(name for name in optional if capture.has(name)))
+    zero = np.zeros(data["t_s"].size)
+    data = {name: data.get(name, zero) for name in (*wanted, *optional)}
+    if kind == DRIVE and not capture.has("temp_magnet_degc"):
+        data["temp_magnet_degc"] = zero + magnet_temperature(capture)[0]
+    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    data = {name: column[fine] for name, column in data.items()}
+    t, theta = data["t_s"], data[angle]
+    if t.size < LEAST_SAMPLES:
+        return None
+    if angle == "omega_mech_rad_s":
+        theta = trapezoid(t, theta)
+    try:
+        weak = _windows(t, theta, kind)
+        speed = smooth_speed(t, theta, max(0.005, 10.0 * float(np.median(np.diff(t)))))
+    except ValueError:
+        return None
+    current = data.get("iq_a", np.zeros(t.size))
+    return _Part(
+        capture, kind, weak, theta, speed, current, data.get("id_a", current * 0.0),
+        data.get("temp_magnet_degc", current * 0.0 + 25.0) - 25.0,
+        data.get("torque_shaft_nm", current * 0.0),
+    )  # fmt: skip
+
+
+def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
+    """Windows long enough for the encoder's noise to be a fiftieth of the acceleration."""
+    if kind == COAST:
+        share = COAST_SHARE * float(t_s[-1] - t_s[0])
+        return weak_rows(t_s, min(max(share, WIDTHS_S[0]), LONGEST_COAST_S), OVERLAP)
+    sigma = white_noise_sigma(theta_rad)
+    for width in WIDTHS_S:
+        try:
+            weak = weak_rows(t_s, width, OVERLAP)
+        except ValueError:
+            continue
+        noise = sigma * weak.noise_gain(2)
+        if noise < QUIET * float(np.std(weak.integral(theta_rad, 2))):
+            return weak
+    return weak_rows(t_s, WIDTHS_S[-1], OVERLAP)
+
+
+def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
+    """Windows [w] with a row that belongs to no coast."""
+    outside = np.ones(speed.size, dtype=bool)
+    for rows, _ in coasting_rows(speed):
+        outside[rows] = False
+    before = np.concatenate([[0], np.cumsum(outside)])
+    held: NDArray[np.bool_] = before[weak.starts + weak.sizes] > before[weak.starts]
+    return held
+
+
+def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:
+    """Windows [w] in which the shaft may stand, or in which a coast-down is no coast yet."""
+    weak = part.weak
+    ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
+    least = np.array([np.min(np.abs(part.speed[a:b])) for a, b in ends])
+    slow: NDArray[np.bool_] = least < SLOWEST_SHARE * fastest
+    if part.kind == COAST:
+        gaining = weak.integral(part.theta, 2) * weak.integral(part.theta, 1) > 0.0
+        slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5
+        slow |= _held(weak, part.speed)
+    return slow
+
+
+def _rows(
+    index: int,
+    part: _Part,
+    fastest: float,
+    speed_functions: Mapping[str, SpeedFunction],
+    cogging_orders: Sequence[int],
+    ripple_orders: Sequence[int],
+) -> tuple[dict[str, Array], int]:
+    """Columns of one capture's windows, and how many of these were dropped."""
+    weak = part.weak
+    clock = np.floor((weak.centres_s - weak.centres_s[0]) / CLUSTER_S)
+    found = {
+        "capture": np.full(weak.count, float(index)),
+        "kind": np.full(weak.count, float(part.kind)),
+        "cluster": clock + 1e6 * index,
+        "time_s": weak.centres_s,
+        "acceleration_rad_s2": weak.integral(part.theta, 2),
+        "q_current_a": weak.integral(part.current),
+        "warm_current_k_a": weak.integral(part.current * part.warm),
+        "product_a2": weak.integral(part.current * part.direct),
+        "load_nm": weak.integral(part.load),
+        "speed_rad_s": weak.integral(part.theta, 1),
+        "sense": weak.integral(np.sign(part.speed)),
+        **_nuisances(part),
+        **_ripples(part, cogging_orders, ripple_orders),
+    }
+    for name, function in speed_functions.items():
+        found[name] = weak.integral(function(part.speed / fastest))
+    slow = _undetermined(part, fastest)
+    return {name: column[~slow] for name, column in found.items()}, int(slow.sum())
+
+
+def _nuisances(part: _Part) -> dict[str, Array]:
+    """What a sensor's fault, saturation or an unbalance adds to the acceleration, per unit."""
+    weak = part.weak
+    turning = np.exp(1j * part.theta)
+    driven = float(part.kind == DRIVE)
+    torque = np.abs(part.current) * np.sign(part.speed)
+    return {
+        "offset": np.full(weak.count, driven),
+        "load friction": weak.integral(torque),
+        "d current": weak.integral(part.direct),
+        "d current cos": weak.integral(part.direct * turning.real),
+        "d current sin": weak.integral(part.direct * turning.imag),
+        "q current cubed": weak.integral(part.current**3),
+        "d squared q current": weak.integral(part.direct**2 * part.current),
+        "d q current cubed": weak.integral(part.direct * part.current**3),
+        "load lag": weak.integral(part.load, 1) * driven,
+        "current lag": weak.integral(part.current, 1) * driven,
+        "eccentric cos": weak.integral(turning.real, 2),
+        "eccentric sin": weak.integral(turning.imag, 2),
+        "unbalance cos": weak.integral(turning.real),
+        "unbalance sin": weak.integral(turning.imag),
+    }
+
+
+def _ripples(
+    part: _Part, cogging_orders: Sequence[int], ripple_orders: Sequence[int]
+) -> dict[str, Array]:
+    """Torque against angle of these orders a turn, the latter in proportion to q current."""
+    found = {}
+    for order in cogging_orders:
+        ripple = np.exp(1j * order * part.theta)
+        found[f"order {order} cos"] = part.weak.integral(ripple.real)
+        found[f"order {order} sin"] = part.weak.integral(ripple.imag)
+    for order in ripple_orders:
+        ripple = part.current * np.exp(1j * order * part.theta)
+        found[f"order {order} q current cos"] = part.weak.integral(ripple.real)
+        found[f"order {order} q current sin"] = part.weak.integral(ripple.imag)
+    return found

@@ -1,0 +1,200 @@
+"""Where the uncertainty of an inductance from steps comes from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.instruments import (
+    current_source,
+    instrument_uncertainties,
+    station,
+    voltage_source,
+)
+from pipeline.estimation.step_fit import AXES, Solution
+from pipeline.estimation.step_model import LD, LQ, StepModel
+from pipeline.estimation.step_record import StepRecord, rotor_angle_rad
+from pipeline.records.uncertainty import Contribution
+
+Array = NDArray[np.float64]
+
+
+def gains(name: str, solution: Solution) -> list[Contribution]:
+    """Each instrument's share, by the linearised fit: dp = -C J' W dr under its gain.
+
+    A gain scales what was read. Where the voltage drives the model sample by sample, it scales the
+    predicted current. It acts on the captures of its station alone. Nobody says how much of a gain
+    stays from day to day: of captures of several days half its variance is taken as the
+    instrument's, half as each day's own, so that a ratio of d of one day and q of the next does
+    not lose it.
+    """
+    records = solution.model.records
+    days = sorted({_day(record) for record in records})
+    lever = _lever(name, solution)
+    found = []
+    for source, u in instrument_uncertainties(
+        [r.capture for r in records], ("voltage", "current")
+    ).items():
+        change = _under_gain(source, solution)
+        acting = [float(lever @ (change * _rows_of(day, solution))) for day in days]
+        if len(days) == 1:
+            found.append(Contribution(source, u * acting[0], "B"))
+            continue
+        half = u * math.sqrt(0.5)
+        found.append(Contribution(source, half * sum(acting), "B"))
+        for day, own in zip(days, acting, strict=True):
+            found.append(Contribution(f"{source}:{day}", half * own, "B"))
+    return found
+
+
+def _under_gain(source: str, solution: Solution) -> Array:
+    """Change of the weighted residuals [n] by a relative gain of one source."""
+    change = []
+    for record, weight, current in zip(
+        solution.model.records, solution.weights, _driven_currents(solution), strict=True
+    ):
+        amps, volts = np.zeros(record.i_a.size), np.zeros(record.i_a.size)
+        if voltage_source(record.capture.meta) == source and record.wave.has_supply:
+            volts = -record.v_v * weight[1]
+        elif voltage_source(record.capture.meta) == source:
+            amps = current * weight[0]
+        if current_source(record.capture.meta) == source:
+            amps = amps - record.i_a * weight[0]
+        change += [amps, volts]
+    return np.concatenate(change)
+
+
+def _day(record: StepRecord) -> str:
+    """The day of a capture, empty where it does not say."""
+    return (record.capture.meta.started_at or "")[:10]
+
+
+def _rows_of(day: str, solution: Solution) -> Array:
+    """1 for the residuals [n] of captures of a day, else 0."""
+    records = solution.model.records
+    return np.concatenate([np.full(2 * r.i_a.size, float(_day(r) == day)) for r in records])
+
+
+def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Contribution]:
+    """What an error of each angle at which the rotor was locked makes of an inductance.
+
+    One error for all captures of one stated angle, as the rotor was locked once. On an axis only
+    its square counts, c δ² with a root mean square of √3 c u² for a normal δ.
+    """
+    lever, now = _lever(name, solution), _weighted(solution, solution.model)
+    records = solution.model.records
+    places = sorted({_place(r) for r in records})
+    found = []
+    for place in places:
+        ends = []
+        for side in (-1.0, 1.0):
+            turned = [
+                replace(r, axis_rad=r.axis_rad + side * u_theta_rad) if _place(r) == place else r
+                for r in records
+            ]
+            ends.append(float(lever @ (_weighted(solution, StepModel(turned)) - now)))
+        odd, even = 0.5 * (ends[1] - ends[0]), 0.5 * (ends[1] + ends[0])
+        u = math.copysign(math.hypot(odd, math.sqrt(3.0) * even), odd)
+        found.append(Contribution(f"theta_elec:{place[1]:g}@{place[0]}", u, "B"))
+    return found
+
+
+def rounded_levels(name: str, solution: Solution) -> float:
+    """Standard uncertainty by the rounding of a voltage that drives the model as it was sampled.
+
+    What rounding leaves in the mean of a level, one error between two of the edges that move;
+    where the voltage is a supply's, its samples' weights hold it already.
+    """
+    model = solution.model
+    lever, now = _lever(name, solution), _weighted(solution, model)
+    total = 0.0
+    for k, record in enumerate(model.records):
+        wave, rounding = record.wave, record.voltage_noise.rounding
+        if wave.has_supply or rounding < 1e-9 * float(np.max(np.abs(wave.levels_v))):
+            continue
+        edges = np.flatnonzero(wave.moves.any(axis=1) & ~wave.moves.all(axis=1))
+        for cells in np.split(np.arange(wave.levels_v.size), edges):
+            levels = wave.levels_v.copy()
+            levels[cells] += rounding
+            records = list(model.records)
+            records[k] = replace(record, wave=replace(wave, levels_v=levels))
+            moved = _weighted(solution, StepModel(records)) - now
+            total += float(lever @ moved) ** 2
+    return math.sqrt(total)
+
+
+def unexplained(solution: Solution) -> dict[str, float]:
+    """Of each capture what the fit leaves of its current, rms over the span, without its noise."""
+    found, first = {}, 0
+    for record, weight in zip(solution.model.records, solution.weights, strict=True):
+        rows = slice(first, first + record.i_a.size)
+        first = rows.stop + record.i_a.size
+        left = solution.fit.residuals[rows] / weight[0]
+        noise = record.current_noise.sigma**2 / record.count
+        excess = max(float(np.mean(left**2)) - float(np.mean(noise)), 0.0)
+        found[record.capture.path] = math.sqrt(excess) / max(float(np.ptp(record.i_a)), 1e-300)
+    return found
+
+
+def birge_ratio(solution: Solution) -> float:
+    """How far the captures disagree on L beyond their own scatter, at least 1.
+
+    Each capture gets a factor of its own on both inductances, by one Gauss-Newton step; their chi
+    square over what the axes leave of the captures. Reference: Birge, Phys. Rev. 40, 1932, 207.
+    """
+    where = np.flatnonzero(solution.free)
+    axes = [k for k in (LD, LQ) if solution.free[k]]
+    records, fit = solution.model.records, solution.fit
+    if len(records) <= len(axes):
+        return 1.0
+    together = np.searchsorted(where, axes)
+    factor = fit.jacobian[:, together] @ solution.parameters[axes]
+    owner = np.repeat(np.arange(len(records)), [2 * r.i_a.size for r in records])
+    own = np.where(owner[:, None] == np.arange(len(records)), factor[:, None], 0.0)
+    rest = np.delete(fit.jacobian, together, axis=1)
+    scale = np.linalg.norm(rest, axis=0)
+    basis = np.linalg.qr(rest[:, scale > 0.0] / scale[scale > 0.0])[0]
+    own = own - basis @ (basis.T @ own)
+    left = fit.residuals - basis @ (basis.T @ fit.residuals)
+    spread = own * solution.scatter[:, None]
+    score, meat = own.T @ left, spread.T @ spread
+    chi2 = float(score @ np.linalg.pinv(meat, 1e-10, hermitian=True) @ score)
+    return max(1.0, math.sqrt(chi2 / (len(records) - len(axes))))
+
+
+def _lever(name: str, solution: Solution) -> Array:
+    """Change of one inductance by a change of each weighted residual [n]."""
+    fit = solution.fit
+    row = int(np.flatnonzero(np.flatnonzero(solution.free) == AXES[name][0])[0])
+    scale = np.linalg.norm(fit.jacobian, axis=0)
+    scale[scale == 0.0] = 1.0
+    scaled = fit.jacobian / scale
+    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
+    lever: Array = -(inverse[row] / scale[row]) @ scaled.T
+    return lever
+
+
+def _place(record: StepRecord) -> tuple[str, float]:
+    angle = rotor_angle_rad(record.capture) or 0.0
+    return station(record.capture.meta), round(math.degrees(angle), 3)
+
+
+def _weighted(solution: Solution, model: StepModel) -> Array:
+    """Weighted readings [n] that a model predicts at the solution's parameters."""
+    rows = [solution.parameters[None, :]] * len(model.records)
+    both = zip(model.predict_both(rows), solution.weights, strict=True)
+    return np.concatenate([x[:, 0] * w for read, ws in both for x, w in zip(read, ws, strict=True)])
+
+
+def _driven_currents(solution: Solution) -> list[Array]:
+    """Predicted current [n] of each capture, without the offset."""
+    model = solution.model
+    rows = [solution.parameters[None, :]] * len(model.records)
+    offsets = [
+        0.0 if own.offset_a is None else float(solution.parameters[at + own.offset_a])
+        for at, own in zip(model.layout.starts, model.layout.own, strict=True)
+    ]
+    return [i[:, 0] - x for i, x in zip(model.predict(rows), offsets, strict=True)]

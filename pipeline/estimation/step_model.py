@@ -1,0 +1,397 @@
+"""Current of a locked machine under voltage levels, and its fit to many captures at once.
+
+    dI/dt = (v - R I)/L(I),  v = e - R_source I
+    L(I)  = 2 [cos²g Ld(i_d) + sin²g Lq(i_q)],  i_d + j i_q = (2/√3) I e^{jg}
+
+g is the angle from the d axis to the pair's current; e and R_source are the supply's. Ld and Lq
+are incremental and saturate with their own flux, L0/(1 + a y + b y² + c y³ + d y⁴) on d, y the flux
+that the current made, L0/(1 + a y² + b |y|³ + c y⁴ + d |y|⁵) on q. So i is a polynomial of y, which
+is how iron bends. Every step of the integration is an exact exponential with L frozen at its
+midpoint: exact for a constant L, else second order.
+
+References: IEEE Std 1812-2014, 8 (step response at standstill); Hairer, Norsett and Wanner,
+Solving Ordinary Differential Equations I, II.1 (midpoint rule).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.step_record import StepRecord
+from pipeline.estimation.step_wave import BETWEEN
+
+Array = NDArray[np.float64]
+SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4")
+TERMS = 4
+EDGE_REACH = 4.0  # [samples]
+LD, LQ = 0, 1 + TERMS
+SPACE = 2.0 / math.sqrt(3.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Own:
+    """Where one capture's own parameters sit, counted from its first; None where it has none.
+
+    The pair's and the supply's resistance, the current's offset where the voltage has two levels
+    or more, the moves of its edges [samples], the first current where the capture starts unsettled,
+    the inverter's drop where commanded, and the supply's open voltages.
+    """
+
+    r_ohm: int
+    source_ohm: int | None
+    offset_a: int | None
+    moves: slice
+    first_a: int | None
+    drop_v: int | None
+    levels_v: slice
+    size: int
+
+
+def own_of(record: StepRecord) -> Own:
+    """The places of a capture's own parameters."""
+    wave, at = record.wave, 1
+    places: list[int | None] = []
+    for there in (
+        wave.has_supply and not record.commanded,
+        wave.levels_v.size > 1,
+        not record.starts_settled,
+        record.commanded,
+    ):
+        places.append(at if there else None)
+        at += there
+    source, offset, first, drop = places
+    moves = slice(at, at + wave.moves.shape[1])
+    levels = slice(moves.stop, moves.stop + (wave.levels_v.size if wave.has_supply else 0))
+    return Own(0, source, offset, moves, first, drop, levels, levels.stop)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the parameters sit: those of the axes, then from `starts` each capture's own."""
+
+    starts: tuple[int, ...]
+    own: tuple[Own, ...]
+
+    @property
+    def size(self) -> int:
+        """How many parameters in all."""
+        return self.starts[-1] + self.own[-1].size
+
+
+def layout_of(records: Sequence[StepRecord]) -> Layout:
+    """The layout for these captures."""
+    own = tuple(own_of(record) for record in records)
+    starts = np.cumsum([len(SHARED), *(o.size for o in own[:-1])])
+    return Layout(tuple(int(s) for s in starts), own)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What drives one capture in m variants [m each]; edges [m, s + 1], open voltages [m, s]."""
+
+    r_ohm: Array
+    source_ohm: Array
+    offset_a: Array
+    edges_s: Array
+    first_a: Array
+    drop_v: Array
+    levels_v: Array
+
+    @property
+    def loop_ohm(self) -> Array:
+        """Resistance of pair and supply [m]."""
+        return self.r_ohm + self.source_ohm
+
+
+def drive_of(record: StepRecord, own: Own, values: Array) -> Drive:
+    """The drive of a capture from the columns of its own parameters [m, size]."""
+    wave, none = record.wave, np.zeros(values.shape[0])
+
+    def column(place: int | None) -> Array:
+        return none if place is None else values[:, place]
+
+    r_ohm, source_ohm = values[:, own.r_ohm], column(own.source_ohm)
+    edges = wave.edges_s + wave.period_s * values[:, own.moves] @ wave.moves.T
+    levels = values[:, own.levels_v] if wave.has_supply else np.tile(wave.levels_v, (none.size, 1))
+    settled = levels[:, 0] / (r_ohm + source_ohm)
+    first = settled if own.first_a is None else values[:, own.first_a]
+    return Drive(r_ohm, source_ohm, column(own.offset_a), edges, first, column(own.drop_v), levels)
+
+
+def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
+    """Starting values: the integrated form's L split over the axes, its R, the supply; linear."""
+    cos2 = np.array([math.cos(r.axis_rad) ** 2 for r in records])
+    mixing = 2.0 * np.column_stack([cos2, 1.0 - cos2])
+    l_total = np.array([r.l_start_h for r in records])
+    ridge = 1e-3 * np.eye(2)
+    both = np.linalg.solve(
+        mixing.T @ mixing + ridge, mixing.T @ l_total + ridge.sum(0) * l_total.mean() / 2
+    )
+    start = np.zeros(layout.size)
+    start[[LD, LQ]] = np.clip(both, 0.2 * l_total.min() / 2, 5.0 * l_total.max() / 2)
+    for record, at, own in zip(records, layout.starts, layout.own, strict=True):
+        start[at] = record.r_start_ohm
+        if own.source_ohm is not None:
+            start[at + own.source_ohm] = max(record.wave.source_ohm, -0.5 * record.r_start_ohm)
+        if record.wave.has_supply:
+            start[at + own.levels_v.start : at + own.levels_v.stop] = record.wave.levels_v
+    return start
+
+
+def axis_inductances(shared: Array, flux_d: Array, flux_q: Array) -> tuple[Array, Array]:
+    """Incremental Ld and Lq [m] at the fluxes [m] made by current; shared [m, 10].
+
+    The q axis begins with y²: both senses are alike, and iron has no corner at zero current.
+    """
+    y = np.abs(flux_q)
+    bend_d = _polynomial(shared[:, LD + 1 : LD + 1 + TERMS], flux_d)
+    bend_q = _polynomial(shared[:, LQ + 1 : LQ + 1 + TERMS], y) * y
+    return shared[:, LD] / np.maximum(1.0 + bend_d, 0.05), shared[:, LQ] / np.maximum(
+        1.0 + bend_q, 0.05
+    )
+
+
+def _polynomial(terms: Array, flux: Array) -> Array:
+    """Polynomial of a flux [m] without a constant."""
+    value = terms[:, 3] * flux
+    for column in (2, 1, 0):
+        value = (value + terms[:, column]) * flux
+    return value
+
+
+def _covered(time: Array) -> Array:
+    """Share of the way to its goal [m] after a time [m, in time constants].
+
+    Negative where two edges of a trial cross; so far back as to overflow no trial is worth it.
+    """
+    covered: Array = -np.expm1(-np.maximum(time, -30.0))
+    return covered
+
+
+def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
+    """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0."""
+    one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
+    flux_d, flux_q = np.zeros(1), np.zeros(1)
+    found = np.empty(current_a.size)
+    for k in range(current_a.size):
+        l_d, l_q = axis_inductances(one, flux_d, flux_q)
+        found[k] = 2.0 * float(cos_g**2 * l_d[0] + sin_g**2 * l_q[0])
+        if k + 1 < current_a.size:
+            step = SPACE * float(current_a[k + 1] - current_a[k])
+            middle = flux_d + 0.5 * l_d * cos_g * step, flux_q + 0.5 * l_q * sin_g * step
+            l_d, l_q = axis_inductances(one, *middle)
+            flux_d, flux_q = flux_d + l_d * cos_g * step, flux_q + l_q * sin_g * step
+    return found
+
+
+def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
+    """Segment of each integration step and the shares of the segment where it begins and ends."""
+    tau = record.l_start_h / (record.r_start_ohm + max(record.wave.source_ohm, 0.0))
+    segments, begin, end = [], [], []
+    sampled = not record.wave.has_supply
+    for index, length in enumerate(np.diff(record.wave.edges_s)):
+        if sampled:
+            nodes = np.array([0.0, 1.0])
+        else:
+            reach = min(8.0 * tau, length)
+            fine = np.linspace(0.0, reach, max(int(reach / tau * 16), 4) + 1)
+            coarse = np.linspace(reach, length, 8)[1:] if length > reach else np.zeros(0)
+            nodes = np.concatenate([fine, coarse]) / length
+            nodes[-1] = 1.0
+        segments += [index] * (nodes.size - 1)
+        begin.append(nodes[:-1])
+        end.append(nodes[1:])
+    return np.array(segments, dtype=np.intp), np.concatenate(begin), np.concatenate(end)
+
+
+class StepModel:
+    """Predicts the current of every capture for every variant of the parameters in one sweep."""
+
+    def __init__(self, records: Sequence[StepRecord]) -> None:
+        self.records = tuple(records)
+        self.layout = layout_of(records)
+        self._grids = [_steps(record) for record in records]
+        self._count = max(grid[0].size for grid in self._grids)
+
+    def predict(self, variants: Sequence[Array]) -> list[Array]:
+        """Currents [n, m] of each capture; variants[c] [m, size] are full parameter vectors."""
+        shared, cos_g, width, volts, own = [], [], [], [], []
+        for record, grid, rows, at, places in zip(
+            self.records, self._grids, variants, self.layout.starts, self.layout.own, strict=True
+        ):
+            mine = drive_of(record, places, rows[:, at : at + places.size])
+            segment, begin, end = grid
+            lengths = np.diff(mine.edges_s, axis=1)[:, segment]
+            pad = self._count - segment.size
+            width.append(np.pad(lengths * (end - begin), ((0, 0), (0, pad))))
+            volts.append(np.pad(mine.levels_v[:, segment], ((0, 0), (0, pad)), mode="edge"))
+            shared.append(rows[:, : len(SHARED)])
+            cos_g.append(np.full(rows.shape[0], math.cos(record.axis_rad)))
+            own.append(mine)
+        nodes, l_mid, target = self._sweep(
+            np.vstack(shared),
+            np.concatenate(cos_g),
+            np.vstack(width).T.copy(),
+            np.vstack(volts).T.copy(),
+            own,
+        )
+        currents, first = [], 0
+        for record, grid, mine in zip(self.records, self._grids, own, strict=True):
+            block = slice(first, first + mine.r_ohm.size)
+            trace = (nodes[:, block], l_mid[:, block], target[:, block])
+            currents.append(_at_samples(record, grid, mine, trace))
+            first += mine.r_ohm.size
+        return currents
+
+    def _sweep(
+        self, shared: Array, cos_g: Array, width: Array, volts: Array, own: Sequence[Drive]
+    ) -> tuple[Array, Array, Array]:
+        """Currents at the nodes [k + 1, m]; inductance and final current of each step [k, m]."""
+        r = np.concatenate([o.loop_ohm for o in own])
+        drop = np.concatenate([o.drop_v for o in own])
+        knee = np.concatenate(
+            [
+                np.full(o.r_ohm.size, 0.02 * c.largest_a)
+                for o, c in zip(own, self.records, strict=True)
+            ]
+        )
+        current = np.concatenate([o.first_a for o in own])
+        nodes = np.empty((self._count + 1, r.size))
+        l_mid, target = np.empty((self._count, r.size)), np.empty((self._count, r.size))
+        nodes[0] = current
+        dropping = bool(np.any(drop))
+        sin_g = np.sqrt(np.maximum(1.0 - cos_g**2, 0.0))
+        l_d, l_q = shared[:, LD], shared[:, LQ]
+        flux_d, flux_q = l_d * SPACE * cos_g * current, l_q * SPACE * sin_g * current
+        for k in range(self._count):
+            goal = volts[k] / r
+            if dropping:
+                goal = goal - drop / r * np.clip(current / knee, -1.0, 1.0)
+            l_d, l_q = axis_inductances(shared, flux_d, flux_q)
+            here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
+            rise = SPACE * (goal - current) * _covered(0.5 * width[k] * r / here)
+            l_d, l_q = axis_inductances(
+                shared, flux_d + l_d * cos_g * rise, flux_q + l_q * sin_g * rise
+            )
+            here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
+            step = (goal - current) * _covered(width[k] * r / here)
+            flux_d = flux_d + l_d * cos_g * SPACE * step
+            flux_q = flux_q + l_q * sin_g * SPACE * step
+            current = current + step
+            nodes[k + 1], l_mid[k], target[k] = current, here, goal
+        return nodes, l_mid, target
+
+    def residuals(
+        self, parameters: Array, weights: Sequence[Array], jacobian: NDArray[np.bool_]
+    ) -> tuple[Array, Array]:
+        """Weighted residuals [n] and their Jacobian [n, k] over the parameters that are free.
+
+        Of each capture first the currents, then the voltages, each times its row of `weights`
+        [2, rows]. One-sided differences of width 1e-6 of each parameter's natural scale.
+        """
+        widths = self._widths(parameters)
+        free = np.flatnonzero(jacobian)
+        columns = [self.columns_of(c, free) for c in range(len(self.records))]
+        variants = []
+        for mine in columns:
+            rows = np.tile(parameters, (mine.size + 1, 1))
+            rows[np.arange(1, mine.size + 1), mine] += widths[mine]
+            variants.append(rows)
+        blocks, slopes = [], []
+        for c, (current, volts) in enumerate(self.predict_both(variants)):
+            record, mine = self.records[c], columns[c]
+            place = np.searchsorted(free, mine)
+            for read, seen, weight in zip(
+                (current, volts), (record.i_a, record.v_v), weights[c], strict=True
+            ):
+                blocks.append((read[:, 0] - seen) * weight)
+                slope = np.zeros((seen.size, free.size))
+                slope[:, place] = (read[:, 1:] - read[:, :1]) / widths[mine] * weight[:, None]
+                slopes.append(slope)
+        return np.concatenate(blocks), np.vstack(slopes)
+
+    def predict_both(self, variants: Sequence[Array]) -> list[tuple[Array, Array]]:
+        """Currents and voltages [n, m each] of each capture; a voltage of no level is 0."""
+        found = []
+        for current, record, rows, at, own in zip(
+            self.predict(variants),
+            self.records,
+            variants,
+            self.layout.starts,
+            self.layout.own,
+            strict=True,
+        ):
+            drive = drive_of(record, own, rows[:, at : at + own.size])
+            volts = np.zeros_like(current)
+            there = record.level != BETWEEN
+            through = current[there] - drive.offset_a
+            volts[there] = drive.levels_v.T[record.level[there]] - drive.source_ohm * through
+            found.append((current, volts))
+        return found
+
+    def bounds(self, start: Array) -> tuple[Array, Array]:
+        """Where the search may go from `start`: beyond, a current would run away without end.
+
+        Inductances and resistances stay positive, the loop's too, and an edge near the samples
+        that leave it open.
+        """
+        low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
+        positive = [LD, LQ, *self.layout.starts]
+        low[positive] = 1e-3 * start[positive]
+        for at, own in zip(self.layout.starts, self.layout.own, strict=True):
+            if own.source_ohm is not None:
+                low[at], low[at + own.source_ohm] = 0.6 * start[at], -0.5 * start[at]
+            moves = slice(at + own.moves.start, at + own.moves.stop)
+            low[moves], high[moves] = -EDGE_REACH, EDGE_REACH
+        return low, high
+
+    def columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Those of the free parameters that a capture depends on."""
+        start, size = self.layout.starts[capture], self.layout.own[capture].size
+        own = (free >= start) & (free < start + size)
+        return free[own | (free < len(SHARED))]
+
+    def _widths(self, parameters: Array) -> Array:
+        largest = SPACE * max(record.largest_a for record in self.records)
+        widths = np.empty(parameters.size)
+        for place in (LD, LQ):
+            flux = parameters[place] * largest
+            widths[place] = 1e-6 * parameters[place]
+            powers = np.arange(1.0, 1.0 + TERMS) + (place == LQ)
+            widths[place + 1 : place + 1 + TERMS] = 1e-6 * flux**-powers
+        for record, at, own in zip(self.records, self.layout.starts, self.layout.own, strict=True):
+            ampere = max(record.largest_a, 1e-9)
+            widths[at : at + own.size] = 1e-5 * ampere
+            widths[at] = 1e-6 * parameters[at]
+            if own.source_ohm is not None:
+                widths[at + own.source_ohm] = 1e-6 * parameters[at]
+            widths[at + own.moves.start : at + own.moves.stop] = 1e-4
+            widths[at + own.moves.stop : at + own.size] = 1e-5 * ampere * parameters[at]
+            if own.drop_v is not None:
+                widths[at + own.drop_v] = 1e-5 * ampere * parameters[at]
+        return widths
+
+
+def _at_samples(
+    record: StepRecord,
+    grid: tuple[NDArray[np.intp], Array, Array],
+    own: Drive,
+    trace: tuple[Array, Array, Array],
+) -> Array:
+    """Current [n, m] at the record's times, by the exact step from the node before each."""
+    segment, begin, _ = grid
+    nodes, l_mid, target = trace
+    currents = np.empty((record.t_s.size, own.r_ohm.size))
+    lengths = np.diff(own.edges_s, axis=1)
+    for column in range(own.r_ohm.size):
+        starts = own.edges_s[column, segment] + begin * lengths[column, segment]
+        index = np.clip(np.searchsorted(starts, record.t_s, side="right") - 1, 0, segment.size - 1)
+        goal = target[index, column]
+        decay = np.exp(-(record.t_s - starts[index]) * own.loop_ohm[column] / l_mid[index, column])
+        currents[:, column] = goal + (nodes[index, column] - goal) * decay + own.offset_a[column]
+    return currents

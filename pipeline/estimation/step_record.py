@@ -1,0 +1,164 @@
+"""A voltage step on a locked rotor, brought to the form that the step model is fitted to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.integrals import trapezoid
+from pipeline.estimation.step_wave import BETWEEN, Noise, Waveform, noise_of, waveform_of
+from pipeline.estimation.terminals import pair_of, pair_signals
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.physics.conventions import PAIR_AXES_RAD
+from pipeline.records.capture import Capture
+
+Array = NDArray[np.float64]
+MOST_BINS = 3000
+SPIKE = 8.0
+MOST_APART = 100.0
+"""Most that saliency and iron's bend together part the inductances of one rotor's steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepRecord:
+    """One current_step capture: means [n] of `count` samples of current and voltage.
+
+    `level` [n] is the supply's level of each mean of the voltage, `BETWEEN` where it is none.
+    `axis_rad` is the angle from the d axis to the pair's current; `l_start_h`, `r_start_ohm` come
+    from the integrated form; `commanded` says that an inverter's drop is in the voltage.
+    """
+
+    capture: Capture
+    pair: str
+    axis_rad: float
+    wave: Waveform
+    t_s: Array
+    i_a: Array
+    v_v: Array
+    level: NDArray[np.intp]
+    count: Array
+    l_start_h: float
+    r_start_ohm: float
+    commanded: bool
+    starts_settled: bool
+    current_noise: Noise
+    voltage_noise: Noise
+
+    @property
+    def largest_a(self) -> float:
+        """The largest current in magnitude."""
+        return float(np.max(np.abs(self.i_a)))
+
+
+def rotor_angle_rad(capture: Capture) -> float | None:
+    """Electrical angle at which the rotor was locked: as stated, else the mean of the column."""
+    if capture.meta.theta_elec_deg is not None:
+        return math.radians(capture.meta.theta_elec_deg)
+    if capture.has("theta_elec_rad"):
+        return float(np.nanmean(capture.arrays("theta_elec_rad")["theta_elec_rad"]))
+    return None
+
+
+def read_step(capture: Capture) -> StepRecord | None:
+    """The record of a capture, or None where it holds no step to speak of.
+
+    Raises KeyError where voltage, current, pair or rotor angle is missing.
+    """
+    pair, angle = pair_of(capture), rotor_angle_rad(capture)
+    if pair is None or angle is None:
+        raise KeyError(f"{capture.path}: pair or theta_elec_deg is not stated")
+    data = pair_signals(capture, pair)
+    whole = ~(_spikes(data["v_v"]) | _spikes(data["i_a"]))
+    t, v, i = (data[name][whole] for name in ("t_s", "v_v", "i_a"))
+    t, noise = t - t[:1], noise_of(i)
+    if t.size < 50 or float(np.ptp(i)) < 10.0 * noise.sigma:
+        return None
+    commanded = capture.meta.voltage_kind == "commanded"
+    wave = waveform_of(t, v, i, capture.meta.voltage_timing, ideal=commanded)
+    start = integrated_form(t, v, i)
+    if start is None:
+        return None
+    cuts = _cuts(t.size, wave)
+    count = np.diff(np.append(cuts, t.size)).astype(np.float64)
+    times, amps, volts = (np.add.reduceat(x, cuts) / count for x in (t, i, v))
+    return StepRecord(
+        capture=capture,
+        pair=pair,
+        axis_rad=PAIR_AXES_RAD[pair] - angle,
+        wave=wave,
+        t_s=times,
+        i_a=amps,
+        v_v=volts,
+        level=wave.level_of[cuts] if wave.has_supply else np.full(cuts.size, BETWEEN),
+        count=count,
+        l_start_h=start[0],
+        r_start_ohm=start[1],
+        commanded=commanded,
+        starts_settled=wave.has_supply and wave.edges_s[1] - wave.edges_s[0] >= 5.0 * wave.period_s,
+        current_noise=noise,
+        voltage_noise=noise_of(v),
+    )
+
+
+def _spikes(signal: Array) -> NDArray[np.bool_]:
+    """Samples [n] that stand more than `SPIKE` of the noise from the median of five around them.
+
+    A signal that rises or falls through the five is its own median, an edge too. Reference: Hampel,
+    J. Am. Stat. Assoc. 69, 1974, 383 (the median as the estimator that outliers move least).
+    """
+    if signal.size < 5:
+        return np.zeros(signal.size, dtype=bool)
+    padded = np.pad(signal, 2, mode="edge")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    noise = noise_of(signal)
+    found: NDArray[np.bool_] = np.abs(signal - middle) > SPIKE * max(noise.sigma, noise.step)
+    return found
+
+
+def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] | None:
+    """L [H] and R [ohm] between the terminals: i = (1/L) ∫v dt - (R/L) ∫i dt + c.
+
+    The integrated form takes no derivative; solved for i, in which alone the noise is white. A
+    start for the fit, not an estimate: the trapezoid across an edge reads L up to half a sample of
+    the time constant high. None where the two integrals are not told apart.
+    """
+    volts, amps = trapezoid(t_s, v_v), trapezoid(t_s, i_a)
+    fit = linear_fit(np.column_stack([volts, amps, np.ones(t_s.size)]), i_a)
+    inverse, slope = float(fit.coefficients[0]), -float(fit.coefficients[1])
+    if not fit.full_rank or inverse <= 0.0 or slope <= 0.0:
+        return None
+    return 1.0 / inverse, slope / inverse
+
+
+def disagreement(records: Sequence[StepRecord]) -> str:
+    """The captures that cannot be of one rotor with the others, in words; empty where all can.
+
+    A clock or a current in another unit scales L by a thousand, and a common fit would follow it.
+    """
+    found = np.log([record.l_start_h for record in records])
+    if found.size < 2 or np.ptp(found) < math.log(MOST_APART):
+        return ""
+    apart = found - np.median(found)
+    odd = [
+        f"{record.capture.path} ({math.exp(ratio):.3g} times the usual L)"
+        for record, ratio in zip(records, apart, strict=True)
+        if abs(ratio) > 0.5 * math.log(MOST_APART) - 1e-9
+    ]
+    return f"look at t_s and the units of {', '.join(odd)}: not one rotor with the other steps"
+
+
+def _cuts(size: int, wave: Waveform) -> NDArray[np.intp]:
+    """First samples of equal groups, about `MOST_BINS` at most, none across an edge of a supply."""
+    cuts = np.arange(0, size, max(1, size // MOST_BINS))
+    if not wave.has_supply:
+        return cuts
+    near = np.flatnonzero(np.diff(wave.level_of)) + 1
+    around = (near[:, None] + np.arange(-2, 3)).ravel()
+    found: NDArray[np.intp] = np.unique(
+        np.concatenate([cuts, around[(around > 0) & (around < size)]])
+    )
+    return found

@@ -1,0 +1,59 @@
+"""The residual test of one motor, in a worker: a model held against its captures, once."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from pipeline.estimation.registry import BROKEN
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.finding import Finding
+from pipeline.records.model_verdict import ModelVerdict
+
+SWITCHED_OFF = ModelVerdict("not_tested", note="residual_test=false")
+
+
+class Verdicts(Protocol):
+    """Verdicts that were come to before, by a key of all that they hang on."""
+
+    def key(self, model: ModelSpec, start: Constants) -> str:
+        """The key of a model held against the captures from these constants."""
+
+    def recall(self, key: str) -> ModelVerdict | None:
+        """The verdict of a key, if it is kept."""
+
+    def keep(self, key: str, found: ModelVerdict) -> None:
+        """Keeps a verdict."""
+
+
+def judged_model(
+    campaign: Campaign,
+    model: ModelSpec | None,
+    constants: Constants,
+    memory: Verdicts | None = None,
+) -> tuple[ModelVerdict, tuple[Finding, ...]]:
+    """The verdict on a model of one motor, `not_tested` for none, and what went wrong in the test.
+
+    A test that breaks on some captures costs itself and not the datasheet. Raises UsageError for a
+    model or an effect that there is not.
+    """
+    if model is None:
+        return SWITCHED_OFF, ()
+    from pipeline.criticism.adequacy import model_verdict
+    from pipeline.execution.start import start_constants
+
+    try:
+        start = start_constants(campaign, constants)
+        key = "" if memory is None else memory.key(model, start)
+        found = None if memory is None else memory.recall(key)
+        if found is None:
+            found = model_verdict(campaign, model, start)
+            if memory is not None:
+                memory.keep(key, found)
+    except (*BROKEN, MemoryError) as error:
+        said = f"the residual test broke on these captures: {type(error).__name__}: {error}"
+        remedy = "the constants stand; report the captures with this line"
+        broken = Finding(campaign.motor_id, "warning", "residual_test_failed", said, remedy)
+        return ModelVerdict("not_tested", model.name, model.effects, note=said), (broken,)
+    return found, ()

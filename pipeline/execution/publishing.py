@@ -1,0 +1,166 @@
+"""What belongs to a whole batch: its findings, its page, its list of files, its outcome."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.execution.jobs import Files, MotorResult
+from pipeline.execution.statuses import Statuses
+from pipeline.io.datasheets import read_datasheet
+from pipeline.io.publish import canonical_json, partial_owner, write_whole
+from pipeline.io.survey import Survey
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.finding import Finding
+from pipeline.records.naming import counted
+from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.report.console import COLUMNS, nothing_usable, summary
+from pipeline.report.words import KEY_CONSTANTS
+from pipeline.settings import RunSettings
+
+MANIFEST = "outputs.json"
+INPUT, OUTPUT = "\ue000", "\ue001"
+"""Stand for the names of the folders; no file may bear such a name."""
+OF_BATCH = frozenset({*KEY_CONSTANTS, *(name for _, name, _ in COLUMNS)})
+"""Constants that the batch's page and summary show."""
+TOLD = 5
+"""Names of removed files in a note, at most; datasheets come first."""
+ROOMS = ("datasheets", "report", "recordings", ".cache")
+
+
+def datasheets_of(output: Path, results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
+    """The datasheets of a batch, read back from where they were written.
+
+    Only what belongs to the batch is kept of each, or memory would grow with the batch.
+    """
+    names = [name for result in results for name, _ in result.finished.files]
+    sheets = (read_datasheet(output / name) for name in names if name.startswith("datasheets/"))
+    return tuple(_kept(sheet) for sheet in sheets)
+
+
+def _kept(sheet: Datasheet) -> Datasheet:
+    constants = {name: one for name, one in sheet.constants.items() if name in OF_BATCH}
+    return replace(sheet, constants=constants, alternatives=(), captures=())
+
+
+def publish(
+    settings: RunSettings,
+    results: Sequence[MotorResult],
+    datasheets: Sequence[Datasheet],
+    findings: Sequence[Finding],
+    statuses: Statuses,
+) -> tuple[Files, tuple[str, ...]]:
+    """Writes what belongs to the batch, then takes away what an earlier run left behind.
+
+    `statuses` are the current ones by motor.
+    Returns every file of the batch, and the names of those that were taken away.
+    """
+    output = Path(settings.output)
+    files: list[tuple[str, str]] = []
+
+    def write(name: str, content: bytes) -> None:
+        write_whole(output / name, content)
+        files.append((name, hashlib.sha256(content).hexdigest()))
+
+    document = {"schema": "findings/1", "findings": [f.document() for f in findings]}
+    write("findings.json", canonical_json(document))
+    files += [file for result in results for file in result.finished.files]
+    if settings.report:
+        from pipeline.report.fleet_page import render_fleet
+
+        write("report/index.html", render_fleet(datasheets, tuple(findings), statuses).encode())
+    names = sorted(name for name, _ in files)
+    removed = _sweep(output, names)
+    write(MANIFEST, canonical_json({"schema": "outputs/1", "files": names}))
+    return tuple(sorted(files)), removed
+
+
+def _sweep(output: Path, files: Sequence[str]) -> tuple[str, ...]:
+    """Removes the files that the last run listed and this one did not write, and torn ones.
+
+    Returns the names of the former.
+    """
+    removed = []
+    for name in sorted(_listed(output / MANIFEST) - set(files)):
+        stale = output / name
+        if stale.resolve().is_relative_to(output.resolve()):
+            with suppress(IsADirectoryError, NotADirectoryError, FileNotFoundError):
+                stale.unlink()
+                removed.append(name)
+    for room in ROOMS:
+        for torn in (output / room).rglob(".*.partial"):
+            if not _alive(partial_owner(torn)):
+                torn.unlink(missing_ok=True)
+    return tuple(removed)
+
+
+def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
+    """A line that counts and names what an earlier run had left and this one took away."""
+    if not removed:
+        return ()
+    told = ", ".join(removed[:TOLD]) + (", ..." if len(removed) > TOLD else "")
+    return (
+        f"note: {output} holds what comes of this input alone: "
+        f"{counted(len(removed), 'file')} of an earlier run removed: {told}",
+    )
+
+
+def _listed(manifest: Path) -> set[str]:
+    """The files that a manifest names; none where it is none of ours."""
+    try:
+        files = json.loads(manifest.read_bytes())["files"]
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return set()
+    return {name for name in files if isinstance(name, str)} if isinstance(files, list) else set()
+
+
+def _alive(process: int | None) -> bool:
+    """Whether a process that may still be writing runs on this machine."""
+    if process is None or process == os.getpid():
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def outcome_of(
+    datasheets: Sequence[Datasheet],
+    findings: Sequence[Finding],
+    found: Survey,
+    statuses: Statuses,
+    *,
+    report: bool,
+) -> Outcome:
+    """What the command says, with its exit code; `placed` names the folders in it."""
+    seen = [{check.status for check in sheet.checks} for sheet in datasheets]
+    refused = any(finding.severity == "refused" for finding in findings)
+    code = first_that_applies(
+        1 if any("fail" in one for one in seen) else 0,
+        3 if refused else 0,
+        4 if not datasheets or any(one == {"not_evaluated"} for one in seen) else 0,
+    )
+    lines = tuple(finding.line() for finding in findings)
+    if not datasheets:
+        lines = (*lines, nothing_usable(INPUT, refused=refused))
+    if found.note:
+        lines = (*lines, f"note: {found.note}")
+    told = summary(datasheets, findings, OUTPUT, report=report, folder=INPUT, statuses=statuses)
+    return Outcome(code, told, lines)
+
+
+def placed(outcome: Outcome, settings: RunSettings) -> Outcome:
+    """The outcome with the names of the folders, which are no part of what is kept."""
+
+    def name(text: str) -> str:
+        return text.replace(INPUT, settings.input).replace(OUTPUT, settings.output)
+
+    return Outcome(outcome.exit_code, name(outcome.text), tuple(map(name, outcome.errors)))

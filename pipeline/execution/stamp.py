@@ -1,0 +1,36 @@
+"""What a datasheet says it was made of: settings, captures as read, code and libraries."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.keys import handed, key_of, version_parts
+from pipeline.execution.versions import datasheet_code, datasheet_libraries
+from pipeline.execution.work import Stamp
+from pipeline.io.publish import canonical_json
+from pipeline.io.source_map import SourceMap
+from pipeline.records.capture import Campaign
+from pipeline.records.content import content_digest
+from pipeline.settings import RunSettings, result_document
+
+
+def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
+    """The version of a motor's datasheet, with all that it is a digest of."""
+    readings = tuple(content_digest(capture) for capture in campaign.captures)
+    code, libraries = datasheet_code(), datasheet_libraries()
+    given = handed(campaign, readings)
+    version = key_of(version_parts(code, libraries, given, job.config_sha256))
+    return Stamp(version, readings, job.config_sha256, code, libraries, given)
+
+
+def configuration_digest(
+    settings: RunSettings, required: Sequence[str], sources: Iterable[SourceMap | None]
+) -> str:
+    """Digest of the settings that can change a result, of the constants that a release must hold,
+    and of the source maps that the captures need. What a lot is held to changes no datasheet.
+    """
+    work = canonical_json({**result_document(settings), "required": tuple(required)})
+    maps = sorted({repr(source) for source in sources if source is not None})
+    return hashlib.sha256("\n".join([work.decode(), *maps]).encode()).hexdigest()

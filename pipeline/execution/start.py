@@ -1,0 +1,17 @@
+"""What criticism starts from."""
+
+from __future__ import annotations
+
+from pipeline.criticism.size import counted_pole_pairs
+from pipeline.estimation.registry import fit_all
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+
+
+def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Constants:
+    """Constants to start criticism from: none where a nameplate or a spin tells the pole pairs,
+    else those that are `fitted` already, or are now.
+    """
+    if campaign.nameplate("pole_pairs") is not None or counted_pole_pairs(campaign) is not None:
+        return Constants()
+    return fit_all(campaign, {})[0] if fitted is None else fitted

@@ -1,1 +1,0 @@
-"""One constant's file each; `pipeline.fit.registry` finds them by their `ESTIMATOR`."""

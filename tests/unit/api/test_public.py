@@ -1,0 +1,145 @@
+"""What `import pipeline` offers, held against what the commands write."""
+
+from __future__ import annotations
+
+import doctest
+import importlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+import pipeline
+from pipeline.__main__ import main
+from pipeline.records.errors import UsageError
+
+ROOT = Path(__file__).parents[3]
+DEMO = ROOT / "data" / "demo"
+MOTOR = "G52-0601"
+MODULES = ("recordings", "fits", "datasheets", "models", "simulated")
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return pipeline.read(DEMO, motor=MOTOR)
+
+
+@pytest.fixture(scope="module")
+def fits(recordings):
+    return pipeline.fit(recordings)
+
+
+def test_every_public_name_is_a_documented_function():
+    for name in pipeline.__all__:
+        function = getattr(pipeline, name)
+        assert callable(function)
+        for section in ("Parameters", "Returns", "Raises"):
+            assert section in function.__doc__ or "Parameters are those of" in function.__doc__
+    assert set(pipeline.__all__) <= set(dir(pipeline))
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'datasheet'"):
+        pipeline.datasheet  # noqa: B018
+
+
+def test_functions_stay_functions_whatever_is_imported():
+    """A package of the same name would replace one as soon as it is imported."""
+    code = (
+        "import pipeline, pkgutil, importlib\n"
+        "for m in pkgutil.walk_packages(pipeline.__path__, 'pipeline.'):\n"
+        "    if not m.name.endswith('__main__'): importlib.import_module(m.name)\n"
+        "assert all(callable(getattr(pipeline, n)) for n in pipeline.__all__)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=environment, check=True)
+
+
+def test_importing_the_package_imports_no_library():
+    code = "import pipeline, sys; print(sorted({'numpy', 'polars', 'scipy'} & set(sys.modules)))"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, check=True
+    )
+    assert done.stdout.strip() == b"[]"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_in_docstrings_run(name, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    module = importlib.import_module(f"pipeline.api.{name}")
+    result = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert result.failed == 0
+
+
+def test_a_run_and_the_functions_give_the_same_datasheet(recordings, fits, tmp_path):
+    """To the byte: version, constants, checks and reasons."""
+    captures = tmp_path / "captures"
+    shutil.copytree(DEMO / MOTOR, captures / MOTOR)
+    sheet = pipeline.check(fits)[MOTOR]
+    output = tmp_path / "out"
+    words = ["recordings=false", "report=false", "workers=1"]
+    assert main(["run", f"input={captures}", f"output={output}", *words]) in (0, 1)
+    written = json.loads((output / "datasheets" / f"{MOTOR}.json").read_text())
+    assert json.loads(json.dumps(sheet.document())) == written
+    loaded = pipeline.load(output)
+    assert loaded[MOTOR] == sheet or loaded[MOTOR].document() == sheet.document()
+    assert loaded.constants.filter(pl.col("motor_id") == MOTOR).equals(
+        pipeline.check(fits).constants
+    )
+
+
+def test_frames_are_tidy_and_agree_with_the_records(recordings, fits):
+    constants = fits.constants
+    assert constants.select("motor_id", "constant").is_unique().all()
+    for row in constants.iter_rows(named=True):
+        estimate = fits[MOTOR].constants.chosen()[row["constant"]]
+        assert row["value"] == (None if estimate.value is None else float(estimate.value))
+        if estimate.known and estimate.u > 0:
+            assert row["low_95"] < row["value"] < row["high_95"]
+    rows = recordings.captures
+    assert rows.height == len(recordings[MOTOR].captures)
+    assert rows["rows"].sum() == sum(t.height for c in recordings[MOTOR].captures for t in c.tables)
+    residuals = fits.residuals.filter(pl.col("fitted").is_finite())
+    difference = residuals["measured"] - residuals["fitted"] - residuals["residual"]
+    assert difference.abs().max() == 0.0
+
+
+def test_part_of_the_recordings(recordings):
+    few = recordings.only(tests=("spin_down",))
+    assert set(few.captures["test"]) == {"spin_down"}
+    assert len(recordings.only(motor="nobody")) == 0
+    with pytest.raises(KeyError):
+        recordings.signals("no/such/capture.csv")
+
+
+def test_a_plot_is_a_document_of_its_own(fits, tmp_path):
+    from xml.etree import ElementTree as Xml
+
+    (first, *_) = fits.plot("current_step")
+    path = first.save(tmp_path / "plot.svg")
+    assert Xml.parse(path).getroot().tag == "{http://www.w3.org/2000/svg}svg"
+    assert "data:image/svg+xml;base64," in first._repr_html_()
+    with pytest.raises(KeyError, match="no plot of nothing"):
+        fits.plot("nothing")
+
+
+def test_what_is_wrong_is_said():
+    with pytest.raises(UsageError, match="no capture of motor nobody"):
+        pipeline.read(DEMO, motor="nobody")
+    with pytest.raises(UsageError, match="no such estimator"):
+        pipeline.fit(pipeline.simulate(exact=True).only(tests=("lcr",)), options={"nothing": {}})
+    with pytest.raises(UsageError, match="no model 'perfect'"):
+        pipeline.compare(pipeline.simulate().only(tests=("lcr",)), "perfect")
+
+
+def test_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recordings = pipeline.simulate(seed=2)
+    pipeline.check(pipeline.fit(recordings))
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,101 @@
+"""Methods of one constant that contradict each other: wide, withheld, or left alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from pipeline.crosscheck.judge import ratio_of
+from pipeline.estimation.agreement import judges, reconciled
+from pipeline.estimation.registry import fit_all
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from pipeline.records.uncertainty import METHODS, propagate, type_a, type_b
+from pipeline.simulator.catalogue import with_effects
+from tests.recovery.simulated import BENCH, MOTOR, recorded
+
+GAIN = type_b("current@rig", 0.02)
+
+
+def of(method: str, value: float, u: float, name: str = "r_phase_ohm", **at: float) -> Estimate:
+    """An estimate of 1 Ω or so with scatter of its own and the rig's gain of 2 %."""
+    budget = propagate([(1.0, type_a(f"scatter:{method}", u, 50.0)), (value, GAIN)])
+    return Estimate(name, value, "ohm", "measured", method, budget, at)
+
+
+def part(estimate: Estimate) -> float:
+    """What the methods' disagreement adds to u."""
+    return math.hypot(*(p.u for p in estimate.budget if p.source.startswith(METHODS)))
+
+
+def test_methods_that_disagree_widen_each_other_and_are_named() -> None:
+    """1.00 and 1.05, ± 0.005 each beside a common gain of 2 %: 0.05 is clear, the gain cancels."""
+    best, other = of("bridge", 1.0, 0.005), of("drive", 1.05, 0.005)
+    found = reconciled(Constants((best, other))).best("r_phase_ohm")
+    assert found is not None
+    assert part(found) == pytest.approx(0.05 / math.sqrt(2.0), rel=0.05)
+    assert "bridge 1 ±" in found.note
+    assert "drive 1.05 ±" in found.note
+    low, high = found.interval()
+    assert low < 1.05 < high
+
+
+def test_methods_that_share_what_parts_them_agree() -> None:
+    """0.05 apart with gains of two rigs, each ± 2 %: by chance; of one rig: not."""
+    best, other = of("bridge", 1.0, 0.005), of("drive", 1.05, 0.005)
+    elsewhere = tuple(
+        replace(p, source="current@far") if p.source == "current@rig" else p for p in other.budget
+    )
+    found = reconciled(Constants((best, replace(other, budget=elsewhere)))).best("r_phase_ohm")
+    assert found == best
+
+
+def test_a_rough_method_says_nothing_of_a_precise_one() -> None:
+    rough = Estimate("r_phase_ohm", 2.0, "ohm", "measured", "drive", type_a("d", 0.25, 50.0))
+    best = of("bridge", 1.0, 0.005)
+    assert judges(Constants((best, rough)), best) == []
+    assert judges(Constants((best, rough)), rough) == [best]
+    kept = reconciled(Constants((best, rough))).estimates
+    assert kept[0] == best
+    assert part(kept[1]) > 0.0
+
+
+def test_drag_at_creep_speed_is_not_held_against_drag_at_full_speed() -> None:
+    name = "torque_coulomb_nm"
+    fast = of("inertia", 1.0, 0.005, name, omega_mech_rad_s=300.0)
+    creep = of("cogging", 1.5, 0.005, name, omega_mech_rad_s=0.5)
+    nearer = of("torque_map", 1.5, 0.005, name, omega_mech_rad_s=100.0)
+    assert reconciled(Constants((fast, creep))).best(name) == fast
+    assert reconciled(Constants((fast, nearer))).best(name) != fast
+
+
+def test_a_check_still_sees_what_widened_its_constants() -> None:
+    """Kt 2 % above 1.5 p psi: Kt is widened, the ratio is judged as it was."""
+    kt = Estimate("kt_peak_nm_a", 0.102, "N·m/A", "measured", "torque_map", type_b("t", 2e-4))
+    ke = Estimate("kt_from_ke_nm_a", 0.1, "N·m/A", "derived", "derived", type_b("v", 1e-4))
+    found = reconciled(Constants((kt, ke)))
+    wide = found.best("kt_peak_nm_a")
+    assert wide is not None
+    assert wide.interval()[0] < 0.1
+    assert found.best("kt_from_ke_nm_a") == ke
+    assert ratio_of(wide, ke) == pytest.approx(ratio_of(kt, ke))
+
+
+def test_torque_constant_off_with_a_transducer_off_is_never_stated_narrow() -> None:
+    """A transducer 2 % off beyond its stated 0.2 %: before, Kt ± 0.3 % and 2 % from the truth."""
+    motor = with_effects(MOTOR, "[torque_scale=0.02]")
+    plan = (
+        ("torque_map_0", "torque_map", {"speed": 0.3}),
+        ("torque_map_1", "torque_map", {"speed": -0.3}),
+        ("open_circuit", "open_circuit", {}),
+    )
+    campaign, _ = recorded(plan, 3, motor, BENCH)
+    found = fit_all(campaign, {})[0].best("kt_peak_nm_a")
+    true = 1.5 * MOTOR.pole_pairs * MOTOR.psi_pm_wb
+    assert found is not None
+    assert found.number / true - 1.0 > 0.012
+    low, high = found.interval()
+    assert low < true < high
+    assert "methods disagree" in found.note

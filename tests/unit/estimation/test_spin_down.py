@@ -1,0 +1,58 @@
+"""Coast-downs written out in closed form: what comes before them, and which sensor sees them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.estimation.estimators.spin_down import ESTIMATOR
+from pipeline.estimation.shaft_rows import shaft_rows
+from pipeline.numerics.coasting import coast_down, coasting_rows
+from pipeline.records.capture import Capture
+from tests.unit.estimation.signals import capture, estimates
+
+COULOMB_RAD_S2, VISCOUS_1_S = 20.0, 0.5
+
+
+def coast(held_s: float, *, angle: bool) -> Capture:
+    """From 100 rad/s to rest after `held_s` at that speed; dw/dt = -20 - 0.5 w."""
+    rng = np.random.default_rng(2)
+    t = np.arange(0.0, 6.0 + held_s, 1e-3)
+    free = np.maximum(t - held_s, 0.0)
+    theta, omega = coast_down(free, 100.0, lambda w: COULOMB_RAD_S2 + VISCOUS_1_S * w)
+    theta = theta + 100.0 * np.minimum(t, held_s)
+    columns = {"t_s": t, "omega_mech_rad_s": omega + 0.05 * rng.standard_normal(t.size)}
+    if angle:
+        columns["theta_mech_rad"] = theta + 1e-4 * rng.standard_normal(t.size)
+    return capture("spin_down", **columns)
+
+
+@pytest.mark.parametrize("held_s", [0.0, 1.0])
+@pytest.mark.parametrize("angle", [True, False])
+def test_the_coast_alone_counts_by_encoder_or_tachometer(held_s: float, angle: bool) -> None:
+    """A zero error of the tachometer would be T_c/B in disguise: it is not fitted."""
+    found = estimates(ESTIMATOR, coast(held_s, angle=angle))
+    truths = {"coast_coulomb_rad_s2": COULOMB_RAD_S2, "coast_viscous_1_s": VISCOUS_1_S}
+    for name, truth in truths.items():
+        assert abs(found[name].number - truth) < 4.0 * found[name].u
+        assert found[name].u < 2e-3 * truth
+
+
+def test_a_shaft_that_is_held_shows_no_drag_to_the_inertia() -> None:
+    """Every row that is left obeys the coast's own law; those of a second at speed are dropped."""
+    rows = shaft_rows((coast(1.0, angle=True),), {})
+    whole = shaft_rows((coast(0.0, angle=True),), {})
+    assert rows is not None
+    assert whole is not None
+    law = -COULOMB_RAD_S2 - VISCOUS_1_S * rows.speed_rad_s
+    assert rows.acceleration_rad_s2 == pytest.approx(law, rel=0.01)
+    assert rows.dropped > whole.dropped
+
+
+def test_every_coast_of_a_record_begins_where_its_speed_is_last_the_highest() -> None:
+    """Up, held, down to rest; then the other way round; then too slow to be a coast."""
+    up, held = np.linspace(0.0, 1.0, 101), np.ones(50)
+    once = np.concatenate([up, held, up[::-1], np.zeros(10)])
+    found = coasting_rows(np.concatenate([80.0 * once, -100.0 * once, 3.0 * once]))
+    assert found == [(slice(151, 251), 1), (slice(413, 513), -1)]
+    assert coasting_rows(np.zeros(9)) == []

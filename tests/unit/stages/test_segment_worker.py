@@ -1,0 +1,153 @@
+"""Work on segments shared with a second process: the same results, whatever befalls it."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from multiprocessing import parent_process
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.each import by_threads, on_each
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.floors import form_tolerance, noise_floor
+from pipeline.criticism.model import Model, zero
+from pipeline.criticism.registry import effects
+from pipeline.criticism.segments import segments
+from pipeline.execution.pools import core_count
+from pipeline.execution.segment_worker import halves, mate
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from tests.unit.criticism.machines import BASE, machine
+
+two_cores = pytest.mark.skipif(core_count() < 2, reason="a second worker needs a second core")
+
+
+def workers(test):
+    """A test that starts worker processes, where there is a core for one."""
+    return pytest.mark.workers(two_cores(test))
+
+
+def slow_turn(number: int) -> Capture:
+    t = np.arange(16_000 + 4_000 * number) * 1e-3
+    theta = 2 * np.pi * t / 8.0
+    torque = 0.01 * np.sin(84 * theta) + np.random.default_rng(number).normal(0, 1e-4, t.size)
+    table = pl.DataFrame({"t_s": t, "theta_mech_rad": theta, "torque_shaft_nm": torque})
+    return Capture(f"{number}.mcap", "0", "verified", CaptureMeta("m", "cogging"), (table,))
+
+
+@pytest.fixture(scope="module")
+def found():
+    return segments(Campaign("m", tuple(slow_turn(n) for n in range(4))), machine())
+
+
+def whose(segment, _) -> bool:
+    """Whether a worker did it."""
+    return parent_process() is not None
+
+
+def fallen(segment, _) -> float:
+    """Ends the worker; here it is a number."""
+    if parent_process() is not None:
+        os._exit(3)
+    return segment.recorded["torque_shaft_nm"].sum()
+
+
+def broken(segment, _) -> float:
+    raise ZeroDivisionError(segment.capture)
+
+
+@workers
+def test_floors_are_the_same_bits_and_in_order(found) -> None:
+    cogging = effects()["cogging"]
+    model = Model(machine(), (cogging,))
+    arguments = [(model, {**BASE, **zero(cogging, model)}, seed) for seed in range(len(found))]
+    alone = by_threads(noise_floor, found, arguments)
+    with mate(None) as second, second.campaign():
+        for _ in range(2):  # the second time the worker has the segments already
+            for one, two in zip(alone, on_each(noise_floor, found, arguments), strict=True):
+                np.testing.assert_array_equal(one, two)
+
+
+@workers
+def test_half_of_the_samples_are_the_workers(found) -> None:
+    with mate(None) as second, second.campaign():
+        theirs = on_each(whose, found, [(0,)] * len(found))
+    sizes = np.array([one.size for one in found])
+    assert 0.4 < sizes[np.array(theirs)].sum() / sizes.sum() < 0.6
+    assert not any(on_each(whose, found, [(0,)] * len(found)))
+
+
+def slow(segment, _) -> bool:
+    """Takes its time over the first capture, and tells whether a worker did it."""
+    until = time.thread_time() + (0.4 if segment.capture == "0.mcap" else 0.01)
+    while time.thread_time() < until:
+        pass
+    return parent_process() is not None
+
+
+@workers
+def test_shares_are_by_the_time_that_segments_took(found) -> None:
+    with mate(None) as second, second.campaign():
+        on_each(slow, found, [(0,)] * len(found))
+        first, *others = on_each(slow, found, [(0,)] * len(found))
+    assert all(other is not first for other in others)
+
+
+@workers
+def test_a_user_s_effect_from_a_folder_goes_along(found, tmp_path) -> None:
+    (tmp_path / "tenth.py").write_text(
+        "from pipeline.criticism.effects.coulomb_friction import EFFECT as KNOWN\n"
+        "from dataclasses import replace\n"
+        "def torque(x, q):\n"
+        "    return 0.1 * q['torque_nm'] * x.omega_rad_s\n"
+        "EFFECT = replace(KNOWN, name='tenth', torque=torque)\n"
+    )
+    tenth = effects(str(tmp_path))["tenth"]
+    assert _tolerances_shared(found, tenth, str(tmp_path))
+
+
+@workers
+def test_an_effect_that_cannot_travel_is_worked_on_here(found) -> None:
+    lambdas = replace(
+        effects()["coulomb_friction"], torque=lambda x, q: q["torque_nm"] * x.omega_rad_s
+    )
+    assert not _tolerances_shared(found, lambdas, None)
+
+
+def _tolerances_shared(found, effect: Effect, path: str | None) -> bool:
+    """Whether the worker is in use after work on an effect, which must come out right."""
+    model = Model(machine(), (effect,))
+    values = {**BASE, **zero(effect, model), f"{effect.name}.torque_nm": 0.02}
+    arguments = [(model, values, (effect,))] * len(found)
+    alone = by_threads(form_tolerance, found, arguments)
+    with mate(path) as second, second.campaign():
+        for one, two in zip(alone, on_each(form_tolerance, found, arguments), strict=True):
+            np.testing.assert_array_equal(one, two)
+            assert one.max() > 0
+        return any(on_each(whose, found, [(0,)] * len(found)))
+
+
+@workers
+def test_the_death_of_the_worker_loses_nothing(found) -> None:
+    with mate(None) as second, second.campaign():
+        sums = on_each(fallen, found, [(0,)] * len(found))
+        assert sums == tuple(one.recorded["torque_shaft_nm"].sum() for one in found)
+        assert not any(on_each(whose, found, [(0,)] * len(found)))
+
+
+def test_an_error_of_the_work_itself_is_raised(found) -> None:
+    with (
+        mate(None) as second,
+        second.campaign(),
+        pytest.raises(ZeroDivisionError, match=r"\.mcap"),
+    ):
+        on_each(broken, found, [(0,)] * len(found))
+
+
+def test_halves_balance_what_is_large() -> None:
+    one, two = halves([5, 1, 9, 3, 4, 2])
+    assert sorted(one + two) == [0, 1, 2, 3, 4, 5]
+    assert sum([5, 1, 9, 3, 4, 2][n] for n in one) == 12
