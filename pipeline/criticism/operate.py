@@ -200,8 +200,10 @@ def ahead_in(
     log, rows = segment.log, segment.recorded.get("t_s")
     if not log or rows is None:
         return None
-    period = float(rows[1] - rows[0])
-    at = np.rint(rows / period)
+    steps = np.diff(rows)
+    if not (steps > 0.0).any():
+        return None
+    at = np.rint(rows / float(np.median(steps[steps > 0.0])))
 
     def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
         later = at + delay_s / segment.ts_s

@@ -42,7 +42,10 @@ def test_what_one_day_lacks_the_other_gives(bench: Path, tmp_path: Path) -> None
 
 
 def test_a_repeated_day_narrows_the_scatter_and_not_the_gain(tmp_path: Path) -> None:
-    """Steps recorded on two days with the same instruments: u_a falls by sqrt(2), u_b stays."""
+    """Steps recorded on two days with the same instruments: u_a falls by about sqrt(2), u_b stays.
+
+    What captures scatter among themselves is in u_a; of six captures that is known to 30 %.
+    """
     for seed, day in ((7, "one"), (8, "two")):
         words = ["motor=gimbal-5208", "motor_id=m", f"seed={seed}", "exact=true"]
         assert main(["simulate", f"output={tmp_path / 'all' / day}", *words]) == 0
@@ -53,5 +56,5 @@ def test_a_repeated_day_narrows_the_scatter_and_not_the_gain(tmp_path: Path) -> 
     once = sheet_of(tmp_path / "in" / "one", tmp_path / "o")["constants"]["ld_h"]
     twice = sheet_of(tmp_path / "in", tmp_path / "b")["constants"]["ld_h"]
     assert twice["u_b"] == pytest.approx(once["u_b"], rel=0.05)
-    assert twice["u_a"] == pytest.approx(once["u_a"] / math.sqrt(2.0), rel=0.15)
+    assert twice["u_a"] == pytest.approx(once["u_a"] / math.sqrt(2.0), rel=0.3)
     assert len(twice["captures"]) == 2 * len(once["captures"])

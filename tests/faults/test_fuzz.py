@@ -34,10 +34,11 @@ def test_hostile_numbers_and_texts_in_every_field_of_every_form() -> None:
 
 
 def test_a_run_over_hostile_folders_refuses_them_and_nothing_more(tmp_path: Path) -> None:
-    """Never 5, no traceback, no motor that could not be finished."""
+    """Never 5, no traceback, no motor that could not be finished; 1 where a check fails as well."""
     numbers = range(5000, 5000 + 3 * len(grammar.FORMS))
     code, odd = fuzz.fuzz_command(numbers, tmp_path, "recordings=false")
-    assert (code, odd) == (3, [])
+    assert odd == []
+    assert code in (1, 3)
 
 
 @pytest.mark.slow

@@ -280,7 +280,7 @@ def test_every_python_gives_the_same_digest() -> None:
 def test_datasheets_hang_on_every_plug_in_and_on_nothing_that_shows_them() -> None:
     closure = own_code().closure(WORK)
     root = Path(pipeline.__file__).parent
-    for room in ("fit/estimators", "contracts/gates", "crosscheck/rules", "io/readers"):
+    for room in ("estimation/estimators", "contracts/gates", "crosscheck/rules", "io/readers"):
         home = f"pipeline.{room.replace('/', '.')}"
         plug_ins = {f"{home}.{p.stem}" for p in (root / room).glob("*.py")} - {f"{home}.__init__"}
         assert plug_ins and plug_ins <= closure
@@ -317,7 +317,7 @@ def test_of_the_package_what_a_datasheet_hangs_on_changes_its_version(tmp_path: 
 
     work, everything = versions()
     assert work == own_code().digest(WORK), "the same wherever the package lies"
-    for file in ("numerics/least_squares.py", "fit/formulas.py", "records/estimate.py"):
+    for file in ("numerics/least_squares.py", "estimation/formulas.py", "records/estimate.py"):
         (root / file).write_text(f"# a word\n{(root / file).read_text()}")
     assert versions() == (work, everything)
     edit("simulator/plant.py", "\n\n", "\n\nMORE = 1\n")

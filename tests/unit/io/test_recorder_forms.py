@@ -83,6 +83,8 @@ def tdms() -> bytes:
 
 
 def mdf4() -> bytes:
+    why = "asammdf brings pandas, which slows every start: installed by hand to run this test"
+    pytest.importorskip("asammdf", reason=why)
     from asammdf import MDF, Signal
 
     buffer = io.BytesIO()
