@@ -16,6 +16,7 @@ def recordings():
     return pipeline.simulate("gimbal-5208", ["stribeck"], seed=3, exact=True).only(tests=STEPS)
 
 
+@pytest.mark.slow  # the second notebook goes the same way in the default run
 def test_a_hidden_effect_is_found_added_and_gone(recordings):
     diagnoses = pipeline.diagnose(recordings, effects=["cogging"])
     motor = recordings.motors[0]

@@ -61,6 +61,7 @@ def test_smooth_speed_is_the_slope(jitter: float) -> None:
     assert speed[inner] == pytest.approx((250.0 - 80.0 * t)[inner], rel=5e-4)
 
 
+@pytest.mark.slow
 def test_smooth_speed_of_a_long_record_is_that_of_a_short_one() -> None:
     """After ten minutes at 10 kHz a window adds less than a sum over the record is rounded to."""
     t = np.arange(6_000_000) * 1e-4
