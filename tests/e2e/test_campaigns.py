@@ -14,7 +14,13 @@ from pipeline.__main__ import main
 
 
 def sheet_of(folder: Path, output: Path) -> dict[str, Any]:
-    words = ["report=false", "recordings=false", "registry=null", "workers=1"]
+    words = [
+        "report=false",
+        "recordings=false",
+        "residual_test=false",
+        "registry=null",
+        "workers=1",
+    ]
     assert main(["run", f"input={folder}", f"output={output}", *words]) in (0, 4)
     (path,) = (output / "datasheets").iterdir()
     sheet: dict[str, Any] = json.loads(path.read_bytes())

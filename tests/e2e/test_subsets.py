@@ -122,6 +122,7 @@ def test_intervals_of_a_few_subsets_hold():
     judged(of_the_simulator(range(4), QUICK), 10)
 
 
+@pytest.mark.slow
 @needs_p0
 def test_intervals_of_a_few_subsets_of_the_rig_hold():
     judged(of_the_rig(range(4), QUICK), 10)

@@ -16,7 +16,7 @@ from pathlib import Path
 from pipeline.io.registry import Registry
 from tests.faults.fleet import ROOT, command, family
 
-WORDS = ("report=true", "recordings=false", "workers=1")
+WORDS = ("report=true", "recordings=false", "residual_test=false", "workers=1")
 
 
 def begin(

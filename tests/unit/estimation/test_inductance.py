@@ -153,6 +153,7 @@ def test_a_step_of_another_clock_is_named_and_no_number_is_made_of_it():
         assert captures[1].path in estimate.note and captures[0].path not in estimate.note
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 def test_no_number_is_made_of_a_search_for_l_that_fits_no_step(monkeypatch):
     """Fault: one clock off by a thousand. Unbounded, an edge runs off and the current overflows."""
