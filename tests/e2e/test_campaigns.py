@@ -50,8 +50,8 @@ def test_what_one_day_lacks_the_other_gives(bench: Path, tmp_path: Path) -> None
 def test_a_repeated_day_narrows_the_scatter_and_not_the_gain(tmp_path: Path) -> None:
     """Steps recorded on two days with the same instruments: u_a falls by about sqrt(2), u_b stays.
 
-    What captures scatter among themselves is in u_a, so the ratio is no exact one; 0.58 was measured
-    for these two seeds, and the width of 0.3 is chosen by it, not derived.
+    What captures scatter among themselves is in u_a, so the ratio is no exact one. 0.58 was
+    measured for these two seeds; the width of 0.3 is chosen by it, not derived.
     """
     for seed, day in ((7, "one"), (8, "two")):
         words = ["motor=gimbal-5208", "motor_id=m", f"seed={seed}", "exact=true"]
