@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from pipeline.io.datasheets import read_datasheets
+from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.records.datasheet import Datasheet
 
 EXPECTED = {("G52-1402", "resistance_balance")}

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from multiprocessing.connection import Connection
 from typing import Any
 
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from pipeline.records.datasheet import AWAITS_APPROVAL, CaptureReference, Datasheet, DatasheetStatus
 from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.uncertainty import type_a, type_b

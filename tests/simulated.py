@@ -8,7 +8,7 @@ from functools import cache
 
 import polars as pl
 
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.settings import configuration_folder
 from pipeline.simulator.catalogue import motor_from

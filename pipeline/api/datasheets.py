@@ -16,9 +16,9 @@ from pipeline.api.recordings import Options
 from pipeline.execution import work
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.stamp import configuration_digest, stamp_of
-from pipeline.io.datasheets import read_datasheets
-from pipeline.io.diagnoses import read_diagnoses
-from pipeline.io.limits import limits_file, required_constants
+from pipeline.io.storage.datasheets import read_datasheets
+from pipeline.io.storage.diagnoses import read_diagnoses
+from pipeline.io.storage.limits import limits_file, required_constants
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.outcome import Stopwatch

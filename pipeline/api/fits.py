@@ -14,7 +14,7 @@ from pipeline.api.figure import Figure, figure
 from pipeline.api.options import check_options
 from pipeline.api.recordings import Options, Recordings
 from pipeline.estimation.registry import Failure, fit_all
-from pipeline.io.source_map import SourceMap
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.evidence import Evidence

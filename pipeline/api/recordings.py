@@ -11,10 +11,10 @@ import polars as pl
 
 from pipeline.api import frames
 from pipeline.execution.captures import ReadTask, usable_captures
-from pipeline.io.files import input_folder
-from pipeline.io.guard import ReadLimits
-from pipeline.io.source_map import SourceMap, find_map, load_source_maps
-from pipeline.io.survey import Entry, survey
+from pipeline.io.ingest.files import input_folder
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Entry, survey
+from pipeline.io.maps.source_map import SourceMap, find_map, load_source_maps
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import UsageError
 from pipeline.records.finding import Finding

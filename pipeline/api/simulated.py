@@ -12,8 +12,8 @@ import polars as pl
 
 from pipeline.api.recordings import Options, Recordings
 from pipeline.contracts.validate import validate
-from pipeline.io.metadata import capture_meta
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.ingest.metadata import capture_meta
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pipeline.io.files import size_bytes
-from pipeline.io.guard import ReadLimits, died, reading, refusing
-from pipeline.io.survey import Entry
+from pipeline.io.ingest.files import size_bytes
+from pipeline.io.ingest.guard import ReadLimits, died, reading, refusing
+from pipeline.io.ingest.survey import Entry
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 from pipeline.records.finding import Finding
@@ -44,7 +44,7 @@ def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
     """The captures that hold, by path, and what was refused or doubtful."""
     from pipeline.contracts.duplicates import once
     from pipeline.contracts.validate import validate
-    from pipeline.io.ingest import read_capture
+    from pipeline.io.ingest.capture_reader import read_capture
 
     watch = watch or Stopwatch()
     captures: list[Capture] = []

@@ -19,7 +19,7 @@ from typing import Any, Protocol, Self
 
 from pipeline.execution.pools import OpenPool, Pool
 from pipeline.execution.task import LOGGER, Report, perform
-from pipeline.io.guard import LastWords, last_words
+from pipeline.io.ingest.guard import LastWords, last_words
 from pipeline.records.errors import MachineError, PipelineError
 
 RERUN = "what was finished is kept: run the same command again to go on"

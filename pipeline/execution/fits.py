@@ -26,8 +26,8 @@ from pipeline.execution.jobs import MotorJob
 from pipeline.execution.keeping import FOLDER
 from pipeline.execution.keys import fit_parts, key_of
 from pipeline.execution.work import Stamp
-from pipeline.io.code_version import closure_digest, libraries_version
-from pipeline.io.publish import write_whole
+from pipeline.io.storage.code_version import closure_digest, libraries_version
+from pipeline.io.storage.publish import write_whole
 from pipeline.records.constants import Constants
 from pipeline.records.errors import PipelineError
 from pipeline.records.estimate import Estimate, Order

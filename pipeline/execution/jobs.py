@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from pipeline.io.guard import ReadLimits
-from pipeline.io.survey import Entry
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Entry
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation

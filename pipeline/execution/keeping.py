@@ -17,11 +17,11 @@ from typing import Any
 from pipeline.execution.jobs import Files, Finished
 from pipeline.execution.keys import answer_parts, key_of
 from pipeline.execution.versions import LOOK, tools
-from pipeline.io.guard import ReadLimits
-from pipeline.io.identity import Identities, Identity, identity, notes_folder
-from pipeline.io.sealed import keep_sealed, read_sealed
-from pipeline.io.source_map import SourceMap
-from pipeline.io.survey import Answer, Entry, Question
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Answer, Entry, Question
+from pipeline.io.maps.source_map import SourceMap
+from pipeline.io.storage.identity import Identities, Identity, identity, notes_folder
+from pipeline.io.storage.sealed import keep_sealed, read_sealed
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome

@@ -13,9 +13,9 @@ from dataclasses import fields
 from typing import Any
 
 from pipeline.execution.jobs import MotorJob
-from pipeline.io.guard import ReadLimits
-from pipeline.io.source_map import SourceMap
-from pipeline.io.survey import Question, Survey
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Question, Survey
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.content import content_digest

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipeline.execution.crew import Crew
-from pipeline.io.files import size_bytes
-from pipeline.io.guard import ReadLimits, died, reading
-from pipeline.io.source_map import SourceMap
-from pipeline.io.survey import Answer, Question, look
+from pipeline.io.ingest.files import size_bytes
+from pipeline.io.ingest.guard import ReadLimits, died, reading
+from pipeline.io.ingest.survey import Answer, Question, look
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.errors import CaptureError, MachineError
 from pipeline.records.finding import Finding
 

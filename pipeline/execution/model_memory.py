@@ -8,8 +8,8 @@ from pipeline.execution.jobs import MotorJob
 from pipeline.execution.keeping import FOLDER
 from pipeline.execution.keys import key_of, model_parts
 from pipeline.execution.work import Stamp
-from pipeline.io.code_version import closure_digest, libraries_version
-from pipeline.io.sealed import keep_sealed, read_sealed
+from pipeline.io.storage.code_version import closure_digest, libraries_version
+from pipeline.io.storage.sealed import keep_sealed, read_sealed
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.model_verdict import ModelVerdict

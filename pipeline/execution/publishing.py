@@ -12,9 +12,9 @@ from pathlib import Path
 
 from pipeline.execution.jobs import Files, MotorResult
 from pipeline.execution.statuses import Statuses
-from pipeline.io.datasheets import read_datasheet
-from pipeline.io.publish import canonical_json, partial_owner, write_whole
-from pipeline.io.survey import Survey
+from pipeline.io.ingest.survey import Survey
+from pipeline.io.storage.datasheets import read_datasheet
+from pipeline.io.storage.publish import canonical_json, partial_owner, write_whole
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted

@@ -9,8 +9,8 @@ from pipeline.execution.jobs import MotorJob
 from pipeline.execution.keys import handed, key_of, version_parts
 from pipeline.execution.versions import datasheet_code, datasheet_libraries
 from pipeline.execution.work import Stamp
-from pipeline.io.publish import canonical_json
-from pipeline.io.source_map import SourceMap
+from pipeline.io.maps.source_map import SourceMap
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
 from pipeline.records.content import content_digest
 from pipeline.settings import RunSettings, result_document

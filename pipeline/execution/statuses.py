@@ -14,9 +14,9 @@ from pathlib import Path
 
 from pipeline.execution.jobs import Files, MotorResult
 from pipeline.execution.keeping import note_files
-from pipeline.io.datasheets import read_datasheet
-from pipeline.io.publish import write_whole
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
+from pipeline.io.storage.datasheets import read_datasheet
+from pipeline.io.storage.publish import write_whole
 from pipeline.records.current_status import CurrentStatus, current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import PipelineError

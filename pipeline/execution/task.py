@@ -15,7 +15,7 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, NoReturn
 
-from pipeline.io.guard import crumbs
+from pipeline.io.ingest.guard import crumbs
 from pipeline.records.errors import PipelineError
 
 LOGGER = "pipeline"

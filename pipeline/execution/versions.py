@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.io.code_version import closure_digest, code_version, libraries_version
+from pipeline.io.storage.code_version import closure_digest, code_version, libraries_version
 
 WORK = "pipeline.execution.work"
 """What makes datasheets."""

@@ -19,7 +19,7 @@ from pipeline.estimation.registry import Recall, fit_all
 from pipeline.execution.captures import ReadTask, Usable, usable_captures
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.model_tests import Verdicts, judged_model
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.agreement import Disagreement
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants

@@ -15,10 +15,10 @@ from pipeline.execution.captures import ReadTask, usable_captures
 from pipeline.execution.crew import Crew
 from pipeline.execution.looking import look_with
 from pipeline.execution.pools import Cluster, core_count, open_pool
-from pipeline.io.files import input_folder
-from pipeline.io.guard import ReadLimits
-from pipeline.io.source_map import find_map, load_source_maps
-from pipeline.io.survey import Entry, Survey, survey
+from pipeline.io.ingest.files import input_folder
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Entry, Survey, survey
+from pipeline.io.maps.source_map import find_map, load_source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from pipeline.execution.segment_worker import mate
 from pipeline.execution.start import start_constants
-from pipeline.io.files import input_folder
-from pipeline.io.guard import ReadLimits
-from pipeline.io.publish import output_folder
+from pipeline.io.ingest.files import input_folder
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.storage.publish import output_folder
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

@@ -7,8 +7,8 @@ from pathlib import Path
 from pipeline.estimation.registry import estimators
 from pipeline.export.protocol import Exporter, Source
 from pipeline.export.registry import exporters
-from pipeline.io.publish import output_folder, write_whole
-from pipeline.io.registry import Registry, one_of
+from pipeline.io.registry.store import Registry, one_of
+from pipeline.io.storage.publish import output_folder, write_whole
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Selection, Version, in_force

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from pipeline.execution.crew import Crew
 from pipeline.execution.pools import Cluster, open_pool
-from pipeline.io.files import size_bytes
-from pipeline.io.guard import ReadLimits, died, reading
+from pipeline.io.ingest.files import size_bytes
+from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
 from pipeline.records.errors import CaptureError, MachineError, UsageError
 from pipeline.records.finding import Finding
@@ -20,9 +20,9 @@ from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings, configuration_folder
 
 if TYPE_CHECKING:
-    from pipeline.io.inspect_file import InspectReport
-    from pipeline.io.source_map import SourceMap
-    from pipeline.io.starter_map import FieldSeen
+    from pipeline.io.inspection.describe import InspectReport
+    from pipeline.io.inspection.starter_map import FieldSeen
+    from pipeline.io.maps.source_map import SourceMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +68,8 @@ def look_into(task: InspectTask) -> tuple[str, tuple[str, ...]]:
 
     In a worker, under its limits.
     """
-    from pipeline.io.inspect_file import describe
-    from pipeline.io.source_map import load_source_maps
+    from pipeline.io.inspection.describe import describe
+    from pipeline.io.maps.source_map import load_source_maps
 
     if task.refused is not None:
         raise died(task.refused)
@@ -87,8 +87,8 @@ def look_into(task: InspectTask) -> tuple[str, tuple[str, ...]]:
 def _refusals(path: Path, sources: Mapping[str, SourceMap]) -> tuple[Finding, ...]:
     """Why `run` would refuse a file by itself; nothing of one that it leaves alone."""
     from pipeline.contracts.validate import validate
-    from pipeline.io.ingest import read_capture
-    from pipeline.io.survey import look, question_of
+    from pipeline.io.ingest.capture_reader import read_capture
+    from pipeline.io.ingest.survey import look, question_of
 
     answer = look(path.parent, question_of(path), sources)
     if answer.entry is None:

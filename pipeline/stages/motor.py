@@ -15,7 +15,7 @@ from pipeline.execution.keeping import note_motor
 from pipeline.execution.keys import key_of, superseding_parts
 from pipeline.execution.model_memory import ModelMemory
 from pipeline.execution.stamp import stamp_of
-from pipeline.io.publish import together
+from pipeline.io.storage.publish import together
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import Datasheet, Superseded
 from pipeline.records.evidence import Evidence

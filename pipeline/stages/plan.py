@@ -7,9 +7,9 @@ from pathlib import Path
 from pipeline.crosscheck.plan import Aims, Known, Plan, Way, make_plan
 from pipeline.crosscheck.registry import check_all, rules
 from pipeline.estimation.registry import estimators, fit_all
-from pipeline.io.datasheets import read_datasheets
-from pipeline.io.guard import ReadLimits
-from pipeline.io.limits import limits_file, required_constants
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.storage.datasheets import read_datasheets
+from pipeline.io.storage.limits import limits_file, required_constants
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, time
 from typing import Literal
 
 from pipeline.execution.statuses import show_decision
-from pipeline.io.registry import Registry, one_of
+from pipeline.io.registry.store import Registry, one_of
 from pipeline.lots.selector import OF_CONTENT, known, parse_selector
 from pipeline.records.current_status import status_of
 from pipeline.records.difference import changes

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.estimation.registry import estimators
-from pipeline.io.diagnoses import read_diagnoses
-from pipeline.io.limits import limits_file, read_limits
-from pipeline.io.publish import canonical_json, output_folder, write_whole
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
+from pipeline.io.storage.diagnoses import read_diagnoses
+from pipeline.io.storage.limits import limits_file, read_limits
+from pipeline.io.storage.publish import canonical_json, output_folder, write_whole
 from pipeline.lots.code import compare_versions
 from pipeline.lots.limits_lint import lint
 from pipeline.lots.regression import compare_lots

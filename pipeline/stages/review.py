@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.execution.statuses import histories_of, status_now
-from pipeline.io.datasheets import read_datasheet
 from pipeline.io.recordings.readback import recording_property
 from pipeline.io.recordings.seal import verify
 from pipeline.io.recordings.viewer import (
@@ -25,7 +24,8 @@ from pipeline.io.recordings.viewer import (
     window,
 )
 from pipeline.io.recordings.web import page_server, recording_address
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
+from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.records.errors import MachineError, RecordingError, UsageError
 from pipeline.records.naming import file_stem, printable
 from pipeline.records.outcome import Outcome

@@ -28,13 +28,13 @@ from pipeline.execution.publishing import (
 from pipeline.execution.stamp import configuration_digest
 from pipeline.execution.statuses import histories_of, restated
 from pipeline.execution.versions import RUN, tools
-from pipeline.io.files import input_folder, size_bytes
-from pipeline.io.guard import ReadLimits
-from pipeline.io.limits import limits_file, required_constants
-from pipeline.io.publish import output_folder
-from pipeline.io.registry import Registry
-from pipeline.io.source_map import SourceMap, find_map, load_source_maps
-from pipeline.io.survey import Answer, Entry, Question, Survey, settled, survey
+from pipeline.io.ingest.files import input_folder, size_bytes
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
+from pipeline.io.maps.source_map import SourceMap, find_map, load_source_maps
+from pipeline.io.registry.store import Registry
+from pipeline.io.storage.limits import limits_file, required_constants
+from pipeline.io.storage.publish import output_folder
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding

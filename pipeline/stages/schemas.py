@@ -7,7 +7,7 @@ from pathlib import Path
 import pipeline
 from pipeline.contracts.glossary_page import glossary_page
 from pipeline.contracts.json_schema import build_schemas
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
 from pipeline.settings import Settings

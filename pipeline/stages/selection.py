@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from pipeline.lots.code import Pair
 from pipeline.lots.regression import Samples
 from pipeline.lots.sample import Member, lots_in_order

@@ -7,8 +7,8 @@ from itertools import cycle
 from pathlib import Path
 
 from pipeline.api.simulated import fleet, simulated, single
-from pipeline.io.publish import canonical_json, output_folder, write_whole
-from pipeline.io.write_capture import Format, write_capture
+from pipeline.io.storage.publish import canonical_json, output_folder, write_whole
+from pipeline.io.storage.write_capture import Format, write_capture
 from pipeline.records.errors import UsageError
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome, Stopwatch

@@ -19,7 +19,7 @@ from pipeline.criticism.effect import Effect
 from pipeline.crosscheck.protocol import Rule
 from pipeline.estimation.protocol import Estimator
 from pipeline.export.protocol import Exporter, Source
-from pipeline.io.source_map import parse_source_map
+from pipeline.io.maps.source_map import parse_source_map
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Datasheet

@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 from pipeline.contracts.json_schema import build_schemas
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
 from pipeline.records.errors import CaptureError

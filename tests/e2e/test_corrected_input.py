@@ -16,7 +16,7 @@ import pytest
 from pipeline.__main__ import main
 from pipeline.estimation import registry as fit_registry
 from pipeline.execution import keys
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from pipeline.settings import configuration_folder
 from pipeline.stages import motor
 from tests.registered import NOON

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from tests.registered import NOON
 
 HEAD = "# contract: 1\n# motor_id: J/1\n# test: resistance\n# pair: ab\n# station: hall\n# lot: 7\n"

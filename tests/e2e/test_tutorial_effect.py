@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.simulator.catalogue import motor_from
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.io.write_capture import Format, write_capture
+from pipeline.io.storage.write_capture import Format, write_capture
 from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import Bench
 from pipeline.simulator.truth import truth

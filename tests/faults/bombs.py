@@ -155,7 +155,7 @@ def write(folder: Path) -> Iterator[Path]:
 
 def refuse(path: Path) -> dict[str, object]:
     """How one file is refused, after how much computing [s]; the peak is the process's so far."""
-    from pipeline.io.ingest import read_capture, survey
+    from pipeline.io.ingest.capture_reader import read_capture, survey
     from pipeline.records.errors import CaptureError
 
     start = time.process_time()

@@ -24,10 +24,10 @@ from hypothesis import strategies as st
 
 from pipeline.contracts.motor import agree
 from pipeline.execution.captures import ReadTask, usable_captures
-from pipeline.io.guard import READER_FAILED, ReadLimits
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.publish import canonical_json
-from pipeline.io.source_map import SourceMap, load_source_maps
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.ingest.guard import READER_FAILED, ReadLimits
+from pipeline.io.maps.source_map import SourceMap, load_source_maps
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder

@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from tests.faults.fleet import ROOT, command, family
 
 WORDS = ("report=true", "recordings=false", "residual_test=false", "workers=1")

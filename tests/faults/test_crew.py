@@ -19,7 +19,7 @@ import pytest
 
 from pipeline.execution.crew import Crew
 from pipeline.execution.pools import Pool, local_pool
-from pipeline.io.guard import ReadLimits, reading
+from pipeline.io.ingest.guard import ReadLimits, reading
 from pipeline.records.errors import CaptureError, MachineError
 
 pytestmark = pytest.mark.workers

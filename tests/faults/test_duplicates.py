@@ -12,8 +12,8 @@ import pytest
 from pipeline.contracts.duplicates import CODE, once
 from pipeline.estimation.registry import fit_all
 from pipeline.execution.captures import ReadTask, usable_captures
-from pipeline.io.guard import ReadLimits
-from pipeline.io.survey import survey
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import survey
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from tests.unit.io.recordings import META, json_messages, mcap_file
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.io.source_map import load_source_maps, parse_source_map
+from pipeline.io.maps.source_map import load_source_maps, parse_source_map
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.settings import configuration_folder
 from tests.faults import fuzz, grammar

@@ -11,16 +11,16 @@ import pytest
 import zstandard
 
 from pipeline.__main__ import main
-from pipeline.io.guard import LEAST_MB
+from pipeline.io.ingest.guard import LEAST_MB
 from tests.faults.bombs import MB, chunk, file_of
 
 pytestmark = pytest.mark.workers
 PARSERS = (
-    ("pipeline.io.survey", "scan"),
-    ("pipeline.io.survey", "split_comments"),
-    ("pipeline.io.ingest", "read_csv"),
-    ("pipeline.io.ingest", "scan"),
-    ("pipeline.io.inspect_file", "describe"),
+    ("pipeline.io.ingest.survey", "scan"),
+    ("pipeline.io.ingest.survey", "split_comments"),
+    ("pipeline.io.ingest.capture_reader", "read_csv"),
+    ("pipeline.io.ingest.capture_reader", "scan"),
+    ("pipeline.io.inspection.describe", "describe"),
 )
 HEAVY = "reading it takes more than"
 LITTLE = f"read_memory_mb={LEAST_MB}"

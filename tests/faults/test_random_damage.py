@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType
 
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.inspect_file import describe
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.inspection.describe import describe
+from pipeline.io.maps.source_map import load_source_maps
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
-from pipeline.io.source_map import load_source_maps
 from pipeline.records.errors import CaptureError
 from tests.unit.io.recordings import START_NS, mcap_file, small_capture
 from tests.unit.io.test_cdr import JOINT_STATE

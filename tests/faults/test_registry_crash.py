@@ -16,8 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.io.registry import Registry
-from pipeline.io.registry_exports import FOLDER
+from pipeline.io.registry.exports import FOLDER
+from pipeline.io.registry.store import Registry
 from pipeline.records.ledger import Event
 from tests.registered import NOON, document, version_of, write
 

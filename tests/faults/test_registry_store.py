@@ -18,8 +18,8 @@ from urllib.request import urlopen
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.io.registry import Registry
-from pipeline.io.registry_exports import FOLDER
+from pipeline.io.registry.exports import FOLDER
+from pipeline.io.registry.store import Registry
 from tests.registered import NOON, document, version_of
 
 pytestmark = pytest.mark.slow

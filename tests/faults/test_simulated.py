@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.contracts.motor import agree
 from pipeline.contracts.validate import validate
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.settings import configuration_folder
 from pipeline.simulator.bench import campaign
 from pipeline.simulator.catalogue import bench_from, motor_from, with_effects

@@ -83,7 +83,19 @@ PACKAGES = {
         ),
         Package(
             "io",
-            ("pipeline/io/*.py", "pipeline/io/readers/*.py", "pipeline/io/recordings/*.py"),
+            tuple(
+                f"pipeline/io/{part}/*.py"
+                for part in (
+                    "ingest",
+                    "inspection",
+                    "maps",
+                    "readers",
+                    "recordings",
+                    "registry",
+                    "storage",
+                    "tables",
+                )
+            ),
             ("tests/unit/io",),
         ),
         Package("records", ("pipeline/records/*.py",), ("tests/unit/records",)),

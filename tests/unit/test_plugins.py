@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 ROOMS = {
-    "readers": ("pipeline.io.foreign", "readers"),
+    "readers": ("pipeline.io.tables.foreign", "readers"),
     "gates": ("pipeline.contracts.registry", "gates"),
     "estimators": ("pipeline.estimation.registry", "estimators"),
     "rules": ("pipeline.crosscheck.registry", "rules"),
@@ -28,8 +28,8 @@ MARKS = {
     "effects": "EFFECT",
 }
 READER = """
-from pipeline.io.foreign import Reader
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.raw_table import RawTable
 
 READER = Reader("hall_binary", lambda data: (RawTable("hall", {}),))
 """

@@ -20,7 +20,7 @@ from pipeline.io.mcap.protobuf import ProtobufDecoder
 from pipeline.io.mcap.protobuf_plan import plan_of
 from pipeline.io.mcap.records import Schema
 from pipeline.io.mcap.ros2msg import layout_of
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 WantedIn = Callable[[str, str], bool]

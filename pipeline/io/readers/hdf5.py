@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from pipeline.io.foreign import Reader
-from pipeline.io.hdf5_tables import tables
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.hdf5_tables import tables
 
 READER = Reader("hdf5", partial(tables, form="hdf5"))

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.io.foreign import Reader
-from pipeline.io.hdf5_tables import tables
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.hdf5_tables import tables
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 HDF5_AT = 512

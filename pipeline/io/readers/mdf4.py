@@ -6,8 +6,8 @@ import io
 
 import numpy as np
 
-from pipeline.io.foreign import Reader, library
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import Reader, library
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 MARK = b"MDF"

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.io.foreign import Reader
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 from pipeline.records.parse import ParseError, json_value, number
 

@@ -6,9 +6,9 @@ import io
 
 import numpy as np
 
-from pipeline.io.foreign import Reader
-from pipeline.io.raw_table import RawTable
 from pipeline.io.readers.npz import BROKEN
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 REMEDY = "save it with numpy.save, a row a sample"

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.io.foreign import Reader
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 _MOST_BYTES = 1 << 30

@@ -7,8 +7,8 @@ import io
 import numpy as np
 import polars as pl
 
-from pipeline.io.foreign import Reader
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import Reader
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 NANOSECOND_S = 1e-9

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from pipeline.io.publish import canonical_json
 from pipeline.io.recordings.datasheet_page import plain
 from pipeline.io.recordings.seal import write_sealed
 from pipeline.io.recordings.stream import (
@@ -40,6 +39,7 @@ from pipeline.io.recordings.views import (
     stacked,
     workspace,
 )
+from pipeline.io.storage.publish import canonical_json
 from pipeline.numerics.thinning import line_points
 from pipeline.physics.notation import quantity, significant
 from pipeline.records.comparison import Comparison, Trace

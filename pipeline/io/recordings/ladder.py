@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline.io.publish import canonical_json
 from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.ladder_page import rung_markdown
@@ -38,6 +37,7 @@ from pipeline.io.recordings.ladder_views import ladder_layout
 from pipeline.io.recordings.seal import write_sealed
 from pipeline.io.recordings.stream import recording, send_axis_ends, send_bars, send_property
 from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.diagnosis import Diagnosis
 
 if TYPE_CHECKING:

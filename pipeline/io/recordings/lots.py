@@ -23,7 +23,6 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.io.publish import canonical_json
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.lots_page import verdict_markdown
 from pipeline.io.recordings.lots_traces import (
@@ -45,6 +44,7 @@ from pipeline.io.recordings.stream import (
     send_property,
     send_trace,
 )
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.lot_constant import ConstantResult
 from pipeline.records.lot_regression import LotRegression
 from pipeline.records.naming import file_stem

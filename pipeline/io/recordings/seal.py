@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from pipeline.io.publish import write_whole
+from pipeline.io.storage.publish import write_whole
 from pipeline.records.errors import RecordingError
 
 SEAL = ".sha256"

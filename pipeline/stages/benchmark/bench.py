@@ -8,7 +8,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.settings import configuration_folder
 from pipeline.simulator.catalogue import bench_from, motor_from
 from pipeline.simulator.design import EXACT, Bench, Motor, Recording

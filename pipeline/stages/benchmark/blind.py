@@ -11,7 +11,7 @@ from multiprocessing import get_context
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
 
 Diagnose = Callable[[Campaign, str], dict[str, Any]]

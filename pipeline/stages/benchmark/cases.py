@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cache
 from typing import Any
 
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.simulator.design import Motor
 from pipeline.stages.benchmark.bench import STEMS, station
 

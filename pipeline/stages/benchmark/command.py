@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.io.publish import write_whole
+from pipeline.io.storage.publish import write_whole
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome, Stopwatch
 from pipeline.settings import BenchmarkSettings

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pipeline
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.stages.benchmark.blind import Diagnose, attempted, blind_process
 from pipeline.stages.benchmark.cases import Case, case_from
 from pipeline.stages.benchmark.sealing import blind_campaign

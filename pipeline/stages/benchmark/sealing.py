@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 
-from pipeline.io.metadata import capture_meta
+from pipeline.io.ingest.metadata import capture_meta
 from pipeline.records.capture import Campaign, Capture
 from pipeline.simulator.design import Recording
 from pipeline.stages.benchmark.bench import recorded, station

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.io.publish import write_whole
+from pipeline.io.storage.publish import write_whole
 from pipeline.settings import configuration_folder
 from pipeline.simulator.design import Motor, Recording
 from pipeline.simulator.effects import ALWAYS, FORMS, parameters

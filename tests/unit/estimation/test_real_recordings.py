@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.estimation.registry import fit_all
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.source_map import load_source_maps
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.maps.source_map import load_source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.settings import configuration_folder

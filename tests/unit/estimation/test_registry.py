@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.estimation import registry
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import type_a

@@ -11,7 +11,7 @@ from pipeline.__main__ import main
 from pipeline.contracts.motor import agree
 from pipeline.crosscheck.registry import check_all
 from pipeline.estimation.registry import fit_all
-from pipeline.io.metadata import capture_meta
+from pipeline.io.ingest.metadata import capture_meta
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import CaptureError
 from pipeline.records.stated import UNSTATED_SHARE, stated_constants
@@ -113,7 +113,7 @@ def test_what_cannot_be_stated_is_said(word, said, tmp_path, capsys):
 def test_a_run_publishes_it_as_stated_and_releases_nothing_on_it(tmp_path):
     import numpy as np
 
-    from pipeline.io.write_capture import Format, write_capture
+    from pipeline.io.storage.write_capture import Format, write_capture
     from pipeline.simulator.bench import record
 
     recording = record("drive", MOTOR, EXACT_BENCH, np.random.default_rng(5), load=0.0)

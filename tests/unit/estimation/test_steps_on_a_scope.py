@@ -294,7 +294,7 @@ SLOW = ("L0", "L1", "L2", "L3", "L4")
 )
 def test_ld_and_lq_of_the_shared_bench(motor: str) -> None:
     """Within 0.1 % plus the gains of that day, inside 95 %, and the ratio free of gains."""
-    from pipeline.io.ingest import read_capture, survey
+    from pipeline.io.ingest.capture_reader import read_capture, survey
 
     folder = BENCH_B / motor
     entries = [e for e in survey(folder, {}).entries if e.said["test"] == "current_step"]

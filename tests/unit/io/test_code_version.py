@@ -13,9 +13,9 @@ import pytest
 
 import pipeline
 from pipeline.execution.versions import LOOK, RUN, WORK
-from pipeline.io import code_version
-from pipeline.io.code_version import DISTRIBUTIONS, Code, installed, own_code
-from pipeline.io.syntax import syntax_of
+from pipeline.io.storage import code_version
+from pipeline.io.storage.code_version import DISTRIBUTIONS, Code, installed, own_code
+from pipeline.io.storage.syntax import syntax_of
 
 MOTOR = '''"""A motor."""
 from __future__ import annotations

@@ -12,8 +12,8 @@ import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.io.csv_dialect import CsvDialect
-from pipeline.io.csv_table import read_csv
+from pipeline.io.tables.csv_dialect import CsvDialect
+from pipeline.io.tables.csv_table import read_csv
 from pipeline.records.errors import CaptureError
 
 HEAD = b"# contract: 1\n# motor_id: 000123\n# test: drive\n"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.io.diagnoses import read_diagnoses
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.diagnoses import read_diagnoses
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.errors import UsageError
 from tests.unit.ladders import make_diagnosis
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from pipeline.io import files
-from pipeline.io.files import list_files
+from pipeline.io.ingest.capture_reader import files
+from pipeline.io.ingest.files import list_files
 from pipeline.records.errors import CaptureError, MachineError
 
 

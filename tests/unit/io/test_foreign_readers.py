@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import pipeline
-from pipeline.io.ingest import read_capture, survey
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.maps.source_map import load_source_maps
 from pipeline.io.readers.moteus_ld import metadata
 from pipeline.io.readers.moteus_ld import read as read_sweep
 from pipeline.io.readers.npz import read as read_archive
-from pipeline.io.source_map import load_source_maps
 from pipeline.records.errors import CaptureError
 
 CONF = Path(pipeline.__file__).parents[1] / "conf" / "source"

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.io.ingest import Survey, read_capture, survey
-from pipeline.io.source_map import parse_source_map
+from pipeline.io.ingest.capture_reader import Survey, read_capture, survey
+from pipeline.io.maps.source_map import parse_source_map
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError, UsageError
 from tests.unit.io.recordings import META, START_NS, json_messages, mcap_file, small_capture
@@ -184,7 +184,7 @@ def test_a_file_that_may_not_be_read_has_to_do_with_permissions(
         raise PermissionError(errno.EACCES, "Permission denied")
 
     (tmp_path / "x.csv").write_text(CSV)
-    monkeypatch.setattr("pipeline.io.files.os.open", closed)
+    monkeypatch.setattr("pipeline.io.ingest.files.os.open", closed)
     (finding,) = survey(tmp_path, {}).findings
     assert (finding.code, finding.remedy) == ("unreadable", "check its permissions")
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.inspect_file import describe
-from pipeline.io.source_map import load_source_maps, parse_source_map
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.inspection.describe import describe
+from pipeline.io.maps.source_map import load_source_maps, parse_source_map
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder
 from pipeline.stages.inspect_file import render

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.io import publish
-from pipeline.io.publish import canonical_json, together, write_whole
+from pipeline.io.storage import publish
+from pipeline.io.storage.publish import canonical_json, together, write_whole
 from pipeline.records.errors import MachineError
 
 FULL, CLOSED = "free the disk and run again", "name an output folder that can be written"

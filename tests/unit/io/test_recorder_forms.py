@@ -10,10 +10,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io import foreign
-from pipeline.io.foreign import find_reader, readers
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.source_map import parse_source_map
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.maps.source_map import parse_source_map
+from pipeline.io.tables import foreign
+from pipeline.io.tables.foreign import find_reader, readers
 from pipeline.records.errors import CaptureError
 
 T_S = np.arange(0.0, 0.5, 0.01)

@@ -13,10 +13,10 @@ import polars as pl
 import pytest
 from deltalake import DeltaTable
 
-from pipeline.io.publish import canonical_json
-from pipeline.io.registry import Registry
-from pipeline.io.registry_exports import FOLDER, place_of
-from pipeline.io.registry_table import MOST_FILES
+from pipeline.io.registry.exports import FOLDER, place_of
+from pipeline.io.registry.store import Registry
+from pipeline.io.registry.table import MOST_FILES
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Event, Selection, Version, newest
 from tests.registered import HOUR, NOON, document, version_of
@@ -386,8 +386,8 @@ def test_a_registry_that_cannot_be_written_is_told_before_the_commit(
 ) -> None:
     """The library panics over it, with a backtrace. Root may write everywhere, so it is told no."""
     registry.publish([document("a", 1)], NOON)
-    monkeypatch.setattr("pipeline.io.registry_table.os.access", lambda *_: False)
-    monkeypatch.setattr("pipeline.io.registry_table.EventTable._committed", None)
+    monkeypatch.setattr("pipeline.io.registry.table.os.access", lambda *_: False)
+    monkeypatch.setattr("pipeline.io.registry.table.EventTable._committed", None)
     with pytest.raises(MachineError, match="cannot be written; is it open to you"):
         registry.tag("tag", registry.history("a"), "t", "me", NOON)
     assert registry.publish([document("a", 1)], NOON).added == ()

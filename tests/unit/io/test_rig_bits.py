@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from pipeline.io.ingest import read_capture, survey
+from pipeline.io.ingest.capture_reader import read_capture, survey
 from tests.unit.io.recordings import SHARED
 
 CAMPAIGNS = [

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pipeline
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.source_map import load_source_maps, parse_source_map
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.maps.source_map import load_source_maps, parse_source_map
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError, UsageError
 from tests.unit.io.recordings import SHARED

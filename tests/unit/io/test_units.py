@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pipeline.io.units import FOREIGN_UNITS, scale_to
+from pipeline.io.maps.units import FOREIGN_UNITS, scale_to
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.errors import CaptureError
 

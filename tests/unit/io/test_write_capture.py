@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.write_capture import Format, csv_bytes, mcap_bytes, write_capture
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.storage.write_capture import Format, csv_bytes, mcap_bytes, write_capture
 from pipeline.records.errors import CaptureError
 
 META = {

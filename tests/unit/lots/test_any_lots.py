@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.lots.regression import compare_lots
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.limits import Amount, ConstantLimits, Limits

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.estimation.registry import estimators
-from pipeline.io.limits import read_limits, required_constants
+from pipeline.io.storage.limits import read_limits, required_constants
 from pipeline.lots.limits_lint import lint
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import UsageError

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.lots.regression import compare_lots
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.estimate import Order

@@ -106,14 +106,14 @@ def test_json_keeps_what_it_is() -> None:
 # Where bytes of strangers come in; the registry and the notes are the project's own, under seals.
 GUARDED = ("io/mcap", "io/readers", "contracts")
 GUARDED_FILES = (
-    "io/csv_table.py",
-    "io/metadata.py",
-    "io/plain_yaml.py",
-    "io/source_map.py",
-    "io/survey.py",
-    "io/inspect_file.py",
-    "io/sniff.py",
-    "io/columns.py",
+    "io/tables/csv_table.py",
+    "io/ingest/metadata.py",
+    "io/storage/plain_yaml.py",
+    "io/maps/source_map.py",
+    "io/ingest/survey.py",
+    "io/inspection/describe.py",
+    "io/inspection/sniff.py",
+    "io/maps/columns.py",
 )
 # latin-1 and `replace` take any byte.
 HARMLESS = {"decode": ("latin-1", "replace")}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.io.datasheets import datasheet_of
+from pipeline.io.storage.datasheets import datasheet_of
 from pipeline.records.current_status import current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.ledger import histories

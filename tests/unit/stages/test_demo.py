@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.datasheet import Check, Datasheet
 from tests import demo
 

@@ -20,12 +20,12 @@ import pytest
 from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
 from pipeline.execution.jobs import MotorJob
-from pipeline.io.csv_dialect import CsvDialect
-from pipeline.io.ingest import read_capture
-from pipeline.io.metadata import capture_meta
-from pipeline.io.source_map import FieldMap, SourceMap
-from pipeline.io.survey import survey
-from pipeline.io.units import FOREIGN_UNITS
+from pipeline.io.ingest.capture_reader import read_capture
+from pipeline.io.ingest.metadata import capture_meta
+from pipeline.io.ingest.survey import survey
+from pipeline.io.maps.source_map import FieldMap, SourceMap
+from pipeline.io.maps.units import FOREIGN_UNITS
+from pipeline.io.tables.csv_dialect import CsvDialect
 from pipeline.physics.glossary import COLUMNS, METADATA
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.content import content_digest

@@ -15,9 +15,9 @@ from pipeline.estimation.registry import estimators
 from pipeline.execution import fits, keeping, keys
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.work import Stamp
-from pipeline.io.guard import ReadLimits
-from pipeline.io.source_map import FieldMap, SourceMap
-from pipeline.io.survey import Question, Survey, look, survey
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Question, Survey, look, survey
+from pipeline.io.maps.source_map import FieldMap, SourceMap
 from pipeline.records.constants import Constants
 from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate

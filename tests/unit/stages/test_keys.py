@@ -17,10 +17,10 @@ import pytest
 
 from pipeline.execution import keys
 from pipeline.execution.jobs import MotorJob
-from pipeline.io.csv_dialect import CsvDialect
-from pipeline.io.guard import ReadLimits
-from pipeline.io.source_map import FieldMap, SourceMap, TimeMap
-from pipeline.io.survey import Entry, Question, Survey
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Entry, Question, Survey
+from pipeline.io.maps.source_map import FieldMap, SourceMap, TimeMap
+from pipeline.io.tables.csv_dialect import CsvDialect
 from pipeline.records.capture import Campaign, Capture, CaptureMeta, Mask
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.content import content_digest

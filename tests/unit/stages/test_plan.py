@@ -11,8 +11,8 @@ import pytest
 from pipeline.__main__ import main as door
 from pipeline.crosscheck.plan import Known, settling_tests
 from pipeline.estimation.registry import estimators, fit_all
-from pipeline.io.datasheets import datasheet_of, read_datasheets
-from pipeline.io.publish import canonical_json
+from pipeline.io.storage.datasheets import datasheet_of, read_datasheets
+from pipeline.io.storage.publish import canonical_json
 from pipeline.physics.glossary import CONSTANTS, TESTS
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from pipeline.records.errors import UsageError
 from pipeline.stages.registry import moment
 from tests.registered import HOUR, NOON, document, version_of

@@ -14,7 +14,7 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.contracts.json_schema import build_schemas
-from pipeline.io.registry import Registry
+from pipeline.io.registry.store import Registry
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.lot_regression import regression_of
 from tests.registered import NOON

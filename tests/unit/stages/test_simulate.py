@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.io.ingest import read_capture, survey
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.records.errors import UsageError
 from pipeline.settings import SimulateSettings, configuration_folder
 from pipeline.simulator.catalogue import fleet_from, motor_from, with_effects

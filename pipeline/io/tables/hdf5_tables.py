@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.io.foreign import library
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.foreign import library
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 
 MOST_BYTES = 1 << 30

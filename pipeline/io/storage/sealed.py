@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pipeline.io.publish import canonical_json, write_whole
+from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import PipelineError
 
 _MAX_BYTES = 2**28

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import polars as pl
 
-from pipeline.io.columns import foreign_unit, last_part, to_frame
-from pipeline.io.csv_dialect import CONTRACT_DIALECT
-from pipeline.io.csv_table import read_csv
-from pipeline.io.files import read_whole
-from pipeline.io.foreign import find_reader
-from pipeline.io.guard import refusing
+from pipeline.io.ingest.files import read_whole
+from pipeline.io.ingest.guard import refusing
+from pipeline.io.ingest.metadata import capture_meta
+from pipeline.io.ingest.survey import Entry, Survey, survey
+from pipeline.io.maps.columns import foreign_unit, last_part, to_frame
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
-from pipeline.io.metadata import capture_meta
-from pipeline.io.raw_table import RawTable
-from pipeline.io.source_map import SourceMap
-from pipeline.io.survey import Entry, Survey, survey
+from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
+from pipeline.io.tables.csv_table import read_csv
+from pipeline.io.tables.foreign import find_reader
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records.capture import Capture, CaptureMeta, Integrity
 from pipeline.records.errors import CaptureError

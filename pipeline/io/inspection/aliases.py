@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from pipeline.io.columns import JOINT_COLUMNS, last_part
-from pipeline.io.units import FOREIGN_UNITS, normal_unit
+from pipeline.io.maps.columns import JOINT_COLUMNS, last_part
+from pipeline.io.maps.units import FOREIGN_UNITS, normal_unit
 from pipeline.physics.glossary import COLUMNS
 
 _NAMES: dict[str, str] = {

@@ -9,8 +9,8 @@ from codecs import getincrementaldecoder
 from collections.abc import Callable
 from dataclasses import replace
 
-from pipeline.io.csv_dialect import CsvDialect
-from pipeline.io.csv_table import MAX_HEAD_BYTES
+from pipeline.io.tables.csv_dialect import CsvDialect
+from pipeline.io.tables.csv_table import MAX_HEAD_BYTES
 
 _SEPARATORS = (",", ";", "\t", "|")
 _NUMBER = re.compile(r"^[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?$|^[-+]?(nan|NaN|NAN)$")

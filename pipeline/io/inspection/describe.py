@@ -10,20 +10,20 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.io.aliases import guess
-from pipeline.io.columns import to_frame
-from pipeline.io.csv_dialect import CONTRACT_DIALECT
-from pipeline.io.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
-from pipeline.io.files import read_whole
-from pipeline.io.ingest import wanted
+from pipeline.io.ingest.capture_reader import wanted
+from pipeline.io.ingest.files import read_whole
+from pipeline.io.ingest.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
+from pipeline.io.ingest.survey import look, question_of
+from pipeline.io.inspection.aliases import guess
+from pipeline.io.inspection.sniff import encoding_of, numeric_columns, sniff
+from pipeline.io.inspection.starter_map import FieldSeen, StreamSeen, starter_map
+from pipeline.io.maps.columns import to_frame
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
-from pipeline.io.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
-from pipeline.io.raw_table import RawTable
-from pipeline.io.sniff import encoding_of, numeric_columns, sniff
-from pipeline.io.source_map import SourceMap
-from pipeline.io.starter_map import FieldSeen, StreamSeen, starter_map
-from pipeline.io.survey import look, question_of
+from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
+from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 from pipeline.records.parse import whole
 

@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.io.publish import write_whole
+from pipeline.io.storage.publish import write_whole
 
 Table = Mapping[str, NDArray[np.float64]]
 Encoding = Literal["json", "protobuf", "cdr", "csv"]

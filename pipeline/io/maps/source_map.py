@@ -10,8 +10,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
-from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
+from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.physics.glossary import COLUMNS
 from pipeline.records import parse
 from pipeline.records.errors import CaptureError, UsageError

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.plugins import discover
 from pipeline.records.errors import CaptureError, UsageError
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
-from pipeline.io.raw_table import RawTable
+from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 from pipeline.records.parse import ParseError, decoded, number, whole
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.limits import (

@@ -17,7 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pipeline.io.publish import sync_folder, write_synced
+from pipeline.io.storage.publish import sync_folder, write_synced
 from pipeline.records.errors import MachineError
 from pipeline.records.naming import file_stem
 

@@ -21,9 +21,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from pipeline.io.publish import sync_file, sync_folder
-from pipeline.io.registry_exports import one_line
-from pipeline.io.registry_stand_in import StandIn, unfit
+from pipeline.io.registry.exports import one_line
+from pipeline.io.registry.stand_in import StandIn, unfit
+from pipeline.io.storage.publish import sync_file, sync_folder
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.ledger import Event
 from pipeline.records.parse import whole

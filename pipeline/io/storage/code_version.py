@@ -25,10 +25,10 @@ from pathlib import Path
 from typing import Any
 
 import pipeline
-from pipeline.io import syntax
-from pipeline.io.identity import notes_folder
-from pipeline.io.sealed import keep_sealed, read_sealed
-from pipeline.io.syntax import BY_TEXT, Import, Syntax, syntax_of
+from pipeline.io.storage import syntax
+from pipeline.io.storage.identity import notes_folder
+from pipeline.io.storage.sealed import keep_sealed, read_sealed
+from pipeline.io.storage.syntax import BY_TEXT, Import, Syntax, syntax_of
 from pipeline.plugins import outside_version
 
 DISTRIBUTIONS: Mapping[str, str] = {

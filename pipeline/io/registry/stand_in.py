@@ -18,7 +18,7 @@ import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.io.publish import sync_file, sync_folder
+from pipeline.io.storage.publish import sync_file, sync_folder
 
 if TYPE_CHECKING:
     import polars as pl

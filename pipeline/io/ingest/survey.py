@@ -13,13 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from pipeline.io.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments
-from pipeline.io.files import list_files, read_head, read_whole
-from pipeline.io.foreign import find_reader
-from pipeline.io.guard import refusing
-from pipeline.io.mcap.container import MAGIC, Layout, scan
-from pipeline.io.mcap.messages import count_messages
-from pipeline.io.metadata import (
+from pipeline.io.ingest.files import list_files, read_head, read_whole
+from pipeline.io.ingest.guard import refusing
+from pipeline.io.ingest.metadata import (
     MANIFEST,
     MAX_MANIFEST_BYTES,
     MAX_SIDECAR_BYTES,
@@ -30,7 +26,11 @@ from pipeline.io.metadata import (
     merge,
     sidecar,
 )
-from pipeline.io.source_map import SourceMap, find_map
+from pipeline.io.maps.source_map import SourceMap, find_map
+from pipeline.io.mcap.container import MAGIC, Layout, scan
+from pipeline.io.mcap.messages import count_messages
+from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments
+from pipeline.io.tables.foreign import find_reader
 from pipeline.physics.glossary import METADATA
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from pipeline.io.aliases import Guess
-from pipeline.io.csv_dialect import CONTRACT_DIALECT, CsvDialect
+from pipeline.io.inspection.aliases import Guess
+from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 
 
 @dataclass(frozen=True, slots=True)

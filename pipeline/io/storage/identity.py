@@ -15,7 +15,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from pipeline.io.sealed import keep_sealed, read_sealed
+from pipeline.io.storage.sealed import keep_sealed, read_sealed
 
 Identity = tuple[int, int, int, int, int]
 _FINE_NS = 50_000_000

@@ -11,9 +11,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.io.raw_table import RawTable
-from pipeline.io.source_map import FieldMap, SourceMap
-from pipeline.io.units import scale_to
+from pipeline.io.maps.source_map import FieldMap, SourceMap
+from pipeline.io.maps.units import scale_to
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.physics.glossary import COLUMNS, suffix_of
 from pipeline.records.errors import CaptureError
 

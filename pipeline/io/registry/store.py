@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from pipeline.io.datasheets import datasheet_of
-from pipeline.io.publish import canonical_json
-from pipeline.io.registry_exports import Exports, Key, place_of
-from pipeline.io.registry_table import EventTable, Row
+from pipeline.io.registry.exports import Exports, Key, place_of
+from pipeline.io.registry.table import EventTable, Row
+from pipeline.io.storage.datasheets import datasheet_of
+from pipeline.io.storage.publish import canonical_json
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import PipelineError, UsageError
 from pipeline.records.ledger import (

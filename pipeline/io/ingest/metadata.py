@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
-from pipeline.io.plain_yaml import load_plain
+from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.physics.glossary import METADATA, TESTS
 from pipeline.records import parse
 from pipeline.records.capture import CaptureMeta
