@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.io.ingest.capture_reader import files
+from pipeline.io.ingest import files
 from pipeline.io.ingest.files import list_files
 from pipeline.records.errors import CaptureError, MachineError
 

@@ -12,10 +12,10 @@ import polars as pl
 import pytest
 from deltalake import write_deltalake
 
+from pipeline.io.registry import exports as registry_exports
+from pipeline.io.registry import table as registry_table
 from pipeline.io.registry.exports import place_of
 from pipeline.io.registry.store import Registry
-from pipeline.io.registry.store import exports as registry_exports
-from pipeline.io.registry.store import table as registry_table
 from pipeline.io.storage.publish import canonical_json
 from pipeline.records.errors import MachineError
 from pipeline.records.ledger import Selection
