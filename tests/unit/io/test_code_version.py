@@ -258,7 +258,11 @@ def test_what_sources_say_is_kept_and_nothing_else_is_believed(
 def test_every_python_gives_the_same_digest() -> None:
     """Of a source that holds most of what the language has."""
     root = Path(pipeline.__file__).parent
-    sources = [root / "records" / "capture.py", root / "io" / "code_version.py", Path(__file__)]
+    sources = [
+        root / "records" / "capture.py",
+        root / "io" / "storage" / "code_version.py",
+        Path(__file__),
+    ]
     code = (
         "import sys; from pathlib import Path\n"
         "sys.path.insert(0, sys.argv[1]); from syntax import syntax_of\n"
@@ -268,7 +272,7 @@ def test_every_python_gives_the_same_digest() -> None:
     others = {shutil.which(f"python3.{n}") for n in (11, 12, 13)} - {None}
     asked = 0
     for python in sorted(map(str, others)):
-        words = [python, "-c", code, str(root / "io"), *map(str, sources)]
+        words = [python, "-c", code, str(root / "io" / "storage"), *map(str, sources)]
         done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode == 0:
             assert done.stdout.split() == ours, python
