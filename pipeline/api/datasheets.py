@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import polars as pl
 
 from pipeline.api import frames
+from pipeline.api.by_motor import ByMotor
 from pipeline.api.fits import Fits, MotorFit
 from pipeline.api.models import model_spec
 from pipeline.api.options import check_options
@@ -36,21 +37,10 @@ DATASHEET_SCHEMA = {
 
 
 @dataclass(frozen=True, slots=True)
-class Datasheets:
+class Datasheets(ByMotor[Datasheet]):
     """Datasheets by motor, and diagnoses where an output folder holds some."""
 
-    motors: Mapping[str, Datasheet]
     diagnoses: Mapping[str, DiagnosisSummary] = field(default_factory=dict)
-
-    def __getitem__(self, motor_id: str) -> Datasheet:
-        """The datasheet of one motor."""
-        return self.motors[motor_id]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.motors)
-
-    def __len__(self) -> int:
-        return len(self.motors)
 
     @property
     def constants(self) -> pl.DataFrame:

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from pipeline.api import frames
+from pipeline.api.by_motor import ByMotor
 from pipeline.api.figure import Figure, figure
 from pipeline.api.options import check_options
 from pipeline.api.recordings import Options, Recordings
@@ -47,26 +48,15 @@ class MotorFit:
 
 
 @dataclass(frozen=True, slots=True)
-class Fits:
+class Fits(ByMotor[MotorFit]):
     """Estimates of every motor, before any check.
 
     `options` are those of the estimators, `stated` the constants that were stated. `failures` of a
     motor name estimators that broke on it.
     """
 
-    motors: Mapping[str, MotorFit]
     options: Options = field(default_factory=dict)
     stated: Mapping[str, float] = field(default_factory=dict)
-
-    def __getitem__(self, motor_id: str) -> MotorFit:
-        """The estimates of one motor."""
-        return self.motors[motor_id]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.motors)
-
-    def __len__(self) -> int:
-        return len(self.motors)
 
     @property
     def constants(self) -> pl.DataFrame:
@@ -94,7 +84,7 @@ class Fits:
         """
         from pipeline.report.chart import chart
 
-        motor_id = next(iter(self.motors)) if motor is None else motor
+        motor_id = self.motor_or_first(motor)
         drawn = [e for e in self.motors[motor_id].evidence if e.estimator == estimator]
         if not drawn:
             known = dict.fromkeys(e.estimator for e in self.motors[motor_id].evidence)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import polars as pl
 
 from pipeline.api import frames
+from pipeline.api.by_motor import ByMotor
 from pipeline.api.figure import Figure, figure
 from pipeline.api.recordings import Recordings, read
 from pipeline.execution.start import start_constants
@@ -62,17 +63,8 @@ RANKING_SCHEMA = {
 
 
 @dataclass(frozen=True, slots=True)
-class Comparisons:
+class Comparisons(ByMotor[Comparison]):
     """One comparison a motor. Errors are of window means; 1 is the noise floor."""
-
-    motors: Mapping[str, Comparison]
-
-    def __getitem__(self, motor_id: str) -> Comparison:
-        """The comparison of one motor."""
-        return self.motors[motor_id]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.motors)
 
     @property
     def errors(self) -> pl.DataFrame:
@@ -125,7 +117,7 @@ class Comparisons:
         """
         from pipeline.report.chart import chart
 
-        motor_id = next(iter(self.motors)) if motor is None else motor
+        motor_id = self.motor_or_first(motor)
         for one in self.motors[motor_id].traces:
             if (one.signal, one.capture) == (signal, capture):
                 series = Series("", one.t_s, one.measured, one.model)
@@ -140,17 +132,8 @@ class Comparisons:
 
 
 @dataclass(frozen=True, slots=True)
-class Diagnoses:
+class Diagnoses(ByMotor[Diagnosis]):
     """One diagnosis a motor: what its model lacks, how sure that is, what else it could be."""
-
-    motors: Mapping[str, Diagnosis]
-
-    def __getitem__(self, motor_id: str) -> Diagnosis:
-        """The diagnosis of one motor."""
-        return self.motors[motor_id]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.motors)
 
     @property
     def verdicts(self) -> pl.DataFrame:
@@ -191,7 +174,7 @@ class Diagnoses:
         """The ladder of one motor: each signal's held-out error over its noise floor by step."""
         from pipeline.report.rung_chart import rung_chart
 
-        motor_id = next(iter(self.motors)) if motor is None else motor
+        motor_id = self.motor_or_first(motor)
         ladder = self.ladder.filter(pl.col("motor_id") == motor_id)
         steps = ladder.unique("step", maintain_order=True)["added"].to_list()
         over = {

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from multiprocessing import get_context
 from typing import Any
 
@@ -53,9 +54,19 @@ def open_pool(executor: str, cluster: Cluster) -> OpenPool:
             raise UsageError("a scheduler or TLS file is named", "add executor=dask")
         return local_pool
     if executor == "dask":
+        _require_dask()
         _check(cluster)
         return _Dask(cluster)
     raise UsageError(f"executor={executor!r} is unknown", "it is local or dask")
+
+
+def _require_dask() -> None:
+    """Raises UsageError where Dask is not installed; asked before any work is done."""
+    if find_spec("distributed") is None:
+        raise UsageError(
+            "executor=dask takes the package distributed, which is not installed",
+            "pip install 'motor-datasheets[dask]'",
+        )
 
 
 def core_count() -> int:
