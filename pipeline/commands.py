@@ -88,12 +88,6 @@ COMMANDS = _index(
         "recordings in the Rerun viewer: fleet, motor, ladder, lot against lot",
     ),
     Command("simulate", "simulate", s.SimulateSettings, "captures of a simulated motor, and truth"),
-    Command(
-        "benchmark",
-        "benchmark.command",
-        s.BenchmarkSettings,
-        "sealed simulated motors, diagnosed blind: how often the answer is right",
-    ),
     Command("schemas", "schemas", s.Settings, "JSON Schemas and glossary, built into the checkout"),
     Command(
         "calc",

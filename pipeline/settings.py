@@ -265,21 +265,6 @@ class ReviewSettings(Settings):
     port: int = key(0, "port of the web page, the fleet's table on the next; 0 takes free ones")
 
 
-@dataclass(kw_only=True)
-class BenchmarkSettings(Settings):
-    """`benchmark`: sealed simulated campaigns, diagnosed blind, with a table of marks."""
-
-    action: str = key("run", "run, table (of what has been run), or sensitivity (measure a* anew)")
-    output: str = key(
-        "reports/benchmark", "folder of sealed truths and results", result=False, place=True
-    )
-    subset: str = key("small", "small, a fixed stratified set of minutes, or full, of hours")
-    shard: str = key("1/1", "which part of the cases to work on: i/n, i from 1", result=False)
-    seed: int = key(1, "master seed of every random draw")
-    docs: str = key("", "Markdown page to put the table into, between its marks", result=False)
-    date: str = key("", "date to write over the table", result=False)
-
-
 def result_document(settings: Settings) -> dict[str, Any]:
     """The settings that can change a result, as plain data for a digest."""
     kept = {f.name for f in fields(settings) if f.metadata.get("result", True)}

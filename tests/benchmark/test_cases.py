@@ -10,11 +10,11 @@ import pytest
 
 from pipeline.simulator.effects import ALWAYS, FORMS
 from pipeline.simulator.plant import plant_of
-from pipeline.stages.benchmark.bench import MOTORS, STEMS, station
-from pipeline.stages.benchmark.cases import Case, case_from
-from pipeline.stages.benchmark.corruption import corrupted, noise_of
-from pipeline.stages.benchmark.drawing import cases, small
-from pipeline.stages.benchmark.sealing import blind_campaign, blind_name
+from tests.benchmark.bench import MOTORS, STEMS, station
+from tests.benchmark.cases import Case, case_from
+from tests.benchmark.corruption import corrupted, noise_of
+from tests.benchmark.drawing import cases, small
+from tests.benchmark.sealing import blind_campaign, blind_name
 
 SECRETS = [name for name in FORMS if name != "cogging"] + list(MOTORS)
 
@@ -136,7 +136,7 @@ def test_leaving_captures_out_changes_no_other(drawn: list[Case]) -> None:
 @pytest.mark.parametrize("kind", ["drift", "hum", "mis-stated noise"])
 def test_corruption_is_of_the_kind_and_size(kind: str) -> None:
     """Drift is a walk, hum one line of the mains and its third, noise white; one to four σ."""
-    from pipeline.stages.benchmark.bench import recorded
+    from tests.benchmark.bench import recorded
 
     place = station("gimbal-5208")
     made = recorded(place.motor, place.quiet, place.plan, 3, ("torque_map_0",))

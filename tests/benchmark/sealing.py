@@ -11,9 +11,9 @@ import polars as pl
 from pipeline.io.ingest.metadata import capture_meta
 from pipeline.records.capture import Campaign, Capture
 from pipeline.simulator.design import Recording
-from pipeline.stages.benchmark.bench import recorded, station
-from pipeline.stages.benchmark.cases import Case
-from pipeline.stages.benchmark.corruption import corrupted
+from tests.benchmark.bench import recorded, station
+from tests.benchmark.cases import Case
+from tests.benchmark.corruption import corrupted
 
 MOTOR_TYPE = "unit"
 

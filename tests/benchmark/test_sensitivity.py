@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipeline.settings import configuration_folder
 from pipeline.simulator.design import EXACT
 from pipeline.simulator.effects import ALWAYS, FORMS
-from pipeline.stages.benchmark.bench import MOTORS, STEMS, recorded, station
-from pipeline.stages.benchmark.innovation import base_of, innovations
-from pipeline.stages.benchmark.sensitivity import (
+from tests.benchmark.bench import MOTORS, STEMS, recorded, station
+from tests.benchmark.innovation import base_of, innovations
+from tests.benchmark.sensitivity import (
     CURVED,
+    HERE,
     Sensitivity,
     digest,
     loaded,
@@ -26,7 +26,7 @@ from pipeline.stages.benchmark.sensitivity import (
 
 
 def shipped(motor: str) -> Sensitivity:
-    return loaded((configuration_folder() / "benchmark" / f"{motor}.npz").read_bytes())[1]
+    return loaded((HERE / f"{motor}.npz").read_bytes())[1]
 
 
 def test_needed_noncentrality_is_the_sum_of_two_quantiles() -> None:
@@ -72,7 +72,7 @@ def test_torque_offset_in_two_slow_turns(motor: str) -> None:
 
 @pytest.mark.parametrize("motor", MOTORS)
 def test_shipped_sensitivities_are_of_this_programme(motor: str) -> None:
-    stamp, found = loaded((configuration_folder() / "benchmark" / f"{motor}.npz").read_bytes())
+    stamp, found = loaded((HERE / f"{motor}.npz").read_bytes())
     assert stamp == digest(motor)
     assert found.stems == STEMS
     assert set(found.effects) == set(FORMS)

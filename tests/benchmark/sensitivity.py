@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.io.storage.publish import write_whole
-from pipeline.settings import configuration_folder
 from pipeline.simulator.design import Motor, Recording
 from pipeline.simulator.effects import ALWAYS, FORMS, parameters
-from pipeline.stages.benchmark.bench import MOTORS, STEMS, Station, recorded, station
+from tests.benchmark.bench import MOTORS, STEMS, Station, recorded, station
 
+HERE = Path(__file__).parent
 Array = NDArray[np.float64]
 POWER, LEVEL = 0.9, 0.01
 SEED = 20_260_501
@@ -182,7 +182,7 @@ def _explained(normal: Array, cross: Array) -> Array:
 
 def measure(name: str) -> Sensitivity:
     """The sensitivity of one motor's programme, from noise-free recordings; a minute of work."""
-    from pipeline.stages.benchmark.innovation import base_of, nuisances, priors
+    from tests.benchmark.innovation import base_of, nuisances, priors
 
     place = station(name)
     plain = _quiet(place, place.motor)
@@ -242,7 +242,7 @@ class _Columns:
         return [0.5 * (one - _fit(two, one.size)) for one, two in zip(there, back, strict=True)]
 
     def _added(self, effect: str, size: float, plain: Motor) -> list[Array]:
-        from pipeline.stages.benchmark.innovation import innovations
+        from tests.benchmark.innovation import innovations
 
         with_it = _quiet(self.place, changed(self.place.motor, effect, size))
         without = _quiet(self.place, plain)
@@ -356,8 +356,8 @@ def loaded(content: bytes) -> tuple[str, Sensitivity]:
 
 @cache
 def sensitivity(name: str, folder: Path) -> Sensitivity:
-    """Of one motor: as shipped in `conf/benchmark/`, as measured into `folder`, or measured now."""
-    shipped = configuration_folder() / "benchmark" / f"{name}.npz"
+    """Of one motor: as kept beside this file, as measured into `folder`, or measured now."""
+    shipped = HERE / f"{name}.npz"
     own = folder / f"{name}.npz"
     for path in (shipped, own):
         if path.is_file():

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pipeline.stages.benchmark.cases import OUTSIDE_VARIABLES, Case
+from tests.benchmark.cases import OUTSIDE_VARIABLES, Case
 
 Mark = Literal["right", "tie", "singled out", "wrong", "unknown", "missed", "failed"]
 POINTS: Mapping[Mark, int] = {

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.stages.benchmark.cases import Case
-from pipeline.stages.benchmark.scoring import Judged, judged
-from pipeline.stages.benchmark.values import Compared, compared
+from tests.benchmark.cases import Case
+from tests.benchmark.scoring import Judged, judged
+from tests.benchmark.values import Compared, compared
 
 CONFIDENCE = 0.95
 MATTERS = 0.01

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from pipeline.stages.benchmark.cases import Case
-from pipeline.stages.benchmark.scoring import judged
-from pipeline.stages.benchmark.table import Line, by_effect, interval, lines, table
-from pipeline.stages.benchmark.values import compared
+from tests.benchmark.cases import Case
+from tests.benchmark.scoring import judged
+from tests.benchmark.table import Line, by_effect, interval, lines, table
+from tests.benchmark.values import compared
 
 
 def case(family: str = "size", **what: Any) -> Case:
@@ -215,7 +215,7 @@ def test_a_gain_is_the_fault_and_the_stations_own() -> None:
     """The station's gain is drawn from the case's seed; the fault alone would be judged wrongly."""
     import numpy as np
 
-    from pipeline.stages.benchmark.bench import station
+    from tests.benchmark.bench import station
 
     place = station("gimbal-5208")
     first = np.random.SeedSequence(7).spawn(1)[0]
@@ -262,7 +262,7 @@ def test_vectors_of_three_phases(effect: str, names: tuple[str, str]) -> None:
 
 def test_size_of_an_effect_of_another_form() -> None:
     """Windage c w² at 0.95 of rated speed; 2 % more is an error of 2 %, without an interval."""
-    from pipeline.stages.benchmark.bench import station
+    from tests.benchmark.bench import station
 
     speed = 0.95 * station("gimbal-5208").motor.speed_rated_rad_s
     hidden = case(truth=("windage",), effects={"windage": {"size": 1e-7}})

@@ -4,34 +4,28 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pipeline
+from pipeline.io.storage.code_version import closure_digest
 from pipeline.io.storage.publish import canonical_json, write_whole
-from pipeline.stages.benchmark.blind import Diagnose, attempted, blind_process
-from pipeline.stages.benchmark.cases import Case, case_from
-from pipeline.stages.benchmark.sealing import blind_campaign
+from pipeline.io.storage.syntax import syntax_of
+from tests.benchmark.blind import Diagnose, attempted, blind_process
+from tests.benchmark.cases import Case, case_from
+from tests.benchmark.sealing import blind_campaign
 
-JUDGED = ("criticism", "numerics", "physics", "records")
-FORGING = (
-    "simulator",
-    *(f"stages/benchmark/{name}.py" for name in ("bench", "corruption", "sealing")),
-)
+HERE = Path(__file__).parent
+JUDGED = ("pipeline.criticism.diagnosis", "pipeline.execution.start")
+SIMULATED = ("pipeline.simulator.bench", "pipeline.simulator.outside")
+RECORDED = ("bench.py", "corruption.py", "sealing.py")
 
 
-def code_digest(rooms: Iterable[str] = (*JUDGED, *FORGING)) -> str:
-    """12 hex digits of the sources that a result hangs on: what is judged, what is simulated."""
-    digest = hashlib.sha256()
-    root = Path(pipeline.__file__).parent
-    for room in rooms:
-        whole = root / room
-        for path in [whole] if whole.is_file() else sorted(whole.rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+def code_digest() -> str:
+    """12 hex digits of what a result hangs on: what is judged, what is simulated and how."""
+    parts = [closure_digest(module) for module in (*JUDGED, *SIMULATED)]
+    parts += [syntax_of((HERE / name).read_bytes(), "tests.benchmark").digest for name in RECORDED]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:12]
 
 
 @dataclass(frozen=True, slots=True)

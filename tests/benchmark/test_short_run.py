@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.stages.benchmark.blind import product
-from pipeline.stages.benchmark.cases import Case
-from pipeline.stages.benchmark.drawing import cases
-from pipeline.stages.benchmark.running import Book, code_digest, run
-from pipeline.stages.benchmark.scoring import judged
-from pipeline.stages.benchmark.sealing import blind_campaign
-from pipeline.stages.benchmark.table import table
+from tests.benchmark.blind import product
+from tests.benchmark.cases import Case
+from tests.benchmark.drawing import cases
+from tests.benchmark.running import Book, code_digest, run
+from tests.benchmark.scoring import judged
+from tests.benchmark.sealing import blind_campaign
+from tests.benchmark.table import table
 
 LINES = {("null", "clean"), ("size", "1 typical"), ("gap", "test missing"), ("outside", None)}
 

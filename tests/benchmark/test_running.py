@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,14 +13,13 @@ import pytest
 
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import UsageError
-from pipeline.settings import BenchmarkSettings
-from pipeline.stages.benchmark import bench
-from pipeline.stages.benchmark import cases as cases_module
-from pipeline.stages.benchmark.blind import attempted, blind_process
-from pipeline.stages.benchmark.cases import Case
-from pipeline.stages.benchmark.command import BEGIN, END, main
-from pipeline.stages.benchmark.drawing import cases
-from pipeline.stages.benchmark.running import Book, code_digest, run, share_of
+from tests.benchmark import bench
+from tests.benchmark import cases as cases_module
+from tests.benchmark.blind import attempted, blind_process
+from tests.benchmark.cases import Case
+from tests.benchmark.command import BEGIN, END, Options, main, options
+from tests.benchmark.drawing import cases
+from tests.benchmark.running import Book, code_digest, run, share_of
 
 
 def fake(campaign: Campaign, model: str) -> dict[str, Any]:
@@ -137,7 +138,7 @@ def test_truth_lies_apart_from_results(few: list[Case], tmp_path: Path) -> None:
 def test_the_blind_process_has_an_empty_folder_and_no_arguments(
     few: list[Case], tmp_path: Path
 ) -> None:
-    from pipeline.stages.benchmark.sealing import blind_campaign
+    from tests.benchmark.sealing import blind_campaign
 
     campaign = blind_campaign(few[0])
     with blind_process() as worker:
@@ -169,10 +170,10 @@ def test_a_document_with_nan_is_a_failure(few: list[Case], tmp_path: Path) -> No
 def test_the_command_prints_what_there_is(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
-    settings = BenchmarkSettings(
+    settings = Options(
         action="table", output=str(tmp_path / "out"), docs=str(page), date="2026-01-01"
     )
-    text = main(settings).text
+    text = main(settings)
     assert "0 of 28 cases of the small set, seed 1" in text
     words = page.read_text()
     assert words.startswith("before\n")
@@ -189,4 +190,24 @@ def test_wrong_use_is_said(tmp_path: Path, key: str, value: str) -> None:
     given = {"output": str(tmp_path / "out"), "action": "table"}
     given[key] = value.format(page=tmp_path / "page.md")
     with pytest.raises(UsageError):
-        main(BenchmarkSettings(**given))
+        main(Options(**given))
+
+
+def test_words_are_options() -> None:
+    assert options(["subset=full", "seed=7"]) == Options(subset="full", seed=7)
+    for word in ("full", "sed=7", "seed=x"):
+        with pytest.raises(UsageError, match=re.escape(word)):
+            options([word])
+
+
+def test_wrong_use_ends_in_one_line() -> None:
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.benchmark", "action=guess"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("error: no action 'guess'")

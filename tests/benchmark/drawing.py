@@ -14,9 +14,9 @@ import numpy as np
 from pipeline.simulator.design import Motor
 from pipeline.simulator.effects import ALWAYS, FORMS, parameters
 from pipeline.simulator.outside import OUTSIDE
-from pipeline.stages.benchmark.bench import MOTORS, STEMS, station
-from pipeline.stages.benchmark.cases import Case, Values, case_from
-from pipeline.stages.benchmark.sensitivity import Sensitivity, sensitivity, typical
+from tests.benchmark.bench import MOTORS, STEMS, station
+from tests.benchmark.cases import Case, Values, case_from
+from tests.benchmark.sensitivity import Sensitivity, sensitivity, typical
 
 MULTIPLES = (1.0, 2.0, 5.0, 20.0)
 SHARES = (0.1, 0.3, 1.0)
@@ -170,7 +170,7 @@ def _singles(draw: Draw) -> Iterator[Case]:
 
 
 def _largest(effect: str) -> float:
-    from pipeline.stages.benchmark.sensitivity import LARGEST
+    from tests.benchmark.sensitivity import LARGEST
 
     return LARGEST.get(effect, math.inf)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.stages.benchmark.bench import MOTORS, recorded, station
-from pipeline.stages.benchmark.innovation import base_of, innovations, nuisances, priors
-from pipeline.stages.benchmark.sensitivity import changed, noncentrality_of, typical
+from tests.benchmark.bench import MOTORS, recorded, station
+from tests.benchmark.innovation import base_of, innovations, nuisances, priors
+from tests.benchmark.sensitivity import changed, noncentrality_of, typical
 
 KEEP = ("resistance_ab", "torque_map_1", "cogging_cw", "cogging_ccw")
 LIMIT = 2.5758

@@ -11,7 +11,7 @@ from typing import Any
 
 from pipeline.io.storage.publish import canonical_json
 from pipeline.simulator.design import Motor
-from pipeline.stages.benchmark.bench import STEMS, station
+from tests.benchmark.bench import STEMS, station
 
 Values = dict[str, float]
 

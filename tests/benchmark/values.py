@@ -13,8 +13,8 @@ from typing import Any
 
 from pipeline.simulator.design import Instruments, Motor
 from pipeline.simulator.effects import cogging_order, parameters
-from pipeline.stages.benchmark.bench import station
-from pipeline.stages.benchmark.cases import Case
+from tests.benchmark.bench import station
+from tests.benchmark.cases import Case
 
 Truth = Callable[[float, Instruments], float]
 Size = Callable[[Mapping[str, float], Motor], float]

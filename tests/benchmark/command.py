@@ -1,0 +1,104 @@
+"""What `python -m tests.benchmark` does: sealed cases, diagnosed blind, and the table of marks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from pipeline.io.storage.publish import write_whole
+from pipeline.records.errors import UsageError
+from tests.benchmark.blind import product
+from tests.benchmark.cases import Case
+from tests.benchmark.drawing import cases, small
+from tests.benchmark.running import Book, code_digest, run, share_of
+from tests.benchmark.table import by_effect, table
+
+ACTIONS = ("run", "table", "sensitivity")
+SUBSETS = ("small", "full")
+BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """The keys of the command.
+
+    `action`: run, table (of what has been run), or sensitivity (measure a* anew). `output`: folder
+    of sealed truths and results. `subset`: small, of minutes, or full, of hours. `shard`: which
+    part of the cases to work on, i/n with i from 1. `seed`: of every random draw. `docs`: Markdown
+    page to put the table into, between its marks. `date`: date to write over the table.
+    """
+
+    action: str = "run"
+    output: str = "reports/benchmark"
+    subset: str = "small"
+    shard: str = "1/1"
+    seed: int = 1
+    docs: str = ""
+    date: str = ""
+
+
+def options(words: Sequence[str]) -> Options:
+    """Options from `key=value` words; raises UsageError for what is none."""
+    known = {field.name: field.type for field in fields(Options)}
+    given: dict[str, Any] = {}
+    for word in words:
+        key, sign, value = word.partition("=")
+        if not sign or key not in known:
+            raise UsageError(f"{word!r} is no key=value", f"known keys are {', '.join(known)}")
+        if key == "seed" and not value.isdecimal():
+            raise UsageError(f"{word} is no whole number", "write seed= and a whole number")
+        given[key] = int(value) if key == "seed" else value
+    return Options(**given)
+
+
+def main(chosen: Options) -> str:
+    """Runs one shard of the benchmark, or makes the table of what has been run."""
+    if chosen.action not in ACTIONS:
+        raise UsageError(f"no action {chosen.action!r}", f"known are {', '.join(ACTIONS)}")
+    if chosen.subset not in SUBSETS:
+        raise UsageError(f"no subset {chosen.subset!r}", f"known are {', '.join(SUBSETS)}")
+    output = Path(chosen.output)
+    if chosen.action == "sensitivity":
+        from tests.benchmark.sensitivity import measure_all
+
+        measure_all(output)
+        return f"sensitivities of every motor in {output}\n"
+    book = Book(output, code_digest())
+    drawn = list(cases(chosen.seed, output / "sensitivity"))
+    wanted = small(iter(drawn)) if chosen.subset == "small" else drawn
+    done = 0
+    if chosen.action == "run":
+        try:
+            own = share_of(wanted, chosen.shard)
+        except ValueError as error:
+            raise UsageError(str(error), "write shard=1/4 for the first of four") from error
+        done = run(own, book, product)
+    text = _table(chosen, book, wanted)
+    if chosen.docs:
+        _into_page(Path(chosen.docs), text)
+    return f"{done} cases diagnosed\n\n{text}"
+
+
+def _table(options: Options, book: Book, chosen: list[Case]) -> str:
+    found = [(case, document) for case in chosen if (document := book.document(case)) is not None]
+    date = f", {options.date}" if options.date else ""
+    heading = (
+        f"{len(found)} of {len(chosen)} cases of the {options.subset} set, "
+        f"seed {options.seed}, code {book.code}{date}"
+    )
+    whole = table(found, heading)
+    if options.subset == "full":
+        whole += "\n" + by_effect(found)
+    return whole
+
+
+def _into_page(page: Path, text: str) -> None:
+    """Puts a table between the marks of a page; raises UsageError where it has none."""
+    words = page.read_text(encoding="utf-8")
+    if BEGIN not in words or END not in words:
+        raise UsageError(f"{page} has no place for the table", f"write {BEGIN} and {END} into it")
+    before, rest = words.split(BEGIN, 1)
+    _, after = rest.split(END, 1)
+    write_whole(page, f"{before}{BEGIN}\n{text}{END}{after}".encode())
