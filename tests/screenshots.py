@@ -16,7 +16,7 @@ from pathlib import Path
 from pipeline.__main__ import main as pipeline
 from pipeline.io.recordings.viewer import catalogue, free_port, page_address
 from pipeline.io.recordings.web import page_server, recording_address
-from tests.looking import Browser, Viewer
+from tests.viewing import Browser, Viewer
 
 MOTOR = "G52-1402"
 BEFORE, AFTER = "2026-W06", "2026-W14"

@@ -1,1 +1,1 @@
-"""Many files and motors over several workers: who works, what survives, what is remembered."""
+"""Work on many files and motors with several workers: executors, retries, caches."""

@@ -1,4 +1,4 @@
-"""The captures of one motor read and judged, each file under its limits; in a worker."""
+"""Reads and validates the captures of one motor in a worker, each file under its limits."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Usable = tuple[tuple[Capture, ...], tuple[Finding, ...]]
 
 
 def usable_captures(task: ReadTask, watch: Stopwatch | None = None) -> Usable:
-    """The captures that hold, by path, and what was refused or doubtful."""
+    """The usable captures by path, and the findings on refused or doubtful files."""
     from pipeline.contracts.duplicates import once
     from pipeline.contracts.validate import validate
     from pipeline.io.ingest.capture_reader import read_capture

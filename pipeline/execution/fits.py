@@ -1,9 +1,9 @@
-"""Fits of one motor that need not be done again while nothing that they were made from changes.
+"""A cache of the fits of one motor.
 
-A fit hangs on the source of the estimator's file and all that it imports, on its options, on the
-captures as they were read and judged (every number, name, mask and word of metadata), and on the
-constants that the estimator declares to use. So a changed estimator is fitted again with those that
-use what it gives, if that has changed, and no other. Whatever changes what is read (a unit in a
+A fit depends on the code of the estimator's file and of everything that it imports, on its options,
+on the captures as read and validated (every number, name, mask and entry of metadata), and on the
+constants that the estimator declares to use. A changed estimator is fitted again. Estimators that
+use its constants follow only if these have changed. Whatever changes what is read (a unit in a
 source map, a sidecar, a gate's limit) changes the captures, and so the fits.
 """
 
@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.registry import homes
 from pipeline.execution.jobs import MotorJob
-from pipeline.execution.keeping import FOLDER
 from pipeline.execution.keys import fit_parts, key_of
+from pipeline.execution.run_cache import FOLDER
 from pipeline.execution.work import Stamp
 from pipeline.io.storage.code_version import closure_digest, libraries_version
 from pipeline.io.storage.publish import write_whole
@@ -39,18 +39,16 @@ _MAX_BYTES = 2**30
 
 
 class FitMemory:
-    """The fits of one motor, kept in one file."""
+    """The cached fits of one motor, in one file."""
 
     def __init__(self, job: MotorJob, stamp: Stamp) -> None:
-        """`stamp` is of the datasheet to be made: where that version was revoked, what is kept from
-        before is doubted with it.
-        """
+        """`stamp` is of the new datasheet; fits of a revoked version are not used."""
         self._path = Path(job.output) / FOLDER / "fits" / f"{file_stem(job.motor_id)}.fits"
         self._kept = _load(self._path)
         self._homes = homes()
         self._used: dict[str, tuple[str, bytes, bytes]] = {}
         self._campaign = stamp.campaign
-        self._doubt = [revoked for revoked in job.revoked if revoked.version == stamp.version]
+        self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def __call__(
         self,
@@ -59,7 +57,7 @@ class FitMemory:
         options: Mapping[str, float],
         fit: Callable[[], Fit],
     ) -> Fit:
-        """The fit that is kept, or a new one."""
+        """The cached fit, or a new one."""
         home = self._homes.get(estimator.name, estimator.fit.__module__)
         key = key_of(
             fit_parts(
@@ -68,7 +66,7 @@ class FitMemory:
                 self._campaign,
                 options,
                 known.estimates,
-                self._doubt,
+                self._revoked,
             )
         )
         kept = self._kept.get(estimator.name)
@@ -77,18 +75,18 @@ class FitMemory:
             return _decoded(kept[1], kept[2])
         text, data = _encoded(fit())
         self._used[estimator.name] = key, text, data
-        # as it would be read again, so that those who use it see the same the next time
+        # decoded as from the cache, so that its users see the same numbers in the next run
         return _decoded(text, data)
 
     def save(self) -> None:
-        """Keeps the fits of this campaign; a place that cannot be written is no failure."""
+        """Stores the fits of this campaign; a place that cannot be written is no failure."""
         if self._used == self._kept:
             return
         with suppress(PipelineError):
-            write_whole(self._path, _sealed(self._used))
+            write_whole(self._path, _checksummed(self._used))
 
 
-def _sealed(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
+def _checksummed(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
     head = [[name, key, len(text), len(data)] for name, (key, text, data) in sorted(fits.items())]
     parts = [json.dumps(head).encode() + b"\n"]
     for _, (_, text, data) in sorted(fits.items()):
@@ -115,7 +113,7 @@ def _load(path: Path) -> dict[str, tuple[str, bytes, bytes]]:
 
 
 def _encoded(fit: Fit) -> tuple[bytes, bytes]:
-    """A fit as JSON, and the bytes of its arrays, which the JSON counts."""
+    """A fit as JSON, and the bytes of its arrays, whose shapes are in the JSON."""
     arrays: list[bytes] = []
 
     def array(values: NDArray[Any]) -> list[Any]:
@@ -148,34 +146,34 @@ def _decoded(text: bytes, data: bytes) -> Fit:
     document = json.loads(text)
     at = 0
 
-    def array(said: Sequence[Any]) -> NDArray[Any]:
+    def array(form: Sequence[Any]) -> NDArray[Any]:
         nonlocal at
-        dtype, shape = np.dtype(said[0]), tuple(said[1])
+        dtype, shape = np.dtype(form[0]), tuple(form[1])
         values = np.frombuffer(data, dtype, int(np.prod(shape)), at).reshape(shape).copy()
         at += values.nbytes
         return values
 
-    estimates = tuple(_estimate(said) for said in document["estimates"])
+    estimates = tuple(_estimate(stored) for stored in document["estimates"])
     evidence = tuple(
         Evidence(
-            **said
+            **stored
             | {
                 "series": tuple(
                     Series(label, array(x), array(measured), array(fitted))
-                    for label, x, measured, fitted in said["series"]
+                    for label, x, measured, fitted in stored["series"]
                 )
             }
         )
-        for said in document["evidence"]
+        for stored in document["evidence"]
     )
     return Fit(estimates, evidence)
 
 
-def _estimate(said: Mapping[str, Any]) -> Estimate:
-    bounds = said["bounds"]
-    values: dict[str, Any] = dict(said)
-    values["budget"] = tuple(Contribution(**part) for part in said["budget"])
-    values["captures"] = tuple(said["captures"])
-    values["orders"] = tuple(Order(**one) for one in said["orders"])
+def _estimate(stored: Mapping[str, Any]) -> Estimate:
+    bounds = stored["bounds"]
+    values: dict[str, Any] = dict(stored)
+    values["budget"] = tuple(Contribution(**part) for part in stored["budget"])
+    values["captures"] = tuple(stored["captures"])
+    values["orders"] = tuple(Order(**order) for order in stored["orders"])
     values["bounds"] = None if bounds is None else (bounds[0], bounds[1])
     return Estimate(**values)

@@ -1,4 +1,4 @@
-"""One motor's work and what comes back of it: plain data, light to import for the driver."""
+"""The job of one motor and its result: plain data, cheap to import for the driver."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Files = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """A motor that is done: its findings and its files."""
+    """A finished motor: its findings and its files."""
 
     findings: tuple[Finding, ...]
     files: Files
@@ -26,12 +26,12 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class MotorJob:
-    """Everything a worker needs for one motor; plain data, so that it crosses a process.
+    """Everything that a worker needs for one motor: plain data, so that it can be pickled.
 
-    `key` is the digest of the work, None where it is not to be noted as done; `refused` are files
-    that must not be read, with the reason. `revoked` are the motor's revoked versions: one of this
-    work with other content is superseded. `model` is what the captures are held against, None for
-    nothing.
+    `key` is the digest of the work, None where the result is not cached; `refused` are files that
+    must not be read, with the reason. `revoked` are the motor's revoked versions: a version of the
+    same work with other content supersedes them. `model` is the model of the residual test, None
+    for no test.
     """
 
     motor_id: str
@@ -66,9 +66,9 @@ class MotorJob:
 
 @dataclass(frozen=True, slots=True)
 class MotorResult:
-    """What comes back: findings, files (none if no capture was usable) and the times taken [s].
+    """The result of a job: findings, files (none if no capture was usable) and times [s].
 
-    `lasting` is False where a file killed its reader, which it may not do again: nothing is kept.
+    `lasting` is False where a file killed its reader. A retry may succeed, so nothing is cached.
     """
 
     motor_id: str

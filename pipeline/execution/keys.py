@@ -1,9 +1,9 @@
-"""What everything that is kept hangs on, by named parts; a key is the digest of its parts.
+"""Cache keys: what each cached result depends on, by named parts. A key is the digest of its parts.
 
-What is kept before anything is read hangs on all that decides what is read and made of it: bytes
-of files, source maps, metadata, settings, limits, code, libraries. What is kept of captures in
-memory hangs on them as they were read, so on every cause that could read them otherwise.
-Records go in whole: a field that is added to one counts without a word here.
+A result that is looked up before anything is read depends on bytes of files, source maps, metadata,
+settings, limits, code and libraries. A result of captures in memory depends on these as they were
+read, and so on everything that could change the reading.
+Records enter as a whole: a field that is added to one counts without a change here.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from pipeline.settings import RunSettings
 Parts = Mapping[str, Any]
 
 NOT_OF_A_MOTOR = frozenset({"input", "output", "key", "refused"})
-"""Fields of a job that change nothing of what it gives: where things lie, what it is known by, and
-files that killed their reader, after which nothing is kept.
+"""Fields of a job that do not change its result: folders, its key, and files that killed their
+reader, after which nothing is cached.
 """
 NOT_OF_A_BATCH = frozenset(
     {"input", "output", "workers", "executor", "scheduler", "tls_ca", "tls_cert", "tls_key"}
     | {"cache", "timings", "registry_options"}
 )
-"""Settings that say where things lie and how the work is done, never what comes of it."""
+"""Settings of folders and of how the work is done; they do not change the results."""
 
 
 def key_of(parts: Parts) -> str:
@@ -51,7 +51,7 @@ def answer_parts(
     *,
     recover: bool,
 ) -> Parts:
-    """What the survey's answer on one file hangs on; the question holds its manifest row."""
+    """What the survey's answer on one file depends on; the question holds its manifest row."""
     return {
         "tools": tools,
         "question": question,
@@ -64,9 +64,9 @@ def answer_parts(
 
 
 def motor_parts(tools: str, job: MotorJob) -> Parts:
-    """What the findings and files of one motor hang on."""
-    own = {f.name: getattr(job, f.name) for f in fields(job) if f.name not in NOT_OF_A_MOTOR}
-    return {"tools": tools, **own}
+    """What the findings and files of one motor depend on."""
+    parts = {f.name: getattr(job, f.name) for f in fields(job) if f.name not in NOT_OF_A_MOTOR}
+    return {"tools": tools, **parts}
 
 
 def batch_parts(
@@ -76,30 +76,32 @@ def batch_parts(
     found: Survey,
     commit: int | None,
 ) -> Parts:
-    """What a batch's own pages and outcome hang on: `motors` are the keys of its motors, in which
-    its captures are; `commit` is the registry's last one, after which a version may be revoked.
+    """What the pages and the outcome of a batch depend on.
+
+    `motors` are the keys of its motors, which cover its captures; `commit` is the registry's last
+    one, as a version may be revoked later.
     """
-    own = {f.name: getattr(settings, f.name) for f in fields(settings)}
-    seen = {f.name: getattr(found, f.name) for f in fields(found)}
+    every = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    surveyed = {f.name: getattr(found, f.name) for f in fields(found)}
     return {
         "tools": tools,
-        "settings": {name: value for name, value in own.items() if name not in NOT_OF_A_BATCH},
+        "settings": {name: value for name, value in every.items() if name not in NOT_OF_A_BATCH},
         "motors": motors,
-        "survey": {name: value for name, value in seen.items() if name != "entries"},
+        "survey": {name: value for name, value in surveyed.items() if name != "entries"},
         "commit": commit,
     }
 
 
-def handed(campaign: Campaign, readings: Sequence[str]) -> list[Any]:
-    """What a campaign hands to the work: every field of it, its captures by their digests."""
-    own = {f.name: getattr(campaign, f.name) for f in fields(campaign) if f.name != "captures"}
-    return [own, list(readings)]
+def campaign_key(campaign: Campaign, readings: Sequence[str]) -> list[Any]:
+    """Every field of a campaign, with its captures by their digests."""
+    parts = {f.name: getattr(campaign, f.name) for f in fields(campaign) if f.name != "captures"}
+    return [parts, list(readings)]
 
 
 def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha256: str) -> Parts:
-    """What a datasheet hangs on: captures as they were read, configuration, code, libraries.
+    """What a datasheet depends on: captures as they were read, configuration, code, libraries.
 
-    `campaign` is what `handed` gives.
+    `campaign` is the result of `campaign_key`.
     """
     return {
         "campaign": campaign,
@@ -110,7 +112,7 @@ def version_parts(code: str, libraries: str, campaign: Sequence[Any], config_sha
 
 
 def superseding_parts(version: str, superseded: Superseded) -> Parts:
-    """What the version hangs on that takes the place of a revoked one: of the same work."""
+    """What a version depends on that supersedes a revoked one of the same work."""
     return {"version": version, "supersedes": superseded}
 
 
@@ -120,10 +122,12 @@ def fit_parts(
     campaign: Sequence[Any],
     options: Mapping[str, float],
     known: Sequence[Estimate],
-    doubt: object,
+    revoked: object,
 ) -> Parts:
-    """What one estimator's fit hangs on: its code, the captures as they were read, its options, the
-    constants that it uses, and the revocation of a version made of such fits (`doubt`).
+    """What the fit of one estimator depends on.
+
+    Its code, the captures as they were read, its options, the constants that it uses, and the
+    revocations of a version that was made of such fits (`revoked`).
     """
     return {
         "code": code,
@@ -131,7 +135,7 @@ def fit_parts(
         "campaign": campaign,
         "options": dict(options),
         "known": list(known),
-        "doubt": doubt,
+        "revoked": revoked,
     }
 
 
@@ -141,10 +145,12 @@ def model_parts(
     campaign: Sequence[Any],
     model: ModelSpec,
     start: Sequence[Estimate],
-    doubt: object,
+    revoked: object,
 ) -> Parts:
-    """What the residual test of one motor hangs on: the code of criticism, the captures as they
-    were read, the model, the constants that it starts from, and as for fits a revocation.
+    """What the residual test of one motor depends on.
+
+    The code of criticism, the captures as they were read, the model, the constants that it starts
+    from, and the revocations, as for fits.
     """
     return {
         "code": code,
@@ -152,5 +158,5 @@ def model_parts(
         "campaign": campaign,
         "model": model,
         "start": list(start),
-        "doubt": doubt,
+        "revoked": revoked,
     }

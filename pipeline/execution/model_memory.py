@@ -1,12 +1,12 @@
-"""Verdicts of the residual test that need not be come to again."""
+"""A cache of verdicts of the residual test."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from pipeline.execution.jobs import MotorJob
-from pipeline.execution.keeping import FOLDER
 from pipeline.execution.keys import key_of, model_parts
+from pipeline.execution.run_cache import FOLDER
 from pipeline.execution.work import Stamp
 from pipeline.io.storage.code_version import closure_digest, libraries_version
 from pipeline.io.storage.sealed import keep_sealed, read_sealed
@@ -16,31 +16,31 @@ from pipeline.records.model_verdict import ModelVerdict
 from pipeline.records.naming import file_stem
 
 TEST = "pipeline.execution.model_tests"
-"""What makes the test, with the effects that it finds."""
+"""The module that runs the test; its imports include the effects."""
 
 
 class ModelMemory:
-    """The verdict on one motor's model that an earlier run came to, kept in one file."""
+    """The cached verdict on one motor's model, in one file."""
 
     def __init__(self, job: MotorJob, stamp: Stamp) -> None:
-        """`stamp` is of the datasheet to be made; where it was revoked, no verdict is recalled."""
+        """`stamp` is of the new datasheet; a verdict of a revoked version is not used."""
         self._path = Path(job.output) / FOLDER / "models" / f"{file_stem(job.motor_id)}.json"
         self._campaign = stamp.campaign
-        self._doubt = [revoked for revoked in job.revoked if revoked.version == stamp.version]
+        self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def key(self, model: ModelSpec, start: Constants) -> str:
-        """What the verdict hangs on."""
+        """The key of everything that the verdict depends on."""
         code, libraries = closure_digest(TEST), libraries_version(TEST)
         known = start.estimates
-        return key_of(model_parts(code, libraries, self._campaign, model, known, self._doubt))
+        return key_of(model_parts(code, libraries, self._campaign, model, known, self._revoked))
 
     def recall(self, key: str) -> ModelVerdict | None:
-        """The verdict of this key; None where another one is kept, or none."""
-        kept = read_sealed(self._path)
-        if kept is None or kept["key"] != key:
+        """The cached verdict of this key, else None."""
+        entry = read_sealed(self._path)
+        if entry is None or entry["key"] != key:
             return None
-        return ModelVerdict.of(kept["model"])
+        return ModelVerdict.of(entry["model"])
 
     def keep(self, key: str, found: ModelVerdict) -> None:
-        """Keeps a verdict; a place that cannot be written is no failure."""
+        """Stores a verdict; a place that cannot be written is no failure."""
         keep_sealed(self._path, {"key": key, "model": found.document()})

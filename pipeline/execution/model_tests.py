@@ -1,4 +1,4 @@
-"""The residual test of one motor, in a worker: a model held against its captures, once."""
+"""The residual test of one motor in a worker: a model is compared with its captures, once."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ SWITCHED_OFF = ModelVerdict("not_tested", note="residual_test=false")
 
 
 class Verdicts(Protocol):
-    """Verdicts that were come to before, by a key of all that they hang on."""
+    """A cache of verdicts, by a key of everything that they depend on."""
 
     def key(self, model: ModelSpec, start: Constants) -> str:
-        """The key of a model held against the captures from these constants."""
+        """The key of a model that is compared with the captures from these constants."""
 
     def recall(self, key: str) -> ModelVerdict | None:
-        """The verdict of a key, if it is kept."""
+        """The verdict of a key, or None."""
 
     def keep(self, key: str, found: ModelVerdict) -> None:
-        """Keeps a verdict."""
+        """Stores a verdict."""
 
 
 def judged_model(
@@ -33,10 +33,10 @@ def judged_model(
     constants: Constants,
     memory: Verdicts | None = None,
 ) -> tuple[ModelVerdict, tuple[Finding, ...]]:
-    """The verdict on a model of one motor, `not_tested` for none, and what went wrong in the test.
+    """The verdict on a model of one motor, `not_tested` for None, and the errors of the test.
 
-    A test that breaks on some captures costs itself and not the datasheet. Raises UsageError for a
-    model or an effect that there is not.
+    A test that fails on some captures does not stop the datasheet. Raises UsageError for an
+    unknown model or effect.
     """
     if model is None:
         return SWITCHED_OFF, ()
@@ -52,8 +52,8 @@ def judged_model(
             if memory is not None:
                 memory.keep(key, found)
     except (*BROKEN, MemoryError) as error:
-        said = f"the residual test broke on these captures: {type(error).__name__}: {error}"
+        message = f"the residual test broke on these captures: {type(error).__name__}: {error}"
         remedy = "the constants stand; report the captures with this line"
-        broken = Finding(campaign.motor_id, "warning", "residual_test_failed", said, remedy)
-        return ModelVerdict("not_tested", model.name, model.effects, note=said), (broken,)
+        broken = Finding(campaign.motor_id, "warning", "residual_test_failed", message, remedy)
+        return ModelVerdict("not_tested", model.name, model.effects, note=message), (broken,)
     return found, ()

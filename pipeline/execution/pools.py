@@ -1,4 +1,4 @@
-"""Who works: processes of this machine, or a Dask cluster. Both are `concurrent.futures`."""
+"""Executors: processes of this machine or a Dask cluster, both as `concurrent.futures`."""
 
 from __future__ import annotations
 
@@ -16,30 +16,30 @@ from pipeline.execution.task import begin_worker
 from pipeline.records.errors import MachineError, UsageError
 
 NEEDED = ("tls_ca", "tls_cert", "tls_key")
-TALKATIVE = ("distributed", "tornado", "asyncio")
+NOISY_LOGGERS = ("distributed", "tornado", "asyncio")
 
 
 @dataclass(frozen=True, slots=True)
 class Pool:
-    """Workers that take tasks. `died` are the errors of a future whose worker died.
+    """An executor and how it fails. `died` are the errors of a future whose worker died.
 
-    `lost` are those that say that nobody is left to take tasks. `spares` is True where the death
-    of one worker leaves the others at work.
+    `lost` are the errors of an executor without any worker. `isolates_crashes` is True where the
+    death of one worker leaves the others running.
     """
 
     executor: Executor
     died: tuple[type[BaseException], ...]
     lost: tuple[type[BaseException], ...] = ()
-    spares: bool = False
+    isolates_crashes: bool = False
 
 
 OpenPool = Callable[[int], AbstractContextManager[Pool]]
-"""Opens a pool of so many workers."""
+"""Opens a pool of the given number of workers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """Where a Dask cluster is (None: one of our own, on loopback), and its TLS files."""
+    """Address of a Dask cluster (None: a local one on loopback), and its TLS files."""
 
     address: str | None = None
     tls_ca: str | None = None
@@ -48,7 +48,7 @@ class Cluster:
 
 
 def open_pool(executor: str, cluster: Cluster) -> OpenPool:
-    """How to open workers of a kind: `local` or `dask`; raises UsageError for any other."""
+    """How to open a pool of a kind, `local` or `dask`; raises UsageError for any other."""
     if executor == "local":
         if cluster != Cluster():
             raise UsageError("a scheduler or TLS file is named", "add executor=dask")
@@ -78,7 +78,7 @@ def core_count() -> int:
 
 @contextmanager
 def local_pool(workers: int) -> Iterator[Pool]:
-    """Processes of this machine, each begun anew: strangers' files never meet the driver."""
+    """Spawned processes of this machine; the driver itself reads no untrusted file."""
     share = str(max(1, core_count() // max(workers, 1)))
     executor = ProcessPoolExecutor(workers, get_context("spawn"), begin_worker, (share,))
     try:
@@ -107,7 +107,7 @@ def _check(cluster: Cluster) -> None:
 
 
 class _Dask:
-    """A Dask cluster as pools; whoever asks for several pools gets the same workers."""
+    """A Dask cluster as pools; several pools share the same workers."""
 
     def __init__(self, cluster: Cluster) -> None:
         self.cluster = cluster
@@ -123,13 +123,13 @@ class _Dask:
         with _quiet(), _client(self.cluster, workers) as client:
             executor = client.get_executor(pure=False)
             lost = (CancelledError, FutureCancelledError, CommClosedError)
-            yield Pool(executor, (KilledWorker,), lost, spares=True)
+            yield Pool(executor, (KilledWorker,), lost, isolates_crashes=True)
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """No traceback of Dask's own threads; the driver tells in a line what became of the work."""
-    names = [n for n in logging.root.manager.loggerDict if n.split(".")[0] in TALKATIVE]
+    """Silences the tracebacks of Dask's own threads; the driver reports failures in one line."""
+    names = [n for n in logging.root.manager.loggerDict if n.split(".")[0] in NOISY_LOGGERS]
     before = {logger: logger.level for logger in map(logging.getLogger, names)}
     for logger in before:
         logger.setLevel(logging.CRITICAL + 1)
@@ -142,7 +142,7 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def _client(cluster: Cluster, workers: int) -> Iterator[Any]:
-    """A client of the cluster that is named, or of one of our own on loopback without a page."""
+    """A client of the named cluster, or of a local one on loopback without a dashboard."""
     import dask
     from distributed import Client, LocalCluster
     from distributed.security import Security
@@ -183,19 +183,19 @@ def _client(cluster: Cluster, workers: int) -> Iterator[Any]:
 
 
 OWN_CLUSTER = {
-    # A task that kills its worker comes back at once; the driver decides on it.
+    # A task that kills its worker is returned at once; the driver decides on a retry.
     "distributed.scheduler.allowed-failures": 0,
     # Nothing is served but the scheduler and its workers, on loopback.
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
-    # Looking at what workers do a hundred times a second costs a tenth of their time.
+    # Profiling the workers a hundred times a second costs a tenth of their time.
     "distributed.worker.profile.enabled": False,
-    # There is a worker a core: threads of its libraries would only wake each other. Dask's own
-    # choice would hand every freed array back to the system, and fetch it again.
+    # There is one worker a core, so threads of its libraries would only compete. Dask's default
+    # would also return every freed array to the system, and allocate it again.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(
         ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "POLARS_MAX_THREADS"), "1"
     ),
-    # Fifty times a second a worker's loop would ask for the interpreter of the work.
+    # The default tick takes the interpreter lock from the work fifty times a second.
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "10s",
 }

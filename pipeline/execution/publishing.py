@@ -1,4 +1,4 @@
-"""What belongs to a whole batch: its findings, its page, its list of files, its outcome."""
+"""The outputs of a whole batch: its findings, its page, its list of files, its outcome."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from pipeline.settings import RunSettings
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"
-"""Stand for the names of the folders; no file may bear such a name."""
+"""Placeholders for the names of the folders; no file may have such a name."""
 OF_BATCH = frozenset({*KEY_CONSTANTS, *(name for _, name, _ in COLUMNS)})
-"""Constants that the batch's page and summary show."""
-TOLD = 5
-"""Names of removed files in a note, at most; datasheets come first."""
-ROOMS = ("datasheets", "report", "recordings", ".cache")
+"""Constants that the page and the summary of the batch show."""
+MOST_NAMED = 5
+"""Most names of removed files in a note; datasheets come first."""
+FOLDERS = ("datasheets", "report", "recordings", ".cache")
 
 
 def datasheets_of(output: Path, results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
-    """The datasheets of a batch, read back from where they were written.
+    """The datasheets of a batch, read back from the disk.
 
-    Only what belongs to the batch is kept of each, or memory would grow with the batch.
+    Only the constants that the batch shows are kept, so that memory hardly grows with the batch.
     """
     names = [name for result in results for name, _ in result.finished.files]
     sheets = (read_datasheet(output / name) for name in names if name.startswith("datasheets/"))
@@ -55,10 +55,10 @@ def publish(
     findings: Sequence[Finding],
     statuses: Statuses,
 ) -> tuple[Files, tuple[str, ...]]:
-    """Writes what belongs to the batch, then takes away what an earlier run left behind.
+    """Writes the outputs of the batch, then removes the outdated files of an earlier run.
 
     `statuses` are the current ones by motor.
-    Returns every file of the batch, and the names of those that were taken away.
+    Returns every file of the batch, and the names of the removed files.
     """
     output = Path(settings.output)
     files: list[tuple[str, str]] = []
@@ -81,7 +81,7 @@ def publish(
 
 
 def _sweep(output: Path, files: Sequence[str]) -> tuple[str, ...]:
-    """Removes the files that the last run listed and this one did not write, and torn ones.
+    """Removes the files that the last run listed and this one did not write, and partial files.
 
     Returns the names of the former.
     """
@@ -92,26 +92,26 @@ def _sweep(output: Path, files: Sequence[str]) -> tuple[str, ...]:
             with suppress(IsADirectoryError, NotADirectoryError, FileNotFoundError):
                 stale.unlink()
                 removed.append(name)
-    for room in ROOMS:
-        for torn in (output / room).rglob(".*.partial"):
-            if not _alive(partial_owner(torn)):
-                torn.unlink(missing_ok=True)
+    for folder in FOLDERS:
+        for partial in (output / folder).rglob(".*.partial"):
+            if not _alive(partial_owner(partial)):
+                partial.unlink(missing_ok=True)
     return tuple(removed)
 
 
 def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
-    """A line that counts and names what an earlier run had left and this one took away."""
+    """A line that counts and names the removed files of an earlier run."""
     if not removed:
         return ()
-    told = ", ".join(removed[:TOLD]) + (", ..." if len(removed) > TOLD else "")
+    names = ", ".join(removed[:MOST_NAMED]) + (", ..." if len(removed) > MOST_NAMED else "")
     return (
         f"note: {output} holds what comes of this input alone: "
-        f"{counted(len(removed), 'file')} of an earlier run removed: {told}",
+        f"{counted(len(removed), 'file')} of an earlier run removed: {names}",
     )
 
 
 def _listed(manifest: Path) -> set[str]:
-    """The files that a manifest names; none where it is none of ours."""
+    """The files that a manifest names; empty for a file that is no manifest."""
     try:
         files = json.loads(manifest.read_bytes())["files"]
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
@@ -140,25 +140,25 @@ def outcome_of(
     *,
     report: bool,
 ) -> Outcome:
-    """What the command says, with its exit code; `placed` names the folders in it."""
-    seen = [{check.status for check in sheet.checks} for sheet in datasheets]
+    """The text and exit code of the command; `with_folder_names` fills in the folders."""
+    outcomes = [{check.status for check in sheet.checks} for sheet in datasheets]
     refused = any(finding.severity == "refused" for finding in findings)
     code = first_that_applies(
-        1 if any("fail" in one for one in seen) else 0,
+        1 if any("fail" in checked for checked in outcomes) else 0,
         3 if refused else 0,
-        4 if not datasheets or any(one == {"not_evaluated"} for one in seen) else 0,
+        4 if not datasheets or any(checked == {"not_evaluated"} for checked in outcomes) else 0,
     )
     lines = tuple(finding.line() for finding in findings)
     if not datasheets:
         lines = (*lines, nothing_usable(INPUT, refused=refused))
     if found.note:
         lines = (*lines, f"note: {found.note}")
-    told = summary(datasheets, findings, OUTPUT, report=report, folder=INPUT, statuses=statuses)
-    return Outcome(code, told, lines)
+    text = summary(datasheets, findings, OUTPUT, report=report, folder=INPUT, statuses=statuses)
+    return Outcome(code, text, lines)
 
 
-def placed(outcome: Outcome, settings: RunSettings) -> Outcome:
-    """The outcome with the names of the folders, which are no part of what is kept."""
+def with_folder_names(outcome: Outcome, settings: RunSettings) -> Outcome:
+    """The outcome with the names of the folders, which the cache does not hold."""
 
     def name(text: str) -> str:
         return text.replace(INPUT, settings.input).replace(OUTPUT, settings.output)

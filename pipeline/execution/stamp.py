@@ -1,4 +1,4 @@
-"""What a datasheet says it was made of: settings, captures as read, code and libraries."""
+"""The version of a datasheet: a digest of settings, captures as read, code and libraries."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable, Sequence
 
 from pipeline.execution.jobs import MotorJob
-from pipeline.execution.keys import handed, key_of, version_parts
+from pipeline.execution.keys import campaign_key, key_of, version_parts
 from pipeline.execution.versions import datasheet_code, datasheet_libraries
 from pipeline.execution.work import Stamp
 from pipeline.io.maps.source_map import SourceMap
@@ -17,10 +17,10 @@ from pipeline.settings import RunSettings, result_document
 
 
 def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
-    """The version of a motor's datasheet, with all that it is a digest of."""
+    """The version of a motor's datasheet, with the parts of its digest."""
     readings = tuple(content_digest(capture) for capture in campaign.captures)
     code, libraries = datasheet_code(), datasheet_libraries()
-    given = handed(campaign, readings)
+    given = campaign_key(campaign, readings)
     version = key_of(version_parts(code, libraries, given, job.config_sha256))
     return Stamp(version, readings, job.config_sha256, code, libraries, given)
 
@@ -28,8 +28,10 @@ def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
 def configuration_digest(
     settings: RunSettings, required: Sequence[str], sources: Iterable[SourceMap | None]
 ) -> str:
-    """Digest of the settings that can change a result, of the constants that a release must hold,
-    and of the source maps that the captures need. What a lot is held to changes no datasheet.
+    """Digest of the settings that can change a result.
+
+    It covers the constants that a release requires, and the source maps that the captures need.
+    The limits of a lot change no datasheet.
     """
     work = canonical_json({**result_document(settings), "required": tuple(required)})
     maps = sorted({repr(source) for source in sources if source is not None})

@@ -1,4 +1,4 @@
-"""What criticism starts from."""
+"""Start constants of the criticism."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from pipeline.records.constants import Constants
 
 
 def start_constants(campaign: Campaign, fitted: Constants | None = None) -> Constants:
-    """Constants to start criticism from: none where a nameplate or a spin tells the pole pairs,
-    else those that are `fitted` already, or are now.
+    """The constants from which criticism starts.
+
+    Empty where the nameplate or a spin gives the pole pairs, else `fitted`, fitted now if None.
     """
     if campaign.nameplate("pole_pairs") is not None or counted_pole_pairs(campaign) is not None:
         return Constants()

@@ -1,7 +1,7 @@
-"""Statuses of an output's motors as the registry has them now, on the pages that show them.
+"""The current statuses of an output's motors by the registry, on the pages that show them.
 
-A run asks after it has registered its datasheets, `registry approve` and `revoke` after a decision.
-The datasheets themselves never change.
+A run updates the pages after it has registered its datasheets, `registry approve` and `revoke`
+after a decision. The datasheets themselves never change.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.execution.jobs import Files, MotorResult
-from pipeline.execution.keeping import note_files
+from pipeline.execution.run_cache import note_files
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.io.storage.publish import write_whole
@@ -30,7 +30,7 @@ INDEX = "report/index.html"
 
 
 def histories_of(registry: Registry | None) -> Histories:
-    """The versions of each motor; none without a registry, or where it cannot be read."""
+    """The versions of each motor; empty without a registry, or where it cannot be read."""
     if registry is None:
         return {}
     try:
@@ -46,13 +46,14 @@ def status_now(output: Path, sheet: Datasheet, versions: Histories) -> CurrentSt
     return current_status(sheet, versions.get(sheet.motor_id, ()), sha256)
 
 
-def restated(
+def with_current_statuses(
     output: Path, results: Sequence[MotorResult], versions: Histories
 ) -> tuple[list[MotorResult], Statuses]:
-    """The results with the digests of the pages whose status was out of date, written anew; the
-    status of each motor.
+    """Rewrites the pages whose status is out of date.
+
+    Returns the results with the new digests, and the current status of each motor.
     """
-    found, statuses = [], {}
+    updated, statuses = [], {}
     for result in results:
         files = dict(result.finished.files)
         for name in [name for name in files if name.startswith("datasheets/")]:
@@ -61,14 +62,14 @@ def restated(
             statuses[sheet.motor_id] = current
             files |= _rewritten(output, sheet, current)
         finished = replace(result.finished, files=tuple(files.items()))
-        found.append(replace(result, finished=finished))
-    return found, statuses
+        updated.append(replace(result, finished=finished))
+    return updated, statuses
 
 
 def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[str, str]:
-    """Name and digest of a motor's page, where there is one whose status was not the current one.
+    """Name and digest of a motor's page that showed an outdated status and was rewritten.
 
-    What a run keeps of its work learns of it: the page is still what that work came to.
+    The run cache is updated too, as the page still belongs to the same work.
     """
     from pipeline.report.status_block import with_status
 
@@ -87,9 +88,9 @@ def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[s
 
 
 def show_decision(registry: Registry, motor_id: str) -> tuple[str, ...]:
-    """Rewrites the pages beside a registry in an output folder that show a motor; their names.
+    """Rewrites the pages that show a motor in the output folder of a registry; returns their names.
 
-    Nothing is done for a registry that is no output's, or where the motor is not in the output.
+    Does nothing for a registry outside an output folder, or a motor that is not in the output.
     Raises MachineError where a page cannot be written.
     """
     output = None if "://" in registry.place else Path(registry.place).parent
@@ -112,8 +113,8 @@ def _index(output: Path, versions: Histories) -> Iterable[str]:
     paths = sorted((output / "datasheets").glob("*.json"))
     sheets = [replace(read_datasheet(path), alternatives=(), captures=()) for path in paths]
     statuses = {sheet.motor_id: status_now(output, sheet, versions) for sheet in sheets}
-    said = json.loads((output / "findings.json").read_bytes())["findings"]
-    findings = [Finding.of(one) for one in said]
+    documents = json.loads((output / "findings.json").read_bytes())["findings"]
+    findings = [Finding.of(document) for document in documents]
     after = render_fleet(sheets, findings, statuses).encode()
     if after == (output / INDEX).read_bytes():
         return ()

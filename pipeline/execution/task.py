@@ -1,4 +1,4 @@
-"""What happens in a worker: one task under a crumb, its log lines brought back with its result."""
+"""Running one task in a worker, with a progress file; its log lines return with its result."""
 
 from __future__ import annotations
 
@@ -15,24 +15,26 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any, NoReturn
 
-from pipeline.io.ingest.guard import crumbs
+from pipeline.io.ingest.guard import progress_file
 from pipeline.records.errors import PipelineError
 
 LOGGER = "pipeline"
 GARBAGE_ROUND = 100_000
-"""So many new objects until a worker looks for cycles; by default 700, a tenth of its time."""
+"""New objects between two garbage collections of a worker; the default of 700 costs a tenth of its
+time.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What came of a task: its value or its error, and (level, text) of what was logged."""
+    """The outcome of a task: its value or its error, and (level, text) of what was logged."""
 
     value: Any
     error: Exception | None
     logged: tuple[tuple[int, str], ...]
 
 
-def perform(function: Callable[[Any], Any], task: Any, crumb: str | None) -> Report:
+def perform(function: Callable[[Any], Any], task: Any, progress: str | None) -> Report:
     """Runs `function(task)` with its warnings and log lines collected.
 
     An error is part of the report, not raised, so that its log lines are not lost.
@@ -40,12 +42,12 @@ def perform(function: Callable[[Any], Any], task: Any, crumb: str | None) -> Rep
     logged: list[tuple[int, str]] = []
     value: Any = None
     error: Exception | None = None
-    with _collected(logged), crumbs(None if crumb is None else Path(crumb)):
+    with _collected(logged), progress_file(None if progress is None else Path(progress)):
         try:
             value = function(task)
         except PipelineError as fault:
             error = fault
-        except Exception as fault:  # noqa: BLE001 (the driver tells it, with the motor's name)
+        except Exception as fault:  # noqa: BLE001 (the driver reports it, with the motor's name)
             error = RuntimeError(f"{type(fault).__name__}: {fault}"[:500])
     return Report(value, error, tuple(logged))
 
@@ -71,8 +73,8 @@ def _collected(logged: list[tuple[int, str]]) -> Iterator[None]:
 def begin_worker(threads: str) -> None:
     """Ends this worker as soon as the driver is gone; `threads` is its share of the cores.
 
-    Polars hands every query to threads of its own: those of several workers would wait for each
-    other. Garbage waits longer.
+    Polars runs every query in threads of its own, and those of several workers would compete.
+    Garbage is collected less often.
     """
     os.environ.setdefault("POLARS_MAX_THREADS", threads)
     gc.set_threshold(GARBAGE_ROUND)

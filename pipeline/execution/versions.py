@@ -1,15 +1,15 @@
-"""Which code, and which libraries, the results of a run hang on: by what each of them imports."""
+"""The code and the libraries that the results of a run depend on, by their imports."""
 
 from __future__ import annotations
 
 from pipeline.io.storage.code_version import closure_digest, code_version, libraries_version
 
 WORK = "pipeline.execution.work"
-"""What makes datasheets."""
+"""The module that makes datasheets."""
 RUN = "pipeline.stages.run"
-"""What makes everything that a run writes."""
-LOOK = "pipeline.execution.looking"
-"""What finds captures in a folder."""
+"""The module that makes everything that a run writes."""
+SURVEY = "pipeline.execution.survey_tasks"
+"""The module that finds captures in a folder."""
 
 
 def datasheet_code() -> str:
@@ -18,10 +18,10 @@ def datasheet_code() -> str:
 
 
 def datasheet_libraries() -> str:
-    """The libraries that datasheets hang on."""
+    """The libraries that datasheets depend on."""
     return libraries_version(WORK)
 
 
 def tools(module: str) -> str:
-    """A module's code with all that it imports and runs on."""
+    """Version of a module's code with everything that it imports, and of its libraries."""
     return f"{closure_digest(module)}; {libraries_version(module)}"

@@ -1,7 +1,7 @@
-"""From files to a datasheet: all that its bytes hang on, and no more.
+"""From files to a datasheet: exactly the code that the bytes of a datasheet depend on.
 
-The version of the code that a datasheet states is that of this module with all that it imports:
-readers, gates, estimators, checks, records. What shows, keeps or registers datasheets is no part.
+The code version of a datasheet covers this module and everything that it imports: readers, gates,
+estimators, checks, records. Code that shows, caches or registers datasheets is not part of it.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from pipeline.records.outcome import Stopwatch
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """What a datasheet says it was made of: its version, and what that is a digest of.
+    """The version of a datasheet and the parts of its digest.
 
     `readings` are the digests of the motor's captures as they were read, in their order; `campaign`
-    is all that estimators are handed, for keys.
+    is everything that estimators are given, for cache keys.
     """
 
     version: str
@@ -48,7 +48,7 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """Constants, what was looked at, checks, residual test and findings of one motor."""
+    """Constants, evidence of the fits, checks, residual test and findings of one motor."""
 
     constants: Constants
     evidence: tuple[Evidence, ...]
@@ -58,7 +58,7 @@ class Judged:
 
 
 def read(job: MotorJob, watch: Stopwatch) -> Usable:
-    """The motor's captures that hold, by path, and what was refused or doubtful."""
+    """The motor's usable captures by path, and the findings on refused or doubtful files."""
     task = ReadTask(job.motor_id, job.input, job.entries, job.limits, job.gates, job.refused)
     return usable_captures(task, watch)
 
@@ -70,9 +70,9 @@ def judge(
     verdicts: Verdicts | None,
     watch: Stopwatch,
 ) -> Judged:
-    """Fits every estimator to the captures, makes every check, and holds the model against them.
+    """Fits every estimator, makes every check, and compares the model with the captures.
 
-    What `recall` and `verdicts` keep is not done again.
+    Results that `recall` and `verdicts` have cached are not computed again.
     """
     with watch.stage("fit"):
         constants, evidence, failures = fit_all(campaign, job.fit, recall)
@@ -89,7 +89,7 @@ def check(
     verdicts: Verdicts | None,
     watch: Stopwatch,
 ) -> Judged:
-    """Makes every check of constants that are fitted, and holds the model against the captures."""
+    """Makes every check of fitted constants, and compares the model with the captures."""
     with watch.stage("crosscheck"):
         apart = captures_apart(campaign, job.fit)
         checks = check_all(constants, campaign, job.crosscheck, apart)
@@ -101,7 +101,10 @@ def check(
 def captures_apart(
     campaign: Campaign, options: Mapping[str, Mapping[str, float]]
 ) -> tuple[Disagreement, ...]:
-    """Where the captures are not of one motor; those that stand alone tell which motor is usual."""
+    """Disagreements between captures that are not of one motor.
+
+    Constants that one capture alone determines show which motor the majority is of.
+    """
     for captures in (alone.repeated(campaign), campaign.captures):
         apart = agreement.disagreements(alone.readings(campaign.motor_id, captures, options))
         if not apart:

@@ -12,9 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
 from pipeline.execution.captures import ReadTask, usable_captures
-from pipeline.execution.crew import Crew
-from pipeline.execution.looking import look_with
 from pipeline.execution.pools import Cluster, core_count, open_pool
+from pipeline.execution.survey_tasks import survey_with
+from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry, Survey, survey
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Gathered(NamedTuple):
-    """Campaigns by motor_id, what was refused or doubtful, and a line on the other files."""
+    """Campaigns by motor_id, findings on refused or doubtful files, and a line on other files."""
 
     campaigns: tuple[Campaign, ...]
     findings: tuple[Finding, ...]
@@ -52,13 +52,13 @@ def campaigns(
     maps = load_source_maps(configuration_folder() / "source")
     sources = maps if source == "auto" else {source: find_map(maps, source)}
     bounds = limits or ReadLimits()
-    with TemporaryDirectory() as crumbs:
+    with TemporaryDirectory() as progress:
         pool = open_pool("local", Cluster())
-        with Crew(pool, core_count(), Path(crumbs) / "work") as crew:
-            ask = partial(look_with, crew, Path(folder), sources, bounds, recover=False)
+        with WorkerPool(pool, core_count(), Path(progress) / "work") as workers:
+            ask = partial(survey_with, workers, Path(folder), sources, bounds, recover=False)
             found = survey(Path(folder), sources, ask)
             tasks = _tasks(folder, found, motor, bounds)
-            read = crew.work_through(usable_captures, tasks)
+            read = workers.map_tasks(usable_captures, tasks)
     findings = list(found.findings)
     made = []
     for task, end in zip(tasks, read, strict=True):
@@ -76,19 +76,19 @@ def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) ->
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
     if motor is not None and motor not in motors:
-        there = f"there are {', '.join(sorted(motors))}" if motors else "there is none of any motor"
-        raise UsageError(f"no capture of motor {motor} in {folder}", there)
+        known = f"there are {', '.join(sorted(motors))}" if motors else "there is none of any motor"
+        raise UsageError(f"no capture of motor {motor} in {folder}", known)
     wanted = sorted(motors) if motor is None else [motor]
     return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
 
 
-def outcome_of(folder: str, found: Gathered, told: Sequence[str], *, undecided: bool) -> Outcome:
-    """What was told of each motor, what was refused, and what to do where nothing is usable."""
+def outcome_of(folder: str, found: Gathered, texts: Sequence[str], *, undecided: bool) -> Outcome:
+    """The text of each motor, the refusals, and the remedy where nothing is usable."""
     refused = any(finding.severity == "refused" for finding in found.findings)
     lines = [finding.line() for finding in found.findings]
-    if not told:
+    if not texts:
         lines.append(nothing_usable(folder, refused=refused))
     if found.note:
         lines.append(f"note: {found.note}")
     code = first_that_applies(3 if refused else 0, 4 if undecided else 0)
-    return Outcome(code, "\n".join(told), tuple(lines))
+    return Outcome(code, "\n".join(texts), tuple(lines))

@@ -1,4 +1,4 @@
-"""What `compare` and `diagnose` share: every motor of a folder judged, files written, one code."""
+"""Shared by `compare` and `diagnose`: judge every motor of a folder, and return one exit code."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
-from pipeline.execution.segment_worker import mate
+from pipeline.execution.segment_worker import segment_worker
 from pipeline.execution.start import start_constants
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
@@ -23,7 +23,7 @@ from pipeline.stages.campaigns import campaigns, outcome_of
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One motor's result: the text to print, and whether the captures were too few to tell."""
+    """One motor's result: the text to print, and whether the captures were too few to decide."""
 
     text: str
     undecided: bool
@@ -44,17 +44,19 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
         known_effects(settings.model.effects, settings.effects_path)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     watch, output = Stopwatch(), output_folder(settings.output)
-    with mate(settings.effects_path) as second:
+    with segment_worker(settings.effects_path) as worker:
         with watch.stage("read"), ThreadPoolExecutor(1) as aside:
-            asked = settings.input, settings.source, settings.motor, limits
-            read = aside.submit(campaigns, *asked)
+            request = settings.input, settings.source, settings.motor, limits
+            read = aside.submit(campaigns, *request)
             import_module(needs)
             found = read.result()
         spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
-        told = []
-        for one in found.campaigns:
-            with second.campaign():
-                told.append(judge(one, spec, start_constants(one), output, watch))
-    undecided = not told or any(one.undecided for one in told)
-    outcome = outcome_of(settings.input, found, [one.text for one in told], undecided=undecided)
+        results = []
+        for campaign in found.campaigns:
+            with worker.campaign():
+                results.append(judge(campaign, spec, start_constants(campaign), output, watch))
+    undecided = not results or any(result.undecided for result in results)
+    outcome = outcome_of(
+        settings.input, found, [result.text for result in results], undecided=undecided
+    )
     return replace(outcome, timings=watch.table())

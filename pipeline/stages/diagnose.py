@@ -53,25 +53,25 @@ def _judge(
 def _lines(result: Diagnosis) -> list[str]:
     """The verdict, the ladder and what to do next, in a few lines."""
     missing = ", ".join(result.missing)
-    told = [f"{result.motor_id}: {result.verdict}" + (f": {missing}" if missing else "")]
-    for rung in result.ladder:
-        added = ", ".join(rung.effects) or result.whole_model
-        told.append(f"  {added}: held-out error {rung.held_out:.4g} of the noise floor")
+    lines = [f"{result.motor_id}: {result.verdict}" + (f": {missing}" if missing else "")]
+    for step in result.ladder:
+        added = ", ".join(step.effects) or result.whole_model
+        lines.append(f"  {added}: held-out error {step.held_out:.4g} of the noise floor")
     for ranked in result.ranking[: len(result.missing)]:
         if ranked.confused_with:
             others = ", ".join(ranked.confused_with)
-            told.append(f"  {ranked.effect} could as well be {others}; {ranked.experiment}")
-        told.extend(
+            lines.append(f"  {ranked.effect} could as well be {others}; {ranked.experiment}")
+        lines.extend(
             f"    against {one.against}: {one.experiment}, predicted power {one.power:.0%}"
             for one in ranked.separation
             if one.power is not None
         )
     if result.verdict in ("adequate", "missing"):
-        told.extend(f"  {one.effect} is {one.shortfall}" for one in result.ranking if one.slight)
+        lines.extend(f"  {one.effect} is {one.shortfall}" for one in result.ranking if one.slight)
     if result.unknown is not None:
-        told.append(f"  left over in {result.unknown.signal}: {result.unknown.shape}")
+        lines.append(f"  left over in {result.unknown.signal}: {result.unknown.shape}")
     if result.unknown is not None and result.unknown.sketch:
-        told.append(f"  {result.unknown.expression}")
-        told.append(f"  an effect to start from: diagnosis/effects/{result.unknown.effect}.py")
-    told.extend(f"  {note}" for note in told_and_folded(result)[0])
-    return told
+        lines.append(f"  {result.unknown.expression}")
+        lines.append(f"  an effect to start from: diagnosis/effects/{result.unknown.effect}.py")
+    lines.extend(f"  {note}" for note in told_and_folded(result)[0])
+    return lines

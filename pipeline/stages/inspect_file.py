@@ -8,8 +8,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from pipeline.execution.crew import Crew
 from pipeline.execution.pools import Cluster, open_pool
+from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.physics.glossary import TESTS
@@ -51,9 +51,9 @@ def main(settings: InspectSettings) -> Outcome:
         raise UsageError(f"{settings.file} is a folder", "name one file of it")
     task = InspectTask(settings.file, ReadLimits(settings.read_seconds, settings.read_memory_mb))
     pool = open_pool("local", Cluster())
-    with TemporaryDirectory() as crumbs, Crew(pool, 1, Path(crumbs) / "work") as crew:
+    with TemporaryDirectory() as progress, WorkerPool(pool, 1, Path(progress) / "work") as workers:
         try:
-            (seen,) = crew.work_through(look_into, [task])
+            (seen,) = workers.map_tasks(look_into, [task])
         except CaptureError as error:
             told = f"{printable(settings.file)}: {error.message}"
             raise CaptureError(error.code, told, error.remedy, error.rows) from error

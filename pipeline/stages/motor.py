@@ -11,9 +11,9 @@ from pipeline.estimation.registry import estimators
 from pipeline.execution import work
 from pipeline.execution.fits import FitMemory
 from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
-from pipeline.execution.keeping import note_motor
 from pipeline.execution.keys import key_of, superseding_parts
 from pipeline.execution.model_memory import ModelMemory
+from pipeline.execution.run_cache import note_motor
 from pipeline.execution.stamp import stamp_of
 from pipeline.io.storage.publish import together
 from pipeline.records.capture import Campaign

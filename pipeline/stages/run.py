@@ -12,22 +12,22 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.api.options import check_options
-from pipeline.execution.crew import Crew
 from pipeline.execution.jobs import MotorJob, MotorResult
-from pipeline.execution.keeping import Batch, Keeping
 from pipeline.execution.keys import batch_parts, key_of, motor_parts
-from pipeline.execution.looking import look_with
 from pipeline.execution.pools import Cluster, core_count, open_pool
 from pipeline.execution.publishing import (
     datasheets_of,
     outcome_of,
-    placed,
     publish,
     removed_note,
+    with_folder_names,
 )
+from pipeline.execution.run_cache import Batch, RunCache
 from pipeline.execution.stamp import configuration_digest
-from pipeline.execution.statuses import histories_of, restated
+from pipeline.execution.statuses import histories_of, with_current_statuses
+from pipeline.execution.survey_tasks import survey_with
 from pipeline.execution.versions import RUN, tools
+from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
@@ -44,7 +44,7 @@ from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.report.progress import progress
 from pipeline.settings import RunSettings, configuration_folder
 
-CRUMBS = ".work"
+PROGRESS = ".work"
 COMMITTED = 50
 """Datasheets in a commit of the registry, at most."""
 Revocations = Mapping[str, tuple[Revocation, ...]]
@@ -52,7 +52,7 @@ Revocations = Mapping[str, tuple[Revocation, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Registered:
-    """What became of the datasheets in the registry: exit code, a line of text, error lines."""
+    """The result of registering the datasheets: exit code, a line of text, error lines."""
 
     code: int = 0
     text: str = ""
@@ -60,7 +60,7 @@ class Registered:
 
 
 def main(settings: RunSettings) -> Outcome:
-    """Every motor of `input` to `output`; refused captures are named and the rest goes on."""
+    """Processes every motor of `input`; refused captures are named and the others go on."""
     check_options(settings)
     ReadLimits(settings.read_seconds, settings.read_memory_mb)
     input_folder(settings.input)
@@ -74,9 +74,9 @@ def main(settings: RunSettings) -> Outcome:
     cluster = Cluster(settings.scheduler, settings.tls_ca, settings.tls_cert, settings.tls_key)
     pool = open_pool(settings.executor, cluster)
     output = output_folder(settings.output)
-    crew = Crew(pool, settings.workers or core_count(), output / CRUMBS)
-    with crew:
-        return _run(settings, registry, crew)
+    workers = WorkerPool(pool, settings.workers or core_count(), output / PROGRESS)
+    with workers:
+        return _run(settings, registry, workers)
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -86,24 +86,24 @@ def process_motor(job: MotorJob) -> MotorResult:
     return motor.process_motor(job)
 
 
-def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcome:
+def _run(settings: RunSettings, registry: Registry | None, workers: WorkerPool) -> Outcome:
     watch = Stopwatch()
     folder, output = Path(settings.input), Path(settings.output)
     conf = configuration_folder()
     limits = limits_file(conf / "limits", settings.limits)
     sources = _source_maps(conf / "source", settings.source)
-    keeping = Keeping(folder, output, on=settings.cache)
+    cache = RunCache(folder, output, on=settings.cache)
     with watch.stage("survey"):
-        ask = partial(_answers, settings, sources, crew, keeping)
+        ask = partial(_answers, settings, sources, workers, cache)
         found = survey(folder, sources, ask, recover=settings.recover)
     plain = _jobs(settings, found, limits)
     batch = _batch_key(settings, plain, found, registry)
-    if (same := _same_again(settings, registry, keeping, batch)) is not None:
-        return replace(same, timings=watch.table())
+    if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:
+        return replace(cached, timings=watch.table())
     revoked = _revocations(registry)
     jobs = _with_revoked(plain, revoked)
     with watch.stage("motors"):
-        results, died = _process(settings, jobs, crew, keeping)
+        results, died = _process(settings, jobs, workers, cache)
     findings = tuple(
         sorted({*found.findings, *(f for r in results for f in r.finished.findings)}, key=_order)
     )
@@ -111,7 +111,7 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
         registered = _register(registry, output, results)
         # before the statuses are read: a later decision is not in them
         batch = _batch_key(settings, plain, found, registry)
-        results, statuses = restated(output, results, histories_of(registry))
+        results, statuses = with_current_statuses(output, results, histories_of(registry))
     with watch.stage("fleet"):
         datasheets = datasheets_of(output, results)
         files, removed = publish(settings, results, datasheets, findings, statuses)
@@ -124,9 +124,9 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
             ((sheet.motor_id, sheet.version), sha256)
             for sheet, sha256 in zip(datasheets, digests, strict=True)
         )
-        keeping.keep_outcome(batch, Batch(outcome, contents), files)
-    keeping.forget_others([job.motor_id for job in jobs])
-    outcome = placed(outcome, settings)
+        cache.keep_outcome(batch, Batch(outcome, contents), files)
+    cache.forget_others([job.motor_id for job in jobs])
+    outcome = with_folder_names(outcome, settings)
     for result in results:
         for name, seconds in result.seconds.items():
             watch.seconds[f"  {name}"] = watch.seconds.get(f"  {name}", 0.0) + seconds
@@ -144,7 +144,7 @@ def _run(settings: RunSettings, registry: Registry | None, crew: Crew) -> Outcom
 
 
 def _registry(settings: RunSettings) -> Registry | None:
-    """The registry of this run; raises UsageError for a place where none can be."""
+    """The registry of this run; raises UsageError for an impossible place."""
     if settings.registry is None:
         return None
     place = settings.registry
@@ -156,9 +156,9 @@ def _registry(settings: RunSettings) -> Registry | None:
 def _register(
     registry: Registry | None, output: Path, results: Sequence[MotorResult]
 ) -> Registered:
-    """Publishes the datasheets, so many in a commit that memory does not grow with the batch.
+    """Publishes the datasheets in commits of limited size, so that memory stays bounded.
 
-    A registry that fails leaves the outputs whole.
+    A registry that fails leaves the outputs complete.
     """
     names = [n for r in results for n, _ in r.finished.files if n.startswith("datasheets/")]
     if registry is None or not names:
@@ -189,7 +189,7 @@ def _conflict(event: Event, place: str) -> str:
 
 
 def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:
-    """Every source map, or the one that was asked for."""
+    """Every source map, or the requested one."""
     maps = load_source_maps(folder)
     return maps if name == "auto" else {name: find_map(maps, name)}
 
@@ -197,25 +197,25 @@ def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:
 def _answers(
     settings: RunSettings,
     sources: Mapping[str, SourceMap],
-    crew: Crew,
-    keeping: Keeping,
+    workers: WorkerPool,
+    cache: RunCache,
     questions: Sequence[Question],
 ) -> list[Answer]:
-    """The survey's answers: those that are known, and those of the crew for the others."""
+    """The survey's answers: cached ones, and those of the workers for the other files."""
     folder = Path(settings.input)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
-    answers = keeping.known_answers(questions, sources, limits, recover=settings.recover)
+    answers = cache.known_answers(questions, sources, limits, recover=settings.recover)
     for number, question in enumerate(questions):
         if number not in answers and (answer := settled(folder, question, sources)) is not None:
             answers[number] = answer
     open_ = [number for number in range(len(questions)) if number not in answers]
-    asked = [questions[number] for number in open_]
-    found = look_with(crew, folder, sources, limits, asked, recover=settings.recover)
+    unanswered = [questions[number] for number in open_]
+    found = survey_with(workers, folder, sources, limits, unanswered, recover=settings.recover)
     answers.update(zip(open_, found, strict=True))
-    told = [answers[number] for number in range(len(questions))]
+    all_answers = [answers[number] for number in range(len(questions))]
     if open_:
-        keeping.keep_answers(questions, told)
-    return told
+        cache.keep_answers(questions, all_answers)
+    return all_answers
 
 
 def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
@@ -227,10 +227,10 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     jobs = [
         MotorJob(
             motor_id=motor_id,
-            entries=tuple(own),
+            entries=tuple(entries),
             input=settings.input,
             output=settings.output,
-            config_sha256=configuration_digest(settings, required, [e.source for e in own]),
+            config_sha256=configuration_digest(settings, required, [e.source for e in entries]),
             required=required,
             release=settings.release,
             report=settings.report,
@@ -240,10 +240,10 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             constants=settings.constants,
             crosscheck=settings.crosscheck,
             model=model if settings.residual_test else None,
-            findings=tuple(f for f in found.findings if f.file in {e.path for e in own}),
+            findings=tuple(f for f in found.findings if f.file in {e.path for e in entries}),
             limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )
-        for motor_id, own in sorted(motors.items())
+        for motor_id, entries in sorted(motors.items())
     ]
     return [_keyed(job) for job in jobs] if settings.cache else jobs
 
@@ -255,14 +255,14 @@ def _keyed(job: MotorJob) -> MotorJob:
 def _batch_key(
     settings: RunSettings, jobs: Sequence[MotorJob], found: Survey, registry: Registry | None
 ) -> str:
-    """Digest of all that the outcome of a batch is made from, but for where it lies."""
+    """Digest of everything that the outcome of a batch depends on, except folders."""
     commit = None if registry is None else registry.last_commit()
     keys = [job.key for job in jobs]
     return key_of(batch_parts(tools(RUN), settings, keys, found, commit))
 
 
 def _revocations(registry: Registry | None) -> Revocations:
-    """What is revoked, by motor; nothing where the registry cannot say: publishing tells why."""
+    """The revocations by motor; empty where the registry fails, as publishing reports the error."""
     if registry is not None:
         with suppress(MachineError):
             return registry.revocations()
@@ -270,16 +270,16 @@ def _revocations(registry: Registry | None) -> Revocations:
 
 
 def _with_revoked(jobs: Sequence[MotorJob], revoked: Revocations) -> list[MotorJob]:
-    """The jobs with the revoked versions of their motors, which count as a part of the work."""
+    """The jobs with the revoked versions of their motors, which are part of the key."""
     knowing = (replace(job, revoked=revoked.get(job.motor_id, ())) for job in jobs)
     return [job if job.key is None or not job.revoked else _keyed(job) for job in knowing]
 
 
-def _same_again(
-    settings: RunSettings, registry: Registry | None, keeping: Keeping, key: str
+def _cached_outcome(
+    settings: RunSettings, registry: Registry | None, cache: RunCache, key: str
 ) -> Outcome | None:
-    """The outcome of a batch that was done before and of which everything is still there."""
-    batch = keeping.outcome(key) if settings.cache else None
+    """The cached outcome of a batch, if all its files and registered versions still exist."""
+    batch = cache.outcome(key) if settings.cache else None
     if batch is None:
         return None
     text = ""
@@ -287,21 +287,21 @@ def _same_again(
         if not registry.has_files(batch.contents):
             return None
         text = f"registry {registry.place}: 0 new, {len(batch.contents)} known"
-    outcome = placed(batch.outcome, settings)
+    outcome = with_folder_names(batch.outcome, settings)
     return replace(outcome, text="\n".join(filter(None, [outcome.text, text])))
 
 
 def _process(
-    settings: RunSettings, jobs: Sequence[MotorJob], crew: Crew, keeping: Keeping
+    settings: RunSettings, jobs: Sequence[MotorJob], workers: WorkerPool, cache: RunCache
 ) -> tuple[list[MotorResult], tuple[MachineError, ...]]:
-    """The results in the order of the jobs, and an error for each that could not be finished."""
+    """The results in the order of the jobs, and an error for each unfinished one."""
     ends: list[Any] = [None] * len(jobs)
     for number, job in enumerate(jobs):
-        if job.key is not None and (done := keeping.finished(job.motor_id, job.key)) is not None:
+        if job.key is not None and (done := cache.finished(job.motor_id, job.key)) is not None:
             ends[number] = MotorResult(job.motor_id, done, {})
     due = [number for number, end in enumerate(ends) if end is None]
     with progress([_size(settings, jobs[number]) for number in due]) as bar:
-        found = crew.work_through(
+        found = workers.map_tasks(
             process_motor, [jobs[number] for number in due], lambda at, _: bar.advance(at)
         )
     for number, end in zip(due, found, strict=True):

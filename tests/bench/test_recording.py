@@ -20,7 +20,7 @@ from pipeline.io.recordings.capture import recording_bytes
 from pipeline.io.recordings.capture_traces import capture_traces, sample_table
 from pipeline.io.recordings.stream import recording, send_trace
 from pipeline.records.capture import Capture, CaptureMeta
-from tests.looking import Viewer, need_viewer
+from tests.viewing import Viewer, need_viewer
 
 CHANNELS, RATE_HZ = 20, 20_000
 NAMES = (

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.execution.crew import Crew
+from pipeline.execution.worker_pool import WorkerPool
 
 HEAD = "# contract: 1\n# motor_id: J/1\n# test: resistance\n# pair: ab\n# station: hall\n# lot: 7\n"
 LEVELS = [-2.0, -1.0, 1.0, 2.0]
@@ -28,13 +28,13 @@ class Bench:
         monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "home"))
         self.record("ab.csv", 0.6)
         self.worked: list[str] = []
-        whole = Crew.work_through
+        whole = WorkerPool.map_tasks
 
-        def watched(crew: Crew, function: Any, tasks: Any, done: Any = None) -> list[Any]:
+        def watched(workers: WorkerPool, function: Any, tasks: Any, done: Any = None) -> list[Any]:
             self.worked += [task.name for task in tasks]
-            return whole(crew, function, tasks, done)
+            return whole(workers, function, tasks, done)
 
-        monkeypatch.setattr(Crew, "work_through", watched)
+        monkeypatch.setattr(WorkerPool, "map_tasks", watched)
 
     def record(self, name: str, r_ohm: float) -> None:
         rows = [

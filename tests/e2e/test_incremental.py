@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.execution import fits
-from pipeline.execution.crew import Crew
+from pipeline.execution.worker_pool import WorkerPool
 from pipeline.stages import run
 
 WORDS = ("report=true", "recordings=false")
@@ -27,13 +27,13 @@ class Folder:
                 shutil.copyfile(bench / motor / name, self.input / motor / name)
         monkeypatch.setenv("XDG_CACHE_HOME", str(place / "home"))
         self.worked: list[str] = []
-        whole = Crew.work_through
+        whole = WorkerPool.map_tasks
 
-        def watched(crew: Crew, function: Any, tasks: Any, done: Any = None) -> list[Any]:
+        def watched(workers: WorkerPool, function: Any, tasks: Any, done: Any = None) -> list[Any]:
             self.worked += [task.name for task in tasks]
-            return whole(crew, function, tasks, done)
+            return whole(workers, function, tasks, done)
 
-        monkeypatch.setattr(Crew, "work_through", watched)
+        monkeypatch.setattr(WorkerPool, "map_tasks", watched)
 
     def run(self, *more: str) -> list[str]:
         """The tasks that the run gave to its workers; its results must be those of a clean run."""
@@ -59,7 +59,7 @@ def folder(bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fold
     return Folder(bench, tmp_path, monkeypatch)
 
 
-LOOK = "the look at one/lcr.csv and 5 more files"
+LOOK = "the survey of one/lcr.csv and 5 more files"
 ONE, TWO = "motor gimbal/one", "motor gimbal/two"
 
 
@@ -79,7 +79,7 @@ def test_what_a_changed_capture_touches_is_done(folder: Folder) -> None:
     text = changed.read_text()
     lines = [line for line in text.splitlines() if not line.startswith("# sha256_rows")]
     changed.write_text("\n".join(lines[:-1]) + "\n")
-    assert folder.run() == ["the look at two/lcr.csv and 0 more files", TWO]
+    assert folder.run() == ["the survey of two/lcr.csv and 0 more files", TWO]
     changed.unlink()
     assert folder.run() == [TWO]
     shutil.rmtree(folder.input / "one")

@@ -38,9 +38,9 @@ from pipeline.io.recordings.seal import SEAL, seal_of
 from pipeline.io.recordings.viewer import catalogue
 from pipeline.io.recordings.views import MEASURED, MODEL, PALETTE, RESIDUAL
 from pipeline.records.capture import Capture, CaptureMeta
-from tests.looking import Browser, Viewer, browser_path, count, need_viewer, pixels
 from tests.unit.ladders import make_diagnosis
 from tests.unit.regressions import make_regression
+from tests.viewing import Browser, Viewer, browser_path, count, need_viewer, pixels
 
 ROOT = Path(__file__).parents[2]
 HEALTHY, FAULTY = "G52-0601", "G52-1402"

@@ -158,7 +158,7 @@ def test_voltage_limit_of_the_inverter(rng: np.random.Generator) -> None:
 
 
 def test_dropped_samples(rng: np.random.Generator) -> None:
-    """Warned: 300 of 40,000 rows lost in one piece are counted and placed."""
+    """Warned: 300 of 40,000 rows lost in one piece are counted and with_folder_names."""
     capture = drive(MOTOR, rng)
     keep = np.ones(40000, dtype=bool)
     keep[5000:5300] = False

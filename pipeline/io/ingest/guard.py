@@ -1,9 +1,9 @@
-"""Limits around the reading of one untrusted file, and a trace of it for whoever outlives this.
+"""Limits around the reading of one untrusted file, and a progress file for the driver.
 
 A file that drives a parser out of memory or into an endless loop must cost that one file. Memory
 is bounded by the kernel (RLIMIT_DATA, Linux), time by a thread of C that needs no interpreter lock
-and ends the process. What the process was reading stands in its crumb, a file that the driver
-reads when the process is gone.
+and ends the process. The process writes what it is reading to its progress file, which the
+driver reads after a crash.
 """
 
 from __future__ import annotations
@@ -73,43 +73,43 @@ class ReadLimits:
 
 
 @dataclass(slots=True)
-class _Crumb:
-    """The file into which this process says what it is reading; None outside the fleet."""
+class _Progress:
+    """The progress file of this process, which names what it is reading; None outside a pool."""
 
     descriptor: int | None = None
 
 
-_CRUMB = _Crumb()
+_PROGRESS = _Progress()
 
 
 @contextmanager
-def crumbs(path: Path | None) -> Iterator[None]:
-    """Says in a file what is being read inside the block; the file is gone after a normal end."""
+def progress_file(path: Path | None) -> Iterator[None]:
+    """Writes to a file what is being read inside the block; a normal end removes the file."""
     if path is None:
         yield
         return
     path.parent.mkdir(parents=True, exist_ok=True)
-    _CRUMB.descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    _PROGRESS.descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     try:
         yield
     finally:
-        os.close(_CRUMB.descriptor)
-        _CRUMB.descriptor = None
+        os.close(_PROGRESS.descriptor)
+        _PROGRESS.descriptor = None
         path.unlink(missing_ok=True)
 
 
 @contextmanager
 def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
-    """Bounds the memory and, where a crumb is laid, the time of the block.
+    """Bounds the memory and, where there is a progress file, the time of the block.
 
     Raises CaptureError where Python itself runs out of memory, beyond which the process ends, and
     for whatever else the bytes make a reader raise.
     """
-    crumb = _CRUMB.descriptor
-    if crumb is not None:
-        os.pwrite(crumb, path.encode("utf-8", "surrogatepass") + b"\n", 0)
-        os.lseek(crumb, 0, os.SEEK_END)
-        faulthandler.dump_traceback_later(limits.time_s(size_bytes), exit=True, file=crumb)
+    progress = _PROGRESS.descriptor
+    if progress is not None:
+        os.pwrite(progress, path.encode("utf-8", "surrogatepass") + b"\n", 0)
+        os.lseek(progress, 0, os.SEEK_END)
+        faulthandler.dump_traceback_later(limits.time_s(size_bytes), exit=True, file=progress)
     try:
         with _memory(limits.memory_bytes(size_bytes)), refusing():
             yield
@@ -121,10 +121,10 @@ def reading(path: str, size_bytes: int, limits: ReadLimits) -> Iterator[None]:
             "split the recording, or raise read_memory_mb",
         ) from None
     finally:
-        if crumb is not None:
+        if progress is not None:
             faulthandler.cancel_dump_traceback_later()
-            os.ftruncate(crumb, 0)
-            os.lseek(crumb, 0, os.SEEK_SET)
+            os.ftruncate(progress, 0)
+            os.lseek(progress, 0, os.SEEK_SET)
 
 
 @contextmanager
@@ -189,8 +189,8 @@ def _begin_libraries() -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class LastWords:
-    """What a dead process had under way: the file it was reading, and if its time was up.
+class CrashReport:
+    """What a process was doing when it died: the file it was reading, and whether it timed out.
 
     `path` is None where it was reading none; `begun` False where it had not begun at all.
     """
@@ -200,17 +200,17 @@ class LastWords:
     timed_out: bool = False
 
 
-def last_words(path: Path) -> LastWords:
-    """Reads the crumb of a dead process, and takes it away."""
+def crash_report(path: Path) -> CrashReport:
+    """Reads and removes the progress file of a dead process."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
-        return LastWords(begun=False)
+        return CrashReport(begun=False)
     path.unlink(missing_ok=True)
     name, _, rest = content.partition(b"\n")
     if not name:
-        return LastWords(begun=True)
-    return LastWords(True, name.decode("utf-8", "surrogatepass"), rest.startswith(_TIMEOUT))
+        return CrashReport(begun=True)
+    return CrashReport(True, name.decode("utf-8", "surrogatepass"), rest.startswith(_TIMEOUT))
 
 
 def died(reason: str) -> CaptureError:

@@ -12,7 +12,7 @@ from pipeline.contracts.registry import gates
 from pipeline.crosscheck.registry import rules
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.registry import estimators
-from pipeline.execution import fits, keeping, keys
+from pipeline.execution import fits, keys, run_cache
 from pipeline.execution.jobs import MotorJob
 from pipeline.execution.work import Stamp
 from pipeline.io.ingest.guard import ReadLimits
@@ -103,11 +103,11 @@ def test_an_answer_is_kept_until_what_it_hangs_on_changes(
         limits: ReadLimits = limits,
         recover: bool = False,
     ) -> bool:
-        kept = keeping.Keeping(folder, output, on=True)
+        kept = run_cache.RunCache(folder, output, on=True)
         monkeypatch.setattr(kept._inputs, "sha256", lambda _: answer.sha256)
         return kept.known_answers([asked], sources, limits, recover=recover) == {0: answer}
 
-    first = keeping.Keeping(folder, output, on=True)
+    first = run_cache.RunCache(folder, output, on=True)
     assert first.known_answers([question], sources, limits, recover=False) == {}
     first.keep_answers([question], [answer])
     assert known()
@@ -125,7 +125,7 @@ def test_an_answer_is_kept_until_what_it_hangs_on_changes(
     assert not known()
     beside.write_text(said)
     assert known()
-    monkeypatch.setattr(keeping, "tools", lambda _: "other")
+    monkeypatch.setattr(run_cache, "tools", lambda _: "other")
     assert not known()
 
 

@@ -141,7 +141,7 @@ class Version:
 
 @dataclass(frozen=True)
 class Superseding:
-    """What the version hangs on that takes the place of a revoked one."""
+    """What the version depends on that takes the place of a revoked one."""
 
     version: str = "v" * 64
     superseded: Superseded = SUPERSEDED
@@ -159,7 +159,7 @@ class Fit:
     campaign: Campaign = CAMPAIGN
     options: Mapping[str, float] = field(default_factory=lambda: {"share": 0.1, "level": 1e-3})
     known: tuple[Estimate, ...] = (ESTIMATE,)
-    doubt: tuple[Revocation, ...] = (REVOKED,)
+    revoked: tuple[Revocation, ...] = (REVOKED,)
 
     def parts(self) -> keys.Parts:
         own = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -175,7 +175,7 @@ class Model:
     campaign: Campaign = CAMPAIGN
     model: ModelSpec = SPEC
     start: tuple[Estimate, ...] = (ESTIMATE,)
-    doubt: tuple[Revocation, ...] = (REVOKED,)
+    revoked: tuple[Revocation, ...] = (REVOKED,)
 
     def parts(self) -> keys.Parts:
         own = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -183,7 +183,7 @@ class Model:
 
 
 def _readings(campaign: Campaign) -> Sequence[Any]:
-    return keys.handed(campaign, [content_digest(capture) for capture in campaign.captures])
+    return keys.campaign_key(campaign, [content_digest(capture) for capture in campaign.captures])
 
 
 KEPT: tuple[Callable[[], Any], ...] = (Answer, Motor, Batch, Version, Superseding, Fit, Model)

@@ -18,7 +18,7 @@ from pipeline.criticism.model import Model, zero
 from pipeline.criticism.registry import effects
 from pipeline.criticism.segments import segments
 from pipeline.execution.pools import core_count
-from pipeline.execution.segment_worker import halves, mate
+from pipeline.execution.segment_worker import halves, segment_worker
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from tests.unit.criticism.machines import BASE, machine
 
@@ -65,7 +65,7 @@ def test_floors_are_the_same_bits_and_in_order(found) -> None:
     model = Model(machine(), (cogging,))
     arguments = [(model, {**BASE, **zero(cogging, model)}, seed) for seed in range(len(found))]
     alone = by_threads(noise_floor, found, arguments)
-    with mate(None) as second, second.campaign():
+    with segment_worker(None) as second, second.campaign():
         for _ in range(2):  # the second time the worker has the segments already
             for one, two in zip(alone, on_each(noise_floor, found, arguments), strict=True):
                 np.testing.assert_array_equal(one, two)
@@ -73,7 +73,7 @@ def test_floors_are_the_same_bits_and_in_order(found) -> None:
 
 @workers
 def test_half_of_the_samples_are_the_workers(found) -> None:
-    with mate(None) as second, second.campaign():
+    with segment_worker(None) as second, second.campaign():
         theirs = on_each(whose, found, [(0,)] * len(found))
     sizes = np.array([one.size for one in found])
     assert 0.4 < sizes[np.array(theirs)].sum() / sizes.sum() < 0.6
@@ -90,7 +90,7 @@ def slow(segment, _) -> bool:
 
 @workers
 def test_shares_are_by_the_time_that_segments_took(found) -> None:
-    with mate(None) as second, second.campaign():
+    with segment_worker(None) as second, second.campaign():
         on_each(slow, found, [(0,)] * len(found))
         first, *others = on_each(slow, found, [(0,)] * len(found))
     assert all(other is not first for other in others)
@@ -123,7 +123,7 @@ def _tolerances_shared(found, effect: Effect, path: str | None) -> bool:
     values = {**BASE, **zero(effect, model), f"{effect.name}.torque_nm": 0.02}
     arguments = [(model, values, (effect,))] * len(found)
     alone = by_threads(form_tolerance, found, arguments)
-    with mate(path) as second, second.campaign():
+    with segment_worker(path) as second, second.campaign():
         for one, two in zip(alone, on_each(form_tolerance, found, arguments), strict=True):
             np.testing.assert_array_equal(one, two)
             assert one.max() > 0
@@ -132,7 +132,7 @@ def _tolerances_shared(found, effect: Effect, path: str | None) -> bool:
 
 @workers
 def test_the_death_of_the_worker_loses_nothing(found) -> None:
-    with mate(None) as second, second.campaign():
+    with segment_worker(None) as second, second.campaign():
         sums = on_each(fallen, found, [(0,)] * len(found))
         assert sums == tuple(one.recorded["torque_shaft_nm"].sum() for one in found)
         assert not any(on_each(whose, found, [(0,)] * len(found)))
@@ -140,7 +140,7 @@ def test_the_death_of_the_worker_loses_nothing(found) -> None:
 
 def test_an_error_of_the_work_itself_is_raised(found) -> None:
     with (
-        mate(None) as second,
+        segment_worker(None) as second,
         second.campaign(),
         pytest.raises(ZeroDivisionError, match=r"\.mcap"),
     ):

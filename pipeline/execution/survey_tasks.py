@@ -1,4 +1,4 @@
-"""The survey's questions answered by workers, each file under its limits."""
+"""Tasks of the survey: workers identify files, each file under its limits."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pipeline.execution.crew import Crew
+from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.files import size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.io.ingest.survey import Answer, Question, look
@@ -19,8 +19,8 @@ SMALLEST_BATCH = 16
 
 
 @dataclass(frozen=True, slots=True)
-class LookTask:
-    """Files to look at, in one task."""
+class SurveyTask:
+    """Files to identify in one task."""
 
     folder: str
     questions: tuple[Question, ...]
@@ -32,14 +32,14 @@ class LookTask:
     @property
     def name(self) -> str:
         """What the task works on."""
-        return f"the look at {self.questions[0].path} and {len(self.questions) - 1} more files"
+        return f"the survey of {self.questions[0].path} and {len(self.questions) - 1} more files"
 
-    def without(self, path: str, reason: str) -> LookTask:
+    def without(self, path: str, reason: str) -> SurveyTask:
         """The task with a file refused for a reason."""
         return replace(self, refused=(*self.refused, (path, reason)))
 
 
-def look_through(task: LookTask) -> tuple[Answer, ...]:
+def survey_files(task: SurveyTask) -> tuple[Answer, ...]:
     """The answers to a task's questions, in their order."""
     folder, refused = Path(task.folder), dict(task.refused)
     answers = []
@@ -55,8 +55,8 @@ def look_through(task: LookTask) -> tuple[Answer, ...]:
     return tuple(answers)
 
 
-def look_with(
-    crew: Crew,
+def survey_with(
+    workers: WorkerPool,
     folder: Path,
     sources: Mapping[str, SourceMap],
     limits: ReadLimits,
@@ -64,15 +64,15 @@ def look_with(
     *,
     recover: bool,
 ) -> list[Answer]:
-    """Asks a crew; raises MachineError where a batch cannot be looked at at all."""
-    share = -(-len(questions) // (4 * crew.workers)) if questions else 1
+    """The answers of the workers; raises MachineError where a batch of files fails as a whole."""
+    share = -(-len(questions) // (4 * workers.count)) if questions else 1
     size = min(max(share, SMALLEST_BATCH), LARGEST_BATCH)
     tasks = [
-        LookTask(str(folder), tuple(questions[at : at + size]), sources, recover, limits)
+        SurveyTask(str(folder), tuple(questions[at : at + size]), sources, recover, limits)
         for at in range(0, len(questions), size)
     ]
     answers: list[Answer] = []
-    for found in crew.work_through(look_through, tasks):
+    for found in workers.map_tasks(survey_files, tasks):
         if isinstance(found, MachineError):
             raise found
         answers += found

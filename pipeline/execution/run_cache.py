@@ -1,8 +1,8 @@
-"""What a run need not do again: answers of the survey, finished motors, the whole batch.
+"""The cache of a run: answers of the survey, finished motors, the whole batch.
 
-Everything is named by a digest of all that it was made from and holds no clock, so a note of
-another work, of other code or of other libraries is never found. Results are not kept twice: a
-note names the files of the output folder with their digests, and counts only while they hold.
+Each entry is keyed by a digest of everything that it depends on, and holds no clock. So an entry
+of other inputs, code or libraries is never found. Results are not stored twice: an entry names the
+files of the output folder with their digests, and is valid only while they match.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from pipeline.execution.jobs import Files, Finished
 from pipeline.execution.keys import answer_parts, key_of
-from pipeline.execution.versions import LOOK, tools
+from pipeline.execution.versions import SURVEY, tools
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question
 from pipeline.io.maps.source_map import SourceMap
@@ -30,13 +30,13 @@ FOLDER = ".cache"
 
 
 def motor_note(output: Path, motor_id: str) -> Path:
-    """Where it is noted that a motor is finished."""
+    """The cache entry of a finished motor."""
     return output / FOLDER / "motors" / f"{file_stem(motor_id)}.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A whole batch that is done: what the command said, and what its registry must hold.
+    """A finished batch: the outcome of the command, and what its registry must hold.
 
     `contents` are ((motor, version), sha256) of the datasheets.
     """
@@ -46,7 +46,7 @@ class Batch:
 
 
 def note_motor(output: Path, motor_id: str, key: str, finished: Finished) -> None:
-    """Notes that a motor is done; its files are on the disk already."""
+    """Records that a motor is done; its files are on the disk already."""
     keep_sealed(
         motor_note(output, motor_id),
         {
@@ -58,21 +58,21 @@ def note_motor(output: Path, motor_id: str, key: str, finished: Finished) -> Non
 
 
 def note_files(output: Path, motor_id: str, files: Files) -> None:
-    """Notes that some files of a motor that is done have other bytes; nothing where none is noted.
+    """Updates the digests of a finished motor's files; does nothing without an entry.
 
-    A note that cannot be written is no failure: the motor is done anew then.
+    An entry that cannot be written is no failure: the motor is then processed again.
     """
     path = motor_note(output, motor_id)
-    said = read_sealed(path)
-    if said is None:
+    entry = read_sealed(path)
+    if entry is None:
         return
     changed = dict(files)
-    said["files"] = [[name, changed.get(name, sha256)] for name, sha256 in said["files"]]
-    keep_sealed(path, said)
+    entry["files"] = [[name, changed.get(name, sha256)] for name, sha256 in entry["files"]]
+    keep_sealed(path, entry)
 
 
-class Keeping:
-    """The notes of one output folder on one input folder; `on` False neither reads nor writes."""
+class RunCache:
+    """The cache of one output folder for one input folder; `on` False neither reads nor writes."""
 
     def __init__(self, folder: Path, output: Path, *, on: bool) -> None:
         self.on = on
@@ -92,21 +92,21 @@ class Keeping:
         recover: bool,
     ) -> dict[int, Answer]:
         """Answers by the number of the question, for files that have not changed."""
-        said = (read_sealed(self._notes / "survey.json") if self.on else None) or {}
+        entries = (read_sealed(self._notes / "survey.json") if self.on else None) or {}
         self._context = partial(
-            answer_parts, tools(LOOK), sources=sources, limits=limits, recover=recover
+            answer_parts, tools(SURVEY), sources=sources, limits=limits, recover=recover
         )
         known = {}
         for number, question in enumerate(questions):
             self._before[question.path] = identity(self._folder / question.path)
             sha256 = self._inputs.sha256(question.path)
-            note = said.get(question.path)
+            note = entries.get(question.path)
             if sha256 and note and note["key"] == self._key(question, sha256):
                 known[number] = _answer(question.path, sha256, note, sources)
         return known
 
     def keep_answers(self, questions: Sequence[Question], answers: Sequence[Answer]) -> None:
-        """Keeps what the survey found of each file."""
+        """Stores the survey's answer on each file."""
         if not self.on:
             return
         notes = {}
@@ -130,32 +130,32 @@ class Keeping:
         return key_of(self._context(question, sha256, beside))
 
     def finished(self, motor_id: str, key: str) -> Finished | None:
-        """A motor of this key whose files are whole, or None."""
-        said = read_sealed(motor_note(self._notes.parent, motor_id)) if self.on else None
-        if said is None or said["key"] != key:
+        """The finished motor of this key, or None where a file of it is missing or changed."""
+        entry = read_sealed(motor_note(self._notes.parent, motor_id)) if self.on else None
+        if entry is None or entry["key"] != key:
             return None
-        files = tuple((name, sha256) for name, sha256 in said["files"])
+        files = tuple((name, sha256) for name, sha256 in entry["files"])
         if not all(self._outputs.holds(name, sha256) for name, sha256 in files):
             return None
-        return Finished(tuple(Finding.of(f) for f in said["findings"]), files)
+        return Finished(tuple(Finding.of(f) for f in entry["findings"]), files)
 
     def outcome(self, key: str) -> Batch | None:
-        """The batch of this key, if all its files are whole."""
-        said = read_sealed(self._notes / "run.json") if self.on else None
-        if said is None or said["key"] != key:
+        """The finished batch of this key, or None where a file of it is missing or changed."""
+        entry = read_sealed(self._notes / "run.json") if self.on else None
+        if entry is None or entry["key"] != key:
             return None
-        if not all(self._outputs.holds(name, sha256) for name, sha256 in said["files"]):
+        if not all(self._outputs.holds(name, sha256) for name, sha256 in entry["files"]):
             return None
-        outcome = Outcome(said["exit_code"], said["text"], tuple(said["errors"]))
-        contents = (((motor, version), sha256) for motor, version, sha256 in said["contents"])
+        outcome = Outcome(entry["exit_code"], entry["text"], tuple(entry["errors"]))
+        contents = (((motor, version), sha256) for motor, version, sha256 in entry["contents"])
         return Batch(outcome, tuple(contents))
 
     def keep_outcome(self, key: str, batch: Batch, files: Files) -> None:
-        """Keeps a batch that ended well."""
+        """Stores a batch that ended without an error."""
         if not self.on:
             return
         self._note_outputs(files)
-        said = {
+        entry = {
             "key": key,
             "exit_code": batch.outcome.exit_code,
             "text": batch.outcome.text,
@@ -163,10 +163,10 @@ class Keeping:
             "files": [list(file) for file in files],
             "contents": [[*key, sha256] for key, sha256 in batch.contents],
         }
-        keep_sealed(self._notes / "run.json", said)
+        keep_sealed(self._notes / "run.json", entry)
 
     def forget_others(self, motors: Sequence[str]) -> None:
-        """Forgets the motors that are no more in the batch."""
+        """Removes the entries of motors that are no longer in the batch."""
         wanted = {motor_note(self._notes.parent, motor_id).name for motor_id in motors}
         for path in (self._notes / "motors").glob("*.json") if self.on else ():
             if path.name not in wanted:
@@ -179,17 +179,17 @@ class Keeping:
 
 
 def _answer_note(key: str, answer: Answer) -> dict[str, Any]:
-    entry = answer.entry
+    found = answer.entry
     return {
         "key": key,
         "findings": [finding.document() for finding in answer.findings],
         "entry": None
-        if entry is None
+        if found is None
         else {
-            "form": entry.form,
-            "source": None if entry.source is None else entry.source.name,
-            "metadata": [list(pair) for pair in entry.metadata],
-            "recovered": entry.recovered,
+            "form": found.form,
+            "source": None if found.source is None else found.source.name,
+            "metadata": [list(pair) for pair in found.metadata],
+            "recovered": found.recovered,
         },
     }
 
@@ -197,11 +197,11 @@ def _answer_note(key: str, answer: Answer) -> dict[str, Any]:
 def _answer(
     path: str, sha256: str, note: Mapping[str, Any], sources: Mapping[str, SourceMap]
 ) -> Answer:
-    findings = tuple(Finding.of(said) for said in note["findings"])
-    said = note["entry"]
-    if said is None:
+    findings = tuple(Finding.of(document) for document in note["findings"])
+    found = note["entry"]
+    if found is None:
         return Answer(path, sha256, None, findings)
-    source = None if said["source"] is None else sources[said["source"]]
-    metadata = tuple((key, value) for key, value in said["metadata"])
-    entry = Entry(path, sha256, said["form"], source, metadata, said["recovered"])
+    source = None if found["source"] is None else sources[found["source"]]
+    metadata = tuple((key, value) for key, value in found["metadata"])
+    entry = Entry(path, sha256, found["form"], source, metadata, found["recovered"])
     return Answer(path, sha256, entry, findings)

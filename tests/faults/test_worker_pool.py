@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.execution.crew import Crew
 from pipeline.execution.pools import Pool, local_pool
+from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.guard import ReadLimits, reading
 from pipeline.records.errors import CaptureError, MachineError
 
@@ -72,17 +72,17 @@ def parse(file: str, seen: Path) -> None:
     if "starves" in file:
         np.ones(300 * 2**20 // 8)
     if "warns" in file:
-        warnings.warn("the worker's word", stacklevel=1)
+        warnings.warn("from the worker", stacklevel=1)
 
 
 @pytest.fixture
-def crew(tmp_path: Path) -> Iterator[Crew]:
-    with Crew(local_pool, 2, tmp_path / "crumbs") as made:
+def workers(tmp_path: Path) -> Iterator[WorkerPool]:
+    with WorkerPool(local_pool, 2, tmp_path / "progress") as made:
         yield made
-    assert not (tmp_path / "crumbs").exists()
+    assert not (tmp_path / "progress").exists()
 
 
-def test_each_poison_costs_itself(crew: Crew, tmp_path: Path) -> None:
+def test_a_failing_task_affects_no_other(workers: WorkerPool, tmp_path: Path) -> None:
     """Of seven tasks one file kills, one hangs, one starves; every other file is read."""
     tasks = [
         Reads(("good 1", "good 2"), str(tmp_path)),
@@ -94,7 +94,7 @@ def test_each_poison_costs_itself(crew: Crew, tmp_path: Path) -> None:
         Reads(("once", "good 9"), str(tmp_path)),
     ]
     done: list[int] = []
-    found = crew.work_through(read, tasks, lambda index, _: done.append(index))
+    found = workers.map_tasks(read, tasks, lambda index, _: done.append(index))
     assert found == [
         ["good 1: read", "good 2: read"],
         ["good 3: read", "kills: the process that read it died, twice", "good 4: read"],
@@ -107,16 +107,16 @@ def test_each_poison_costs_itself(crew: Crew, tmp_path: Path) -> None:
     assert sorted(done) == list(range(7))
 
 
-def test_a_task_that_breaks_is_told_and_the_others_are_done(
-    crew: Crew, tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_a_task_that_breaks_is_reported_and_the_others_are_done(
+    workers: WorkerPool, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A fault of ours: tried twice, then one error with the task's name. A warning arrives."""
     tasks = [Reads((name,), str(tmp_path)) for name in ("good", "breaks", "warns")]
-    one, two, three = crew.work_through(read, tasks)
+    one, two, three = workers.map_tasks(read, tasks)
     assert (one, three) == (["good: read"], ["warns: read"])
     assert isinstance(two, MachineError)
     assert two.message == "task breaks could not be finished: RecursionError: too deep"
-    assert "UserWarning: the worker's word" in caplog.text
+    assert "UserWarning: from the worker" in caplog.text
 
 
 def test_workers_end_with_their_driver(tmp_path: Path) -> None:
@@ -141,8 +141,8 @@ def test_workers_end_with_their_driver(tmp_path: Path) -> None:
 
 
 def drive(folder: str, pipe: object) -> None:
-    with Crew(local_pool, 1, Path(folder) / "crumbs") as crew:
-        (worker,) = crew.work_through(own_number, [1])
+    with WorkerPool(local_pool, 1, Path(folder) / "progress") as workers:
+        (worker,) = workers.map_tasks(own_number, [1])
         pipe.send(worker)  # type: ignore[attr-defined]
         time.sleep(60)
 
@@ -160,8 +160,8 @@ def stillborn(workers: int) -> Iterator[Pool]:
 
 def test_workers_that_never_begin_are_not_waited_for(tmp_path: Path) -> None:
     with (
-        Crew(stillborn, 2, tmp_path / "crumbs") as crew,
+        WorkerPool(stillborn, 2, tmp_path / "progress") as workers,
         pytest.raises(MachineError, match="no worker process could begin") as caught,
     ):
-        crew.work_through(read, [Reads(("a",), str(tmp_path)), Reads(("b",), str(tmp_path))])
+        workers.map_tasks(read, [Reads(("a",), str(tmp_path)), Reads(("b",), str(tmp_path))])
     assert "__main__" in str(caught.value)
