@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.estimation.agreement import reconciled
-from pipeline.estimation.instruments import with_clock
 from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.agreement import reconciled
+from pipeline.estimation.uncertainty.instruments import with_clock
 from pipeline.numerics.identifiability import within
 from pipeline.physics.glossary import CONSTANTS, Term
 from pipeline.plugins import PlugIn, discover

@@ -66,7 +66,7 @@ def test_other_seeds_are_another_block():
     [
         ("pipeline.estimation.estimators.resistance", {"resistance", "heat_run", "thermal"}),
         ("pipeline.estimation.estimators.spin_down", {"spin_down"}),
-        ("pipeline.estimation.step_model", {"current_step"}),
+        ("pipeline.estimation.electrical.step_model", {"current_step"}),
         ("pipeline.simulator.sensors", set(CASES)),
         ("pipeline.records.estimate", set(CASES)),
         ("tests.recovery.harness", set(CASES)),

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.estimation.instruments import instrument_uncertainties, unstated_note
-from pipeline.estimation.measured import measured
 from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
+from pipeline.estimation.uncertainty.measured import measured
 from pipeline.numerics.orders import (
     TURN_RAD,
     OrderLine,

@@ -8,18 +8,32 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import budget_of, unstated_note
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.step_budget import (
+from pipeline.estimation.electrical.step_budget import (
     birge_ratio,
     gains,
     rotor_angles,
     rounded_levels,
     unexplained,
 )
-from pipeline.estimation.step_fit import AXES, Offer, Solution, between_models, offers_of, solve
-from pipeline.estimation.step_model import SHARED, SPACE, Drive, StepModel, along_ramp, drive_of
-from pipeline.estimation.step_record import StepRecord, disagreement, read_step
+from pipeline.estimation.electrical.step_fit import (
+    AXES,
+    Offer,
+    Solution,
+    between_models,
+    offers_of,
+    solve,
+)
+from pipeline.estimation.electrical.step_model import (
+    SHARED,
+    SPACE,
+    Drive,
+    StepModel,
+    along_ramp,
+    drive_of,
+)
+from pipeline.estimation.electrical.step_record import StepRecord, disagreement, read_step
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import budget_of, unstated_note
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.records.capture import Campaign, Capture

@@ -9,7 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     contributions,
     current_source,
@@ -18,12 +21,8 @@ from pipeline.estimation.instruments import (
     unstated_note,
     voltage_source,
 )
-from pipeline.estimation.integrals import trapezoid
-from pipeline.estimation.magnet_coefficient import magnet_coefficient
-from pipeline.estimation.nuisances import allowed_for
-from pipeline.estimation.operating_points import pole_pairs_of
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.regimes import (
+from pipeline.estimation.uncertainty.nuisances import allowed_for
+from pipeline.estimation.uncertainty.regimes import (
     Disagreement,
     Partition,
     Regression,
@@ -32,6 +31,7 @@ from pipeline.estimation.regimes import (
     signs,
 )
 from pipeline.numerics.clusters import cluster_covariance
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.numerics.selection import needed_columns

@@ -8,17 +8,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.back_emf import read_spin
-from pipeline.estimation.hand_turns import Turn, turns_of
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.back_emf import read_spin
+from pipeline.estimation.electrical.hand_turns import Turn, turns_of
+from pipeline.estimation.electrical.terminals import first_temperature
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     instrument_uncertainties,
     unstated_note,
     voltage_source,
 )
-from pipeline.estimation.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.terminals import first_temperature
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.conventions import POLE_PAIRS_TOLERANCE, pole_pairs_from
 from pipeline.records.capture import Campaign, Capture

@@ -9,21 +9,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.heat_record import (
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.heat_record import (
     REFERENCE,
     TURNING,
     HeatRecord,
     read_heat,
     reference_resistance,
 )
-from pipeline.estimation.instruments import (
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     current_source,
     temperature_source,
     unstated_note,
     voltage_source,
 )
-from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants

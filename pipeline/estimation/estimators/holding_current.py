@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.estimators.cogging import name_orders, part_orders
+from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.torque_constant import USES, torque_constant
 from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import linear_fit

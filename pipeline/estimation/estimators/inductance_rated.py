@@ -8,16 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.flux_pairs import SAME, Flux, flux_pairs, frame_of, instant_voltage
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.flux_pairs import (
+    SAME,
+    Flux,
+    flux_pairs,
+    frame_of,
+    instant_voltage,
+)
+from pipeline.estimation.electrical.operating_points import Point, operating_points, pole_pairs_of
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.uncertainty.instruments import (
     contributions,
     instrument_uncertainties,
     unstated_note,
 )
-from pipeline.estimation.magnet_coefficient import magnet_coefficient
-from pipeline.estimation.measured import measured
-from pipeline.estimation.operating_points import Point, operating_points, pole_pairs_of
-from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.measured import measured
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable
@@ -56,7 +62,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     R and odd inverter errors cancel. The voltage's timing and the angle it is late by are taken
     out first. Reference: Armando, Bojoi, Guglielmi, Pellegrino, Pastorelli, IEEE Trans. Ind. Appl.
     49(5), 2013. In a frame turned by e the drop of R is taken off along the pair's own current
-    (fit.flux_pairs), which leaves L_other tan² e on each axis; that is taken off here.
+    (`flux_pairs`), which leaves L_other tan² e on each axis; that is taken off here.
     """
     del options
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.drag import (
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     DragFit,
     drag_of,
@@ -16,7 +17,12 @@ from pipeline.estimation.drag import (
     too_short,
     torque_is_parted,
 )
-from pipeline.estimation.instruments import (
+from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
+from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
+from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     contributions,
     current_source,
@@ -25,13 +31,7 @@ from pipeline.estimation.instruments import (
     torque_source,
     unstated_note,
 )
-from pipeline.estimation.magnet_coefficient import magnet_coefficient
-from pipeline.estimation.operating_points import pole_pairs_of
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.regimes import Disagreement
-from pipeline.estimation.shaft_regimes import drag_disagreements
-from pipeline.estimation.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
-from pipeline.estimation.torque_constant import USES, torque_constant
+from pipeline.estimation.uncertainty.regimes import Disagreement
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.physics.glossary import CONSTANTS
@@ -120,7 +120,7 @@ class Doubts:
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """J, T_c and B of J dw/dt = K i_q + K_rel i_d i_q - T_load - T_c sign(w) - B w.
 
-    Rows of drives and coast-downs (fit.shaft_rows) are regressed together on g = 1/J, T_c/J, B/J:
+    Rows of drives and coast-downs (`shaft_rows`) are regressed together on g = 1/J, T_c/J, B/J:
     coast-downs fix the ratios, drives the scale. Where drag has another form, J comes from the
     drag curve left free, T = J (a_driven - a_coasting) at each speed. References: IEEE Std 115-2019
     4.4 (retardation); Messenger and Bortz 2021 (weak form).

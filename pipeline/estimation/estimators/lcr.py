@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.terminals import PAIRS
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
     station,
     unstated_note,
 )
-from pipeline.estimation.measured import measured
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.terminals import PAIRS
+from pipeline.estimation.uncertainty.measured import measured
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.conventions import (
     PAIR_AXES_RAD,

@@ -8,23 +8,23 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.back_emf import (
+from pipeline.estimation.electrical.back_emf import (
     LEAST_CYCLES,
     flux_of,
     read_spin,
     steady_stretches,
 )
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.spin_angle import METHOD, Group, angle_offset, count_pole_pairs
+from pipeline.estimation.electrical.terminals import first_temperature
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     instrument_uncertainties,
     temperature_source,
     unstated_note,
     voltage_source,
 )
-from pipeline.estimation.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.spin_angle import METHOD, Group, angle_offset, count_pole_pairs
-from pipeline.estimation.terminals import first_temperature
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
 from pipeline.physics.glossary import Term

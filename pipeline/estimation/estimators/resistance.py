@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.direct_current import (
+from pipeline.estimation.electrical.direct_current import (
     COPPER_SOURCE,
     POINT_OPTIONS,
     TEST,
@@ -20,16 +20,16 @@ from pipeline.estimation.direct_current import (
     fit_direct_current,
     shifted,
 )
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.terminals import PAIRS
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import (
     Shift,
     contributions,
     instrument_uncertainties,
     unstated_note,
     voltage_source,
 )
-from pipeline.estimation.measured import measured
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.terminals import PAIRS
+from pipeline.estimation.uncertainty.measured import measured
 from pipeline.physics.conventions import phase_from_line, phase_resistances_ohm
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.estimation.direct_current import (
+from pipeline.estimation.electrical.direct_current import (
     POINT_OPTIONS,
     TEST,
     captures_of,
@@ -15,14 +15,14 @@ from pipeline.estimation.direct_current import (
     fit_direct_current,
     shifted,
 )
-from pipeline.estimation.instruments import (
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import (
     Shift,
     budget_of,
     contributions,
     instrument_uncertainties,
     unstated_note,
 )
-from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, not_identifiable

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.drag import DRAG_FORMS, STRIBECK
-from pipeline.estimation.instruments import budget_of
-from pipeline.estimation.integrals import trapezoid
-from pipeline.estimation.nuisances import allowed_for
+from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
 from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import budget_of
+from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.coasting import coast_down, coasting_rows
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import (
     NonlinearFit,
     autocorrelation_time,

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.heat_record import (
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.heat_record import (
     REFERENCE,
     TURNING,
     HeatRecord,
@@ -17,14 +18,13 @@ from pipeline.estimation.heat_record import (
     read_heat,
     reference_resistance,
 )
-from pipeline.estimation.instruments import (
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     current_source,
     temperature_source,
     voltage_source,
 )
-from pipeline.estimation.integrals import trapezoid
-from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import (
     LinearFit,
     autocorrelation_time,

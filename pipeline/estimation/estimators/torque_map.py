@@ -9,18 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.operating_points import (
+    Point,
+    PointTable,
+    operating_points,
+    pole_pairs_of,
+)
+from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
+from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE, magnet_coefficient
+from pipeline.estimation.uncertainty.instruments import (
     budget_of,
     contributions,
     instrument_uncertainties,
     unstated_note,
 )
-from pipeline.estimation.locked_rotor import HARMONICS, angle_doubt, standstill_words
-from pipeline.estimation.magnet_coefficient import SOURCE, magnet_coefficient
-from pipeline.estimation.nuisances import allowed_for
-from pipeline.estimation.operating_points import Point, PointTable, operating_points, pole_pairs_of
-from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.torque_slope import Slope, slope_without_d
+from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.physics.glossary import CONSTANTS, Term

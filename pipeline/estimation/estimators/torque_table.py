@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.mechanical.locked_rotor import HARMONICS, SOURCE, ripple_share
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
+from pipeline.estimation.uncertainty.instruments import (
     contributions,
     current_source,
     instrument_uncertainties,
     torque_source,
     unstated_note,
 )
-from pipeline.estimation.locked_rotor import HARMONICS, SOURCE, ripple_share
-from pipeline.estimation.magnet_coefficient import magnet_coefficient
-from pipeline.estimation.measured import measured
-from pipeline.estimation.operating_points import pole_pairs_of
-from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.measured import measured
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.records.capture import Campaign, Capture

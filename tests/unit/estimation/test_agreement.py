@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from pipeline.crosscheck.judge import ratio_of
-from pipeline.estimation.agreement import judges, reconciled
 from pipeline.estimation.registry import fit_all
+from pipeline.estimation.uncertainty.agreement import judges, reconciled
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import METHODS, propagate, type_a, type_b

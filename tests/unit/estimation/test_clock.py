@@ -9,8 +9,8 @@ import polars as pl
 import pytest
 
 from pipeline.crosscheck.judge import ratio_of
-from pipeline.estimation.instruments import clock_source, with_clock
 from pipeline.estimation.registry import estimators, fit_all
+from pipeline.estimation.uncertainty.instruments import clock_source, with_clock
 from pipeline.records.capture import UNSTATED_U, Campaign, Capture
 from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import campaign

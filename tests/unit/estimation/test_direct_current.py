@@ -9,12 +9,12 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.estimation.electrical.terminals import PAIRS
 from pipeline.estimation.estimators import (
     resistance,
     soak,
 )
 from pipeline.estimation.registry import fit_all
-from pipeline.estimation.terminals import PAIRS
 from pipeline.records.capture import Campaign
 from tests.unit.estimation.signals import capture, estimates, near
 

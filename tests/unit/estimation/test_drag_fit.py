@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.estimation.drag import (
+from pipeline.estimation.mechanical.drag import (
     CURVE,
     DRAG_FORMS,
     KNOTS,
@@ -17,7 +17,7 @@ from pipeline.estimation.drag import (
     DragFit,
     drag_of,
 )
-from pipeline.estimation.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
 from pipeline.numerics.least_squares import linear_fit
 
 Array = NDArray[np.float64]

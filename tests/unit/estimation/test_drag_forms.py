@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.estimation.drag import BUMPS, KNOTS, MATERIAL, SHAPES
-from pipeline.estimation.shaft_rows import SLOWEST_SHARE
+from pipeline.estimation.mechanical.drag import BUMPS, KNOTS, MATERIAL, SHAPES
+from pipeline.estimation.mechanical.shaft_rows import SLOWEST_SHARE
 
 
 def test_chords_between_knots_follow_windage() -> None:

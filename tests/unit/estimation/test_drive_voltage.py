@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators.drive_voltage import ESTIMATOR
-from pipeline.estimation.magnet_coefficient import SOURCE, U_USUAL_1_K
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from pipeline.estimation.estimators.hand_turn import ESTIMATOR
-from pipeline.estimation.integrals import REST, cubic, trapezoid
+from pipeline.numerics.integrals import REST, cubic, trapezoid
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

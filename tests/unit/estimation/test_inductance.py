@@ -9,12 +9,12 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.estimation import step_record
+from pipeline.estimation.electrical import step_record
+from pipeline.estimation.electrical.terminals import PAIRS
 from pipeline.estimation.estimators import (
     current_step,
     lcr,
 )
-from pipeline.estimation.terminals import PAIRS
 from pipeline.records.capture import Capture, CaptureMeta
 from tests.unit.estimation.signals import capture, estimates, near
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from pipeline.criticism.model import BASE
-from pipeline.estimation.instruments import instrument_uncertainties, unstated_note
 from pipeline.estimation.registry import fit_all
+from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.records.capture import UNSTATED_U, Campaign, Capture, CaptureMeta
 from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import campaign

@@ -11,10 +11,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.estimation.electrical.operating_points import operating_points
 from pipeline.estimation.estimators.inductance_rated import ESTIMATOR as INDUCTANCE_RATED
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
-from pipeline.estimation.locked_rotor import HARMONICS, SOURCE, angle_doubt
-from pipeline.estimation.operating_points import operating_points
+from pipeline.estimation.mechanical.locked_rotor import HARMONICS, SOURCE, angle_doubt
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators.inertia import ESTIMATOR
-from pipeline.estimation.regimes import Partition, Regression, disagreement, halves, information
 from pipeline.estimation.registry import fit_all
+from pipeline.estimation.uncertainty.regimes import (
+    Partition,
+    Regression,
+    disagreement,
+    halves,
+    information,
+)
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import BETWEEN, type_b, without_between

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators.spin_down import ESTIMATOR
-from pipeline.estimation.shaft_rows import shaft_rows
+from pipeline.estimation.mechanical.shaft_rows import shaft_rows
 from pipeline.numerics.coasting import coast_down, coasting_rows
 from pipeline.records.capture import Capture
 from tests.unit.estimation.signals import capture, estimates

@@ -16,12 +16,12 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.estimation.electrical.step_fit import row_variance
+from pipeline.estimation.electrical.step_model import axis_inductances
+from pipeline.estimation.electrical.step_record import read_step
+from pipeline.estimation.electrical.step_wave import Noise
 from pipeline.estimation.estimators import current_step
 from pipeline.estimation.estimators.derived_electrical import ESTIMATOR as DERIVED
-from pipeline.estimation.step_fit import row_variance
-from pipeline.estimation.step_model import axis_inductances
-from pipeline.estimation.step_record import read_step
-from pipeline.estimation.step_wave import Noise
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

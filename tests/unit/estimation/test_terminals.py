@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.estimation.terminals import pair_signals
+from pipeline.estimation.electrical.terminals import pair_signals
 from tests.unit.estimation.signals import capture
 
 T = np.arange(5) * 1e-3

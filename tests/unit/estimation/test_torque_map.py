@@ -11,7 +11,7 @@ from scipy.special import jv
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.estimation.estimators.open_circuit import ESTIMATOR as OPEN_CIRCUIT
 from pipeline.estimation.estimators.torque_map import ESTIMATOR, Regression
-from pipeline.estimation.magnet_coefficient import SOURCE, U_USUAL_1_K
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

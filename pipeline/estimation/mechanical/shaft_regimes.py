@@ -10,8 +10,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.drag import DragFit
-from pipeline.estimation.regimes import (
+from pipeline.estimation.mechanical.drag import DragFit
+from pipeline.estimation.mechanical.shaft_rows import DRIVE, ShaftRows
+from pipeline.estimation.uncertainty.regimes import (
     Disagreement,
     Partition,
     Regression,
@@ -19,7 +20,6 @@ from pipeline.estimation.regimes import (
     halves,
     signs,
 )
-from pipeline.estimation.shaft_rows import DRIVE, ShaftRows
 
 Array = NDArray[np.float64]
 

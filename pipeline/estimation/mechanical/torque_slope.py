@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.operating_points import Point
+from pipeline.estimation.electrical.operating_points import Point
 from pipeline.numerics.least_squares import linear_fit
 
 Array = NDArray[np.float64]

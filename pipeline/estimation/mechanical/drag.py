@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.estimation.nuisances import allowed_for
-from pipeline.estimation.shaft_rows import COAST, DRIVE, OVERLAP, ShaftRows
+from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, OVERLAP, ShaftRows
+from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.selection import needed_columns

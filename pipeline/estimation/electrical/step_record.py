@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.integrals import trapezoid
-from pipeline.estimation.step_wave import BETWEEN, Noise, Waveform, noise_of, waveform_of
-from pipeline.estimation.terminals import pair_of, pair_signals
+from pipeline.estimation.electrical.step_wave import BETWEEN, Noise, Waveform, noise_of, waveform_of
+from pipeline.estimation.electrical.terminals import pair_of, pair_signals
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.conventions import PAIR_AXES_RAD
 from pipeline.records.capture import Capture

@@ -8,8 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.estimation.back_emf import Spin, Stretch, StretchFlux, electrical_per_mechanical
-from pipeline.estimation.instruments import budget_of
+from pipeline.estimation.electrical.back_emf import (
+    Spin,
+    Stretch,
+    StretchFlux,
+    electrical_per_mechanical,
+)
+from pipeline.estimation.uncertainty.instruments import budget_of
 from pipeline.physics.conventions import pole_pairs_from
 from pipeline.records.capture import Capture
 from pipeline.records.estimate import Estimate, not_identifiable

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.step_fit import AXES, Solution
+from pipeline.estimation.electrical.step_model import LD, LQ, StepModel
+from pipeline.estimation.electrical.step_record import StepRecord, rotor_angle_rad
+from pipeline.estimation.uncertainty.instruments import (
     current_source,
     instrument_uncertainties,
     station,
     voltage_source,
 )
-from pipeline.estimation.step_fit import AXES, Solution
-from pipeline.estimation.step_model import LD, LQ, StepModel
-from pipeline.estimation.step_record import StepRecord, rotor_angle_rad
 from pipeline.records.uncertainty import Contribution
 
 Array = NDArray[np.float64]

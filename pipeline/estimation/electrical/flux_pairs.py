@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from pipeline.estimation.operating_points import Point
+from pipeline.estimation.electrical.operating_points import Point
 from pipeline.numerics.least_squares import linear_fit
 
 SAME = 0.03

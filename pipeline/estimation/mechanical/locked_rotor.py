@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.operating_points import Point
+from pipeline.estimation.electrical.operating_points import Point
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import Contribution
 

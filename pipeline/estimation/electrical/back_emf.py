@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.terminals import PAIRS, bridged
+from pipeline.estimation.electrical.terminals import PAIRS, bridged
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma

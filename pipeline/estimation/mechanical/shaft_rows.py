@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.integrals import trapezoid
-from pipeline.estimation.operating_points import magnet_temperature
+from pipeline.estimation.electrical.operating_points import magnet_temperature
 from pipeline.numerics.coasting import coasting_rows
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.records.capture import Capture

@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.terminals import bridged, first_temperature, pair_of, pair_signals
+from pipeline.estimation.electrical.terminals import (
+    bridged,
+    first_temperature,
+    pair_of,
+    pair_signals,
+)
 from pipeline.numerics.plateaus import block_means, find_plateaus
 from pipeline.physics.conventions import phase_from_line
 from pipeline.records.capture import Capture

@@ -9,13 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import (
+from pipeline.estimation.electrical.terminals import (
+    PAIRS,
+    bridged,
+    first_temperature,
+    pair_of,
+    pair_signals,
+)
+from pipeline.estimation.uncertainty.instruments import (
     Shift,
     current_source,
     temperature_source,
     voltage_source,
 )
-from pipeline.estimation.terminals import PAIRS, bridged, first_temperature, pair_of, pair_signals
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import find_plateaus
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K

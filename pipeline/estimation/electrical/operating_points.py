@@ -9,9 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.instruments import current_source, temperature_source, torque_source
-from pipeline.estimation.instruments import voltage_source as source_of_voltage
-from pipeline.estimation.terminals import bridged
+from pipeline.estimation.electrical.terminals import bridged
+from pipeline.estimation.uncertainty.instruments import (
+    current_source,
+    temperature_source,
+    torque_source,
+)
+from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import find_plateaus, white_noise_sigma
 from pipeline.records.capture import Capture

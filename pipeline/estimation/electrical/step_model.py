@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.step_record import StepRecord
-from pipeline.estimation.step_wave import BETWEEN
+from pipeline.estimation.electrical.step_record import StepRecord
+from pipeline.estimation.electrical.step_wave import BETWEEN
 
 Array = NDArray[np.float64]
 SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4")

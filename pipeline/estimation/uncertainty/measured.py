@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pipeline.estimation.instruments import budget_of
+from pipeline.estimation.uncertainty.instruments import budget_of
 from pipeline.records.capture import Capture
 from pipeline.records.estimate import Conditions, Estimate
 from pipeline.records.uncertainty import Contribution

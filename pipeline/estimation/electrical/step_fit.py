@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.step_model import LD, LQ, SHARED, TERMS, StepModel, start_of
-from pipeline.estimation.step_wave import BETWEEN, Noise
+from pipeline.estimation.electrical.step_model import LD, LQ, SHARED, TERMS, StepModel, start_of
+from pipeline.estimation.electrical.step_wave import BETWEEN, Noise
 from pipeline.numerics.least_squares import NonlinearFit, autocorrelation_time, gauss_newton
 
 AXES: Mapping[str, tuple[int, tuple[int, ...]]] = {

@@ -1,0 +1,1 @@
+"""Resistance, inductance and flux: what the estimators of the terminals share."""

@@ -1,0 +1,1 @@
+"""Torque, inertia and drag: what the estimators of the shaft share."""

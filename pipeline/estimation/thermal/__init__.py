@@ -1,0 +1,1 @@
+"""Temperature: heat runs, and what warmth does to magnets."""
