@@ -83,18 +83,21 @@ PACKAGES = {
         ),
         Package(
             "io",
-            tuple(
-                f"pipeline/io/{part}/*.py"
-                for part in (
-                    "ingest",
-                    "inspection",
-                    "maps",
-                    "readers",
-                    "recordings",
-                    "registry",
-                    "storage",
-                    "tables",
-                )
+            (
+                "pipeline/io/*.py",
+                *(
+                    f"pipeline/io/{part}/*.py"
+                    for part in (
+                        "ingest",
+                        "inspection",
+                        "maps",
+                        "readers",
+                        "recordings",
+                        "registry",
+                        "storage",
+                        "tables",
+                    )
+                ),
             ),
             ("tests/unit/io",),
         ),
