@@ -79,7 +79,9 @@ class RunSettings(ReadingSettings):
     output: str = key(
         "reports/demo", "folder for everything that is written", result=False, place=True
     )
-    source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
+    source: str = key(
+        "auto", "source map for foreign files, a name or path/to/map.yaml; auto recognises them"
+    )
     release: str = key(
         "manual",
         "manual, or auto: release a datasheet that meets every condition",
@@ -148,7 +150,7 @@ class PlanSettings(ReadingSettings):
     input: str | None = key(
         None, "folder of captures to plan from, where there is no run of them", place=True
     )
-    source: str = key("auto", "source map of conf/source/ for foreign files of input")
+    source: str = key("auto", "source map for foreign files, a name or path/to/map.yaml")
     motor: str | None = key(None, "motor_id; every motor without it")
     limits: str = key(
         "default", "limits file of conf/limits/: constants a release must hold", place=True
@@ -243,7 +245,9 @@ class CompareSettings(ReadingSettings):
     output: str = key(
         "reports/demo", "folder for everything that is written", result=False, place=True
     )
-    source: str = key("auto", "source map of conf/source/ for foreign files; auto recognises them")
+    source: str = key(
+        "auto", "source map for foreign files, a name or path/to/map.yaml; auto recognises them"
+    )
     motor: str | None = key(None, "motor_id; every motor without it")
     model: ModelSettings = field(default_factory=ModelSettings)
     effects_path: str | None = key(None, "folder of your own effects, one file each", place=True)

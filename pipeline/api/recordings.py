@@ -14,11 +14,11 @@ from pipeline.execution.captures import ReadTask, usable_captures
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry, survey
-from pipeline.io.maps.source_map import SourceMap, find_map, load_source_maps
+from pipeline.io.maps.places import source_maps
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import UsageError
 from pipeline.records.finding import Finding
-from pipeline.settings import configuration_folder
 
 Options = Mapping[str, Mapping[str, float]]
 """Options by the name of a gate, an estimator or a check."""
@@ -112,7 +112,8 @@ def read(
     folder : path
         Folder of MCAP and CSV captures.
     source : str
-        Name of a source map in `conf/source/` for files of another bench; `auto` recognises them.
+        Source map for files of another bench, by name or as path/to/map.yaml; `auto` recognises
+        them by every map in `conf/source/` and the user's configuration folder.
     motor : str, optional
         Only the captures of this motor_id.
     gates : mapping of mapping, optional
@@ -144,8 +145,7 @@ def read(
     """
     place = str(folder)
     input_folder(place)
-    maps = load_source_maps(configuration_folder() / "source")
-    sources = maps if source == "auto" else {source: find_map(maps, source)}
+    sources = source_maps(source)
     found = survey(Path(place), sources, recover=recover)
     entries: dict[str, list[Entry]] = {}
     for entry in found.entries:

@@ -18,13 +18,12 @@ from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry, Survey, survey
-from pipeline.io.maps.source_map import find_map, load_source_maps
+from pipeline.io.maps.places import source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import nothing_usable
-from pipeline.settings import configuration_folder
 
 if TYPE_CHECKING:
     pass
@@ -49,8 +48,7 @@ def campaigns(
     Raises UsageError where the folder is not there or holds no capture of `motor`.
     """
     input_folder(folder)
-    maps = load_source_maps(configuration_folder() / "source")
-    sources = maps if source == "auto" else {source: find_map(maps, source)}
+    sources = source_maps(source)
     bounds = limits or ReadLimits()
     with TemporaryDirectory() as progress:
         pool = open_pool("local", Cluster())

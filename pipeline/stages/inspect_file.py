@@ -17,7 +17,7 @@ from pipeline.records.errors import CaptureError, MachineError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome
-from pipeline.settings import InspectSettings, configuration_folder
+from pipeline.settings import InspectSettings
 
 if TYPE_CHECKING:
     from pipeline.io.inspection.describe import InspectReport
@@ -69,12 +69,12 @@ def look_into(task: InspectTask) -> tuple[str, tuple[str, ...]]:
     In a worker, under its limits.
     """
     from pipeline.io.inspection.describe import describe
-    from pipeline.io.maps.source_map import load_source_maps
+    from pipeline.io.maps.places import source_maps
 
     if task.refused is not None:
         raise died(task.refused)
     path = Path(task.file)
-    sources = load_source_maps(configuration_folder() / "source")
+    sources = source_maps()
     with reading(task.file, size_bytes(path), task.limits):
         report = describe(path, sources)
         refusals = _refusals(path, sources)

@@ -31,7 +31,8 @@ from pipeline.execution.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
-from pipeline.io.maps.source_map import SourceMap, find_map, load_source_maps
+from pipeline.io.maps.places import source_maps
+from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.limits import limits_file, required_constants
 from pipeline.io.storage.publish import output_folder
@@ -91,7 +92,7 @@ def _run(settings: RunSettings, registry: Registry | None, workers: WorkerPool) 
     folder, output = Path(settings.input), Path(settings.output)
     conf = configuration_folder()
     limits = limits_file(conf / "limits", settings.limits)
-    sources = _source_maps(conf / "source", settings.source)
+    sources = source_maps(settings.source)
     cache = RunCache(folder, output, on=settings.cache)
     with watch.stage("survey"):
         ask = partial(_answers, settings, sources, workers, cache)
@@ -186,12 +187,6 @@ def _conflict(event: Event, place: str) -> str:
         f"`registry revoke {shlex.quote(motor)} version={version} by=NAME why=REASON "
         f"registry={shlex.quote(place)}` and run again: the new bytes become a version of their own"
     )
-
-
-def _source_maps(folder: Path, name: str) -> dict[str, SourceMap]:
-    """Every source map, or the requested one."""
-    maps = load_source_maps(folder)
-    return maps if name == "auto" else {name: find_map(maps, name)}
 
 
 def _answers(

@@ -13,7 +13,7 @@ from pipeline.io.ingest.guard import refusing
 from pipeline.io.ingest.metadata import capture_meta
 from pipeline.io.ingest.survey import Entry, Survey, survey
 from pipeline.io.maps.columns import foreign_unit, last_part, to_frame
-from pipeline.io.maps.source_map import SourceMap
+from pipeline.io.maps.source_map import Part, SourceMap
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
@@ -45,6 +45,7 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     else:
         raw, source, verified = _read_csv(data, entry)
     frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
+    frames = _cut(frames, entry.part)
     if not frames:
         raise CaptureError(
             "missing_column",
@@ -52,11 +53,25 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
             "run `inspect` on it for its fields and a source map to start from",
         )
     integrity: Integrity = "verified" if verified else "unverified"
-    return Capture(entry.path, entry.sha256, integrity, meta, tuple(_sorted(frames)))
+    return Capture(entry.capture_path, entry.sha256, integrity, meta, tuple(_sorted(frames)))
 
 
 def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.DataFrame | None:
     return to_frame(table, source, meta.pole_pairs)
+
+
+def _cut(frames: list[pl.DataFrame], part: Part | None) -> list[pl.DataFrame]:
+    """The rows of a part; raises CaptureError where the file has several clocks or fewer rows."""
+    if part is None or not frames:
+        return frames
+    if len(frames) > 1:
+        words = f"{len(frames)} tables of different clocks cannot be cut by rows"
+        raise CaptureError("bad_part", words, "leave `captures` out of the source map")
+    last = frames[0].height - 1 if part.last is None else part.last
+    if not part.first < last < frames[0].height:
+        words = f"there are no {part.name} in {frames[0].height} rows"
+        raise CaptureError("bad_part", words, "correct `captures` in the source map")
+    return [frames[0].slice(part.first, last - part.first + 1)]
 
 
 def _sorted(frames: list[pl.DataFrame]) -> list[pl.DataFrame]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
@@ -26,7 +26,7 @@ from pipeline.io.ingest.metadata import (
     merge,
     sidecar,
 )
-from pipeline.io.maps.source_map import SourceMap, find_map
+from pipeline.io.maps.source_map import Part, SourceMap, find_maps
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.messages import count_messages
 from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments
@@ -50,7 +50,8 @@ class Entry:
     """A file that is a capture: where it is, what it is, and all that is said of it.
 
     `source` is None for the contract's own form. `path` is relative with forward slashes.
-    `recovered` is a file that is cut off, of which the good part is to be used.
+    `recovered` is a file that is cut off, of which the good part is to be used. `part` are the
+    rows of it that are this capture.
     """
 
     path: str
@@ -59,6 +60,15 @@ class Entry:
     source: SourceMap | None
     metadata: tuple[tuple[str, str], ...]
     recovered: bool = False
+    part: Part | None = None
+
+    @property
+    def capture_path(self) -> str:
+        """The path of the capture: the file's, its stem with the rows where it is a part of it."""
+        if self.part is None:
+            return self.path
+        path = PurePosixPath(self.path)
+        return path.with_name(f"{path.stem} {self.part.name}{path.suffix}").as_posix()
 
     @property
     def said(self) -> dict[str, str]:
@@ -151,8 +161,18 @@ def survey(
                 entries[entry.sha256] = kept
                 findings.append(_duplicate(other.path, kept.path))
     findings += [_absent(path) for path in sorted(set(manifests) - there)]
-    captures = tuple(sorted(entries.values(), key=lambda entry: entry.path))
+    parts = [part for entry in entries.values() for part in _parts(entry)]
+    captures = tuple(sorted(parts, key=lambda entry: entry.capture_path))
     return Survey(captures, tuple(sorted(findings, key=_order)), tuple(others))
+
+
+def _parts(entry: Entry) -> list[Entry]:
+    """An entry for each capture that the source map cuts the file into, or the one."""
+    parts = () if entry.source is None else entry.source.parts_of(entry.path)
+    if not parts:
+        return [entry]
+    said = [tuple(sorted((entry.said | dict(part.metadata)).items())) for part in parts]
+    return [replace(entry, part=p, metadata=own) for p, own in zip(parts, said, strict=True)]
 
 
 def _preferred(folder: Path, first: Entry, second: Entry) -> tuple[Entry, Entry]:
@@ -397,9 +417,11 @@ def _source(
     named = beside.get("source") or listed.get("source") or own.get("source")
     if named:
         try:
-            return find_map(sources, named), True
+            maps = list(find_maps(sources, named).values())
         except UsageError as fault:
             raise CaptureError("unknown_source", fault.message, fault.remedy) from None
+        fitting = [s for s in maps if s.recognises(path, head, topics)]
+        return (fitting or maps)[0], True
     if "contract" in own:
         return None, True
     matches = [s for s in sources.values() if s.recognises(path, head, topics)]

@@ -145,6 +145,8 @@ def _converted(
 ) -> NDArray[np.float64]:
     """Values in the column's unit."""
     numbers = values.astype(np.float64, copy=False)
+    if part.wraps is not None and part.column != "t_s":
+        numbers = np.unwrap(numbers, period=part.wraps)
     unit = units.get(part.field, "") if part.unit == "row" else part.unit
     factor, shift = part.sign * part.scale, part.offset
     if unit is not None:
@@ -226,7 +228,7 @@ def _from_field(table: RawTable, clock: FieldMap, source: SourceMap | None) -> N
     values = table.fields[clock.field]
     if values.dtype.kind in "iu" and values.size:
         values = (values - values[0]).astype(np.int64)
-    wraps_at = None if source is None else source.time.wraps_at
+    wraps_at = clock.wraps or (None if source is None else source.time.wraps_at)
     if wraps_at is not None:
         numbers = values.astype(np.float64)
         steps = np.diff(numbers, prepend=numbers[:1])

@@ -10,15 +10,14 @@ from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
+from pipeline.io.maps.section import Section
 from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.physics.glossary import COLUMNS
-from pipeline.records import parse
 from pipeline.records.errors import CaptureError, UsageError
 
 TimeFrom = Literal["field", "even", "log", "increment"]
 MessageForm = Literal["auto", "row", "block"]
-_MAX_PATTERN = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +26,8 @@ class FieldMap:
 
     `unit` None is the column's own unit; `row` takes what the file's units row says.
     `per_pole_pair` divides by the metadata's pole pairs, for a drive that logs electrical speed.
+    `wraps` is the span [the field's own numbers] after which a counter or an angle starts again;
+    a clock goes on forwards, anything else by the shorter way.
     """
 
     field: str
@@ -36,6 +37,7 @@ class FieldMap:
     scale: float = 1.0
     offset: float = 0.0
     per_pole_pair: bool = False
+    wraps: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +60,31 @@ class TimeMap:
 TIME_FROM_FIELD = TimeMap()
 
 
+Pairs = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Rows `first` to `last` of a file, counted from 0, as a capture; None is the file's end."""
+
+    files: tuple[str, ...]
+    first: int
+    last: int | None
+    metadata: Pairs
+
+    @property
+    def name(self) -> str:
+        """What stands behind the file's stem in the path of the capture."""
+        return f"rows {self.first}-{'' if self.last is None else self.last}"
+
+
 @dataclass(frozen=True, slots=True)
 class SourceMap:
     """How to recognise a bench's files and turn them into the contract's columns.
 
     `reader` names the plug-in that reads a form that is neither MCAP nor a text table.
+    `file_names` are regular expressions whose named groups are metadata, `values` what a word of
+    a file name means, by metadata key; `captures` cut a file into several.
     """
 
     name: str
@@ -75,8 +97,11 @@ class SourceMap:
     messages: MessageForm = "auto"
     joint: str | None = None
     reader: str | None = None
-    metadata: tuple[tuple[str, str], ...] = ()
-    per_file: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = ()
+    metadata: Pairs = ()
+    per_file: tuple[tuple[str, Pairs], ...] = ()
+    file_names: tuple[str, ...] = ()
+    values: tuple[tuple[str, Pairs], ...] = ()
+    captures: tuple[Part, ...] = ()
 
     def recognises(self, path: str, head: str | None, topics: Iterable[str]) -> bool:
         """Whether a file is this bench's: every criterion that the map states must hold.
@@ -97,43 +122,103 @@ class SourceMap:
 
     def recognises_name(self, path: str) -> bool:
         """Whether the file's name is one of those the map lists."""
-        name = PurePosixPath(path).name
-        return any(fnmatchcase(name, pattern) for pattern in self.files)
+        return _is_named(path, self.files)
+
+    def parts_of(self, path: str) -> tuple[Part, ...]:
+        """The captures that a file is cut into; none where it is one capture as a whole."""
+        return tuple(p for p in self.captures if not p.files or _is_named(path, p.files))
 
     def metadata_for(self, path: str) -> dict[str, str]:
         """Fixed metadata of one file; what is said of its name counts before the rest."""
-        found = dict(self.metadata)
+        found = dict(self.metadata) | self._from_name(path)
         name = PurePosixPath(path).name
         for pattern, values in reversed(self.per_file):
             if fnmatchcase(name, pattern):
                 found |= dict(values)
         return {"contract": "1"} | found
 
+    def _from_name(self, path: str) -> dict[str, str]:
+        """What the patterns of `file_names` find in a path, the first that finds a key winning."""
+        found: dict[str, str] = {}
+        values = {key: dict(words) for key, words in self.values}
+        for pattern in self.file_names:
+            match = re.search(pattern, path)
+            for key, word in (match.groupdict() if match else {}).items():
+                if word:
+                    found.setdefault(key, values.get(key, {}).get(word, word))
+        return found
+
+
+def _is_named(path: str, patterns: Iterable[str]) -> bool:
+    name = PurePosixPath(path).name
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
 
 def load_source_maps(folder: Path) -> dict[str, SourceMap]:
     """All maps of a folder by name; raises UsageError naming the file and the key at fault."""
     if not folder.is_dir():
         raise UsageError(f"there is no folder of source maps {folder}", "check the configuration")
-    maps = (load_source_map(path) for path in sorted(folder.glob("*.yaml")))
-    return {found.name: found for found in maps}
+    found: dict[str, SourceMap] = {}
+    for path in sorted(folder.glob("*.yaml")):
+        found |= load_source_file(path)
+    return found
 
 
-def load_source_map(path: Path) -> SourceMap:
-    """One source map; its name is the file's. Raises UsageError."""
+def load_source_file(path: Path) -> dict[str, SourceMap]:
+    """The map of a file under the file's name, or its variants as NAME/1, NAME/2, ...
+
+    Raises UsageError.
+    """
     try:
         data = path.read_bytes()
     except OSError as fault:
         raise UsageError(f"the source map {path} cannot be read: {fault}", "check it") from fault
-    return parse_source_map(data, path.stem)
+    return parse_source_file(data, path.stem)
+
+
+def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:
+    """The maps of one YAML file by name. Raises UsageError.
+
+    Each item of `variants` is laid over the file's other keys, a map over a map key by key.
+    """
+    plain = _plain(data, name)
+    variants = plain.pop("variants", None) if isinstance(plain, dict) else None
+    if variants is None:
+        return {name: _parsed(plain, name)}
+    if not isinstance(variants, list) or not variants:
+        raise UsageError(f"source map {name}: variants: is no list", "write `- recognise: ...`")
+    found = {}
+    for number, variant in enumerate(variants, 1):
+        label = f"{name}/{number}"
+        if not isinstance(variant, dict):
+            raise UsageError(f"source map {label}: is no map of keys", "write `key: value` lines")
+        found[label] = _parsed(_laid_over(plain, variant), label)
+    return found
+
+
+def _laid_over(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
+    both = {
+        key: {**base[key], **value}
+        for key, value in top.items()
+        if isinstance(value, dict) and isinstance(base.get(key), dict)
+    }
+    return {**base, **top, **both}
 
 
 def parse_source_map(data: bytes, name: str) -> SourceMap:
-    """A source map from its YAML bytes. Raises UsageError."""
+    """A source map without variants from its YAML bytes. Raises UsageError."""
+    return _parsed(_plain(data, name), name)
+
+
+def _plain(data: bytes, name: str) -> Any:
     try:
-        plain = load_plain(data, f"the source map {name}")
+        return load_plain(data, f"the source map {name}")
     except CaptureError as fault:
         raise UsageError(fault.message, fault.remedy) from None
-    top = _Section(name, "", plain)
+
+
+def _parsed(plain: Any, name: str) -> SourceMap:
+    top = Section(name, "", plain)
     recognise = top.section("recognise")
     found = SourceMap(
         name,
@@ -147,7 +232,10 @@ def parse_source_map(data: bytes, name: str) -> SourceMap:
         joint=top.text("joint"),
         reader=top.text("reader"),
         metadata=_pairs(top.section("metadata")),
-        per_file=_per_file(top.section("per_file")),
+        per_file=_per_key(top.section("per_file")),
+        file_names=_file_names(top),
+        values=_per_key(top.section("values")),
+        captures=tuple(_part(part) for part in top.sections("captures")),
     )
     top.text("about")
     recognise.close()
@@ -155,87 +243,7 @@ def parse_source_map(data: bytes, name: str) -> SourceMap:
     return found
 
 
-class _Section:
-    """One map of the YAML, read key by key; a key nobody asked for is an error."""
-
-    def __init__(self, source: str, where: str, plain: Any) -> None:
-        self.source = source
-        self.where = where
-        if plain is None or plain == "":
-            plain = {}
-        if not isinstance(plain, dict):
-            raise self.fault("", "is no map of keys", "write `key: value` lines")
-        self.left: dict[str, Any] = dict(plain)
-        self.asked: list[str] = []
-
-    def fault(self, key: str, what: str, remedy: str) -> UsageError:
-        place = ".".join(part for part in (self.where, key) if part) or "the top"
-        return UsageError(f"source map {self.source}: {place}: {what}", remedy)
-
-    def take(self, key: str) -> Any:
-        self.asked.append(key)
-        return self.left.pop(key, None)
-
-    def close(self) -> None:
-        for key in self.left:
-            near = difflib.get_close_matches(key, self.asked, 1)
-            hint = f"did you mean {near[0]!r}?" if near else f"known keys: {', '.join(self.asked)}"
-            raise self.fault(key, "is no key of a source map", hint)
-
-    def section(self, key: str) -> _Section:
-        inner = self.take(key)
-        return _Section(self.source, f"{self.where}.{key}".strip("."), inner)
-
-    def text(self, key: str) -> str | None:
-        value = self.take(key)
-        if value is not None and not isinstance(value, str):
-            raise self.fault(key, "is not a single text", "write one value")
-        return value
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        value = self.take(key)
-        value = [value] if isinstance(value, str) else value or []
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self.fault(key, "is no list of texts", "write `[a, b]`")
-        return tuple(value)
-
-    def pattern(self, key: str) -> str | None:
-        value = self.text(key)
-        if value is None:
-            return None
-        try:
-            if len(value) > _MAX_PATTERN:
-                raise re.error("it is too long")
-            re.compile(value)
-        except (re.error, RecursionError, OverflowError) as fault:
-            raise self.fault(key, f"is no regular expression: {fault}", "correct it") from None
-        return value
-
-    def number(self, key: str, default: float | None) -> float | None:
-        value = self.text(key)
-        if value is None:
-            return default
-        found = parse.number(value)
-        if found is None:
-            raise self.fault(key, f"{value[:60]!r} is no number", "write a number")
-        return found
-
-    def flag(self, key: str, default: bool) -> bool:
-        value = self.text(key)
-        if value is None:
-            return default
-        if value not in ("true", "false"):
-            raise self.fault(key, f"{value!r} is neither true nor false", "write true or false")
-        return value == "true"
-
-    def choice(self, key: str, known: tuple[str, ...], default: str) -> Any:
-        value = self.text(key)
-        if value is not None and value not in known:
-            raise self.fault(key, f"{value!r} is unknown", f"use one of {', '.join(known)}")
-        return default if value is None else value
-
-
-def _layout(section: _Section) -> CsvDialect:
+def _layout(section: Section) -> CsvDialect:
     standard = CONTRACT_DIALECT
     values: dict[str, Any] = {}
     for part in fields(CsvDialect):
@@ -263,26 +271,26 @@ def _layout(section: _Section) -> CsvDialect:
     return _readable(section, CsvDialect(**values))
 
 
-def _readable(section: _Section, layout: CsvDialect) -> CsvDialect:
+def _readable(section: Section, layout: CsvDialect) -> CsvDialect:
     """The layout; refuses one whose units row is among the rows."""
     if layout.units_row and not layout.skip_after_header:
         raise section.fault("units_row", "is not skipped", "write `skip_after_header: 1` or more")
     return layout
 
 
-def _whole(section: _Section, key: str, default: int) -> int:
+def _whole(section: Section, key: str, default: int) -> int:
     number = section.number(key, default)
     if number is None or number != int(number) or not 0 <= number <= 10_000:
         raise section.fault(key, "is no whole number from 0 to 10000", "count the lines")
     return int(number)
 
 
-def _fields(section: _Section) -> tuple[FieldMap, ...]:
+def _fields(section: Section) -> tuple[FieldMap, ...]:
     found: list[FieldMap] = []
     for name in list(section.left):
         plain = section.take(name)
         plain = {"column": plain} if isinstance(plain, str) else plain
-        part = _Section(section.source, f"fields.{name}", plain)
+        part = Section(section.source, f"fields.{name}", plain)
         column = part.text("column")
         if column not in COLUMNS:
             near = difflib.get_close_matches(column or "", list(COLUMNS), 3)
@@ -295,35 +303,62 @@ def _fields(section: _Section) -> tuple[FieldMap, ...]:
         if not scale:
             raise part.fault("scale", "is zero", "write the factor")
         unit, per_pole_pair = part.text("unit"), part.flag("per_pole_pair", False)
-        found.append(FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair))
+        wraps = _positive(part, "wraps")
+        found.append(FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps))
         part.close()
     return tuple(found)
 
 
-def _time(section: _Section) -> TimeMap:
+def _time(section: Section) -> TimeMap:
     found = TimeMap(
         section.choice("from", get_args(TimeFrom), "field"),
-        section.number("wraps_at", None),
+        _positive(section, "wraps_at"),
         section.number("start_s", 0.0) or 0.0,
-        section.number("increment_s", None),
+        _positive(section, "increment_s"),
     )
     section.close()
-    for key, value in (("wraps_at", found.wraps_at), ("increment_s", found.increment_s)):
-        if value is not None and value <= 0:
-            raise section.fault(key, "is not above zero", "write a positive number")
     return found
 
 
-def _pairs(section: _Section) -> tuple[tuple[str, str], ...]:
+def _positive(section: Section, key: str) -> float | None:
+    value = section.number(key, None)
+    if value is not None and value <= 0:
+        raise section.fault(key, "is not above zero", "write a positive number")
+    return value
+
+
+def _pairs(section: Section) -> Pairs:
     return tuple((key, section.text(key) or "") for key in list(section.left))
 
 
-def _per_file(section: _Section) -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
-    return tuple((pattern, _pairs(section.section(pattern))) for pattern in list(section.left))
+def _per_key(section: Section) -> tuple[tuple[str, Pairs], ...]:
+    return tuple((key, _pairs(section.section(key))) for key in list(section.left))
 
 
-def find_map(maps: Mapping[str, SourceMap], name: str) -> SourceMap:
-    """The map of a name; raises UsageError naming the known ones."""
-    if name not in maps:
-        raise UsageError(f"there is no source map {name!r}", f"use one of {', '.join(maps)}")
-    return maps[name]
+def _file_names(section: Section) -> tuple[str, ...]:
+    """The patterns of file names; each has a named group."""
+    patterns = section.patterns("file_names")
+    for pattern in patterns:
+        if not re.compile(pattern).groupindex:
+            remedy = "write `(?P<motor_id>...)` around what is metadata"
+            raise section.fault("file_names", f"{pattern!r} has no named group", remedy)
+    return patterns
+
+
+def _part(section: Section) -> Part:
+    """A capture cut from a file: `rows: 0-4999`, `rows: 5000-`; other keys are its metadata."""
+    files, rows = section.texts("files"), section.text("rows") or ""
+    match = re.fullmatch(r"(\d{1,12})-(\d{1,12})?", rows.replace(" ", ""))
+    if match is None or (match[2] and int(match[2]) <= int(match[1])):
+        raise section.fault("rows", f"{rows!r} is no range of rows", "write `0-4999` or `5000-`")
+    last = int(match[2]) if match[2] else None
+    return Part(files, int(match[1]), last, _pairs(section))
+
+
+def find_maps(maps: Mapping[str, SourceMap], name: str) -> dict[str, SourceMap]:
+    """The map of a name, or all its variants; raises UsageError naming the known ones."""
+    found = {key: one for key, one in maps.items() if key == name or key.startswith(f"{name}/")}
+    if not found:
+        known = dict.fromkeys(key.partition("/")[0] for key in maps)
+        raise UsageError(f"there is no source map {name!r}", f"use one of {', '.join(known)}")
+    return found

@@ -18,6 +18,7 @@ class CsvDialect:
     `fewer_columns`: rows may end before the header does, all of them at the same column.
     `time_start`, `time_increment`: regular expressions whose one group is a number [s] in the text
     before the rows.
+    `row_end`: what stands behind the last field of a row, such as `;`, and is no field.
     `whole_last_line`: the last row must end in a line break; a cut number looks whole.
     """
 
@@ -34,6 +35,7 @@ class CsvDialect:
     missing: tuple[str, ...] = ()
     time_start: str | None = None
     time_increment: str | None = None
+    row_end: str = ""
     whole_last_line: bool = True
 
 

@@ -25,6 +25,8 @@ _MAX_COLUMNS = 4096
 _BLOCK_BYTES = 2**22
 SEPARATORS = (";", "\t", ",", "|")
 _COMMENT = re.compile(r"^#\s*([^:]*?)\s*:\s?(.*?)\s*$")
+_BLANKS = re.compile(rb"[ \t]+")
+_EDGES = re.compile(rb"^ | (?=\n)", re.MULTILINE)
 _DECIMAL_COMMA = re.compile(rb"\d,\d")
 _LONG_INTEGER = re.compile(r"^-?\d{16,}$")
 PACKED = (b"\x1f\x8b", b"\x28\xb5\x2f\xfd", b"\x78\x9c", b"PK\x03\x04", b"BZh", b"\xfd7zXZ")
@@ -229,7 +231,8 @@ def _check_separator(names: Sequence[str], rows: bytes, dialect: CsvDialect) -> 
 
 
 def _cells(line: bytes, dialect: CsvDialect) -> list[str]:
-    cells = _text(line, dialect).split(dialect.separator)
+    text = _text(line, dialect)
+    cells = text.split() if dialect.separator == " " else text.split(dialect.separator)
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
@@ -239,7 +242,11 @@ def _even_out(rows: bytes, dialect: CsvDialect) -> bytes:
     if not rows:
         return rows
     rows += b"\n"
+    if dialect.row_end:
+        rows = rows.replace(dialect.row_end.encode() + b"\n", b"\n")
     mark = dialect.separator.encode()
+    if dialect.separator == " ":
+        rows = _EDGES.sub(b"", _BLANKS.sub(b" ", rows))
     blanks = (b" ",) if dialect.separator == "\t" else (b" ", b"\t")
     for blank in blanks if dialect.separator != " " else ():
         for edge in (mark, b"\n"):

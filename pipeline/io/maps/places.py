@@ -1,0 +1,55 @@
+"""Where source maps lie: a file anywhere, `conf/source` here, the user's folder, the package's."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from pipeline.io.maps.source_map import (
+    SourceMap,
+    find_maps,
+    load_source_file,
+    load_source_maps,
+)
+from pipeline.settings import configuration_folder
+
+AUTO = "auto"
+
+
+def map_folders() -> tuple[Path, ...]:
+    """Folders of source maps, the weakest first: the package's, the user's, the current one's."""
+    places = [configuration_folder() / "source", *_users(), Path("conf") / "source"]
+    there = {place.resolve(): place for place in places if place.is_dir()}
+    return tuple(there.values())
+
+
+def source_maps(source: str = AUTO) -> dict[str, SourceMap]:
+    """The maps to read foreign files by: those of a file, of a name, or with `auto` all.
+
+    A map of the same name in a nearer folder takes the place of one farther away.
+
+    Raises
+    ------
+    UsageError
+        For a file or name that is not there, and for a map that cannot be read.
+
+    """
+    if source.endswith((".yaml", ".yml")):
+        return load_source_file(Path(source))
+    maps: dict[str, SourceMap] = {}
+    for folder in map_folders():
+        nearer = load_source_maps(folder)
+        names = {name.partition("/")[0] for name in nearer}
+        maps = {n: one for n, one in maps.items() if n.partition("/")[0] not in names} | nearer
+    return maps if source == AUTO else find_maps(maps, source)
+
+
+def _users() -> list[Path]:
+    """The user's folder of source maps, as the XDG base directory specification names it."""
+    named = os.environ.get("XDG_CONFIG_HOME", "")
+    if named and Path(named).is_absolute():
+        return [Path(named) / "motor-datasheets" / "source"]
+    with suppress(RuntimeError):
+        return [Path.home() / ".config" / "motor-datasheets" / "source"]
+    return []
