@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import pipeline
-from pipeline.execution.versions import LOOK, RUN, WORK
+from pipeline.execution.versions import RUN, SURVEY, WORK
 from pipeline.io.storage import code_version
 from pipeline.io.storage.code_version import DISTRIBUTIONS, Code, installed, own_code
 from pipeline.io.storage.syntax import syntax_of
@@ -300,7 +300,7 @@ def test_datasheets_hang_on_every_plug_in_and_on_nothing_that_shows_them() -> No
     }
     assert not any("registry_table" in m or "recordings" in m or m == RUN for m in closure)
     assert closure < own_code().closure(RUN)
-    assert own_code().closure(LOOK) < own_code().closure(RUN)
+    assert own_code().closure(SURVEY) < own_code().closure(RUN)
     assert any(module.startswith("pipeline.report") for module in own_code().closure(RUN))
 
 
@@ -337,7 +337,7 @@ def test_of_the_package_what_a_datasheet_hangs_on_changes_its_version(tmp_path: 
     assert versions()[0] != work
 
 
-@pytest.mark.parametrize("module", [WORK, RUN, LOOK])
+@pytest.mark.parametrize("module", [WORK, RUN, SURVEY])
 def test_every_library_that_is_imported_changes_the_version(
     module: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
