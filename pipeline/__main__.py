@@ -1,4 +1,4 @@
-"""The one door: `python -m pipeline COMMAND key=value ...`."""
+"""The entry point: `python -m pipeline COMMAND key=value ...`."""
 
 from __future__ import annotations
 

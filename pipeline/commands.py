@@ -128,8 +128,8 @@ def _keys(settings: type[Any], group: str) -> list[str]:
         lines.append(f"  {group}{key.name.rstrip('_')}={_default(key)}")
         if words := key.metadata.get("words"):
             lines.append(f"      {words}")
-        if room := key.metadata.get("room"):
-            names = sorted(module.name for module in iter_modules(import_module(room).__path__))
+        if package := key.metadata.get("package"):
+            names = sorted(module.name for module in iter_modules(import_module(package).__path__))
             lines += textwrap.wrap(
                 ", ".join(names), 92, initial_indent=INDENT, subsequent_indent=INDENT
             )

@@ -1,4 +1,4 @@
-"""Plug-ins, one file each: those of a room of this package, and those that other packages name.
+"""Plug-ins, one file each: those of this package, and those that other packages name.
 
 Another package offers one by an entry point of the group `motor_datasheets.KIND` whose object is
 the plug-in: `[project.entry-points."motor_datasheets.effects"] seal_drag = "seals.drag:EFFECT"`.
@@ -18,8 +18,8 @@ from typing import Any
 
 from pipeline.records.errors import UsageError
 
-GROUP = "motor_datasheets"
-ROOMS = ("readers", "gates", "estimators", "rules", "exporters", "effects")
+PREFIX = "motor_datasheets"
+GROUPS = ("readers", "gates", "estimators", "rules", "exporters", "effects")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,18 +31,18 @@ class PlugIn:
     value: Any
 
 
-def discover(room: str, attribute: str, kind: type) -> tuple[PlugIn, ...]:
-    """Every plug-in by name: `attribute` of each module of the package `room`, and outside ones.
+def discover(package: str, attribute: str, kind: type) -> tuple[PlugIn, ...]:
+    """Every plug-in by name: `attribute` of each module of `package`, and outside ones.
 
-    The group of the entry points is the last part of `room`. Raises UsageError for an outside
-    plug-in that cannot be loaded, is no `kind`, or takes a name that there is.
+    The group of the entry points is the last part of the name of `package`. Raises UsageError for
+    an outside plug-in that cannot be loaded, is no `kind`, or takes a name that there is.
     """
     found: dict[str, PlugIn] = {}
-    for name in sorted(m.name for m in pkgutil.iter_modules(import_module(room).__path__)):
-        module = f"{room}.{name}"
+    for name in sorted(m.name for m in pkgutil.iter_modules(import_module(package).__path__)):
+        module = f"{package}.{name}"
         value = getattr(import_module(module), attribute)
         found[value.name] = PlugIn(value.name, module, value)
-    for point in _outside()[room.rpartition(".")[2]]:
+    for point in _outside()[package.rpartition(".")[2]]:
         value = _loaded(point, kind)
         if value.name in found:
             other = found[value.name].module
@@ -53,11 +53,11 @@ def discover(room: str, attribute: str, kind: type) -> tuple[PlugIn, ...]:
 
 @cache
 def outside_version() -> str:
-    """What outside plug-ins there are and what they say: names, versions, digest of their sources.
+    """The outside plug-ins: names, versions, digest of their sources.
 
-    Empty where there are none. A result hangs on them as it does on the code of this package.
+    Empty where there are none. A result depends on them as on the code of this package.
     """
-    points = [point for room in _outside().values() for point in room]
+    points = [point for group in _outside().values() for point in group]
     names = sorted({f"{p.group} {p.value} {p.dist.version if p.dist else ''}" for p in points})
     digest = hashlib.sha256()
     for home in sorted({p.module.partition(".")[0] for p in points}):
@@ -77,9 +77,9 @@ def _sources(home: str) -> list[Path]:
 
 @cache
 def _outside() -> dict[str, list[EntryPoint]]:
-    """The entry points of each room by name, read once a process."""
-    named = {room: entry_points(group=f"{GROUP}.{room}") for room in ROOMS}
-    return {room: sorted(found, key=lambda one: one.name) for room, found in named.items()}
+    """The entry points of each group by name, read once a process."""
+    named = {name: entry_points(group=f"{PREFIX}.{name}") for name in GROUPS}
+    return {name: sorted(found, key=lambda point: point.name) for name, found in named.items()}
 
 
 def _loaded(point: EntryPoint, kind: type) -> Any:

@@ -19,16 +19,22 @@ def key(
     words: str,
     *,
     result: bool = True,
-    room: str | None = None,
+    package: str | None = None,
     place: bool = False,
     one_of: tuple[str, ...] = (),
 ) -> Any:
     """A settings field; `result` is False where the value cannot change what is computed.
 
-    `room` is a package each of whose modules is a name that the key takes. A `place` is a file,
+    `package` is one each of whose modules is a name that the key takes. A `place` is a file,
     folder or URL: never empty, and `~` is the user's home. `one_of` are all values that there are.
     """
-    metadata = {"words": words, "result": result, "room": room, "place": place, "one_of": one_of}
+    metadata = {
+        "words": words,
+        "result": result,
+        "package": package,
+        "place": place,
+        "one_of": one_of,
+    }
     if isinstance(default, (dict, list)):
         return field(default_factory=lambda: type(default)(default), metadata=metadata)
     return field(default=default, metadata=metadata)
@@ -65,7 +71,7 @@ class ModelSettings:
     effects: list[str] = key(
         [],
         "[a,b] adds effects, [-a] takes one away: those of effects_path, and these",
-        room="pipeline.criticism.effects",
+        package="pipeline.criticism.effects",
     )
 
 

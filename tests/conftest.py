@@ -16,9 +16,9 @@ for name in THREADS:  # before anything imports numpy
     os.environ.setdefault(name, "1")
 
 hypothesis.settings.register_profile(
-    "house", deadline=None, derandomize=True, database=None, print_blob=True
+    "project", deadline=None, derandomize=True, database=None, print_blob=True
 )
-hypothesis.settings.load_profile("house")
+hypothesis.settings.load_profile("project")
 
 
 @pytest.fixture(autouse=True)

@@ -50,24 +50,26 @@ def _check_constants(stated: Mapping[str, Any]) -> None:
             raise UsageError(f"constants.{key} is of no stated constant", f"state {name} as well")
 
 
-def _check(room: str, given: Mapping[str, Any], known: Known) -> None:
+def _check(group: str, given: Mapping[str, Any], known: Known) -> None:
     for name, options in given.items():
         if name not in known:
-            raise UsageError(f"{room}.{name}: no such {KINDS[room]}", f"one of {', '.join(known)}")
+            raise UsageError(
+                f"{group}.{name}: no such {KINDS[group]}", f"one of {', '.join(known)}"
+            )
         has = ", ".join(known[name]) or "none"
         if not isinstance(options, Mapping):
             raise UsageError(
-                f"{room}.{name}={options}: {name} is no option but has some",
-                f"write {room}.{name}.OPTION=number; it has {has}",
+                f"{group}.{name}={options}: {name} is no option but has some",
+                f"write {group}.{name}.OPTION=number; it has {has}",
             )
         for option, value in options.items():
             if option not in known[name]:
-                raise UsageError(f"{room}.{name}.{option}: no such option", f"it has {has}")
+                raise UsageError(f"{group}.{name}.{option}: no such option", f"it has {has}")
             wanted = allowed(option, value, known[name][option])
             if wanted is not None:
                 usual = f"{known[name][option]:g} is usual"
                 raise UsageError(
-                    f"{room}.{name}.{option}={value} is not {wanted}", f"give such a one; {usual}"
+                    f"{group}.{name}.{option}={value} is not {wanted}", f"give such a one; {usual}"
                 )
 
 

@@ -24,8 +24,8 @@ def equivalence(
     dof = min(dof, 1e9)
     half = float(stdtrit(dof, 1.0 - alpha)) * se
     low, high = difference - half, difference + half
-    room = margin - abs(difference)
-    p_value = float(stdtr(dof, -room / se)) if se > 0.0 else 0.0 if room > 0.0 else 1.0
+    distance = margin - abs(difference)
+    p_value = float(stdtr(dof, -distance / se)) if se > 0.0 else 0.0 if distance > 0.0 else 1.0
     if p_value < alpha:
         status = "equivalent"
     elif low > margin or high < -margin:

@@ -32,8 +32,8 @@ def needed_columns(
     Billings and Luo, Int. J. Control 50(5), 1989 (orthogonal forward selection).
     """
     names = list(candidates)
-    room = max(0, int(y.size / (2.0 * dependence)) - base.shape[1])
-    most = room if most is None else min(most, room)
+    most_columns = max(0, int(y.size / (2.0 * dependence)) - base.shape[1])
+    most = most_columns if most is None else min(most, most_columns)
     if not names or most < 1:
         return []
     basis = _basis(base / sigma[:, None])

@@ -1,4 +1,4 @@
-"""Shaft mechanics that several rooms need."""
+"""Shaft mechanics that several packages use."""
 
 from __future__ import annotations
 

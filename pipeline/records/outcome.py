@@ -1,4 +1,4 @@
-"""What a command hands back to the one door: what to print, where, and the exit code."""
+"""What a command returns to the entry point: what to print, where, and the exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plug-in is one file: dropped into its room, it is found, and nothing else is touched."""
+"""A plug-in is one file: dropped into its package, it is found, and nothing else is touched."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from types import ModuleType
 import polars as pl
 import pytest
 
-from pipeline.contracts import gates as gates_room
+from pipeline.contracts import gates as gates_package
 from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
-from pipeline.crosscheck import rules as rules_room
+from pipeline.crosscheck import rules as rules_package
 from pipeline.crosscheck.registry import check_all, rules
-from pipeline.estimation import estimators as estimators_room
+from pipeline.estimation import estimators as estimators_package
 from pipeline.estimation.registry import estimators, fit_all
-from pipeline.export import exporters as exporters_room
+from pipeline.export import exporters as exporters_package
 from pipeline.export.registry import exporters
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
@@ -77,12 +77,12 @@ EXPORTER = Exporter("dropped_in", "txt", "pole pairs", render, read)
 
 @pytest.fixture
 def drop_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
-    """Puts one file into a room for the length of a test."""
+    """Puts one file into a package for the length of a test."""
     registries = (estimators, rules, gates, exporters)
 
-    def drop(room: ModuleType, source: str) -> None:
+    def drop(package: ModuleType, source: str) -> None:
         (tmp_path / "dropped_in.py").write_text(source)
-        monkeypatch.setattr(room, "__path__", [*room.__path__, str(tmp_path)])
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
         for registry in registries:
             registry.cache_clear()
 
@@ -110,7 +110,7 @@ def capture() -> Capture:
 
 def test_an_estimator_is_one_file(drop_in: Callable[..., None], capture: Capture) -> None:
     """Found, run with its own option and its own constant, with no other file edited."""
-    drop_in(estimators_room, ESTIMATOR)
+    drop_in(estimators_package, ESTIMATOR)
     assert "dropped_in" in {estimator.name for estimator in estimators()}
     constants = fit_all(Campaign("m", (capture,)), {"dropped_in": {"weight": 3.0}})[0]
     best = constants.best("dropped_in_count")
@@ -119,25 +119,25 @@ def test_an_estimator_is_one_file(drop_in: Callable[..., None], capture: Capture
 
 
 def test_a_rule_is_one_file(drop_in: Callable[..., None], capture: Capture) -> None:
-    drop_in(rules_room, RULE)
+    drop_in(rules_package, RULE)
     checks = check_all(Constants(), Campaign("m", (capture,)), {})
     assert [c.meaning for c in checks if c.name == "dropped_in"] == ["of 1 captures"]
 
 
 def test_a_gate_is_one_file(drop_in: Callable[..., None], capture: Capture) -> None:
     assert validate(capture, {})[1] == ()
-    drop_in(gates_room, GATE)
+    drop_in(gates_package, GATE)
     findings = validate(capture, {})[1]
     assert [(f.code, f.message) for f in findings] == [("dropped_in", "4 rows")]
     assert validate(capture, {"dropped_in": {"enabled": 0.0}})[1] == ()
 
 
 def test_an_exporter_is_one_file(drop_in: Callable[..., None]) -> None:
-    drop_in(exporters_room, EXPORTER)
+    drop_in(exporters_package, EXPORTER)
     assert exporters()["dropped_in"].read("7.0") == {"pole_pairs": 7.0}
 
 
-def test_rooms_are_clean_again() -> None:
+def test_packages_are_clean_again() -> None:
     """The tests above leave nothing behind."""
     plugs = (*estimators(), *rules(), *gates(), *exporters().values())
     assert "dropped_in" not in {plug.name for plug in plugs}

@@ -72,11 +72,11 @@ def test_links_and_files_exist(page: str) -> None:
     assert not absent
 
 
-def test_rooms_of_the_house_are_all_named() -> None:
-    rooms = {p.name for p in (ROOT / "pipeline").iterdir() if (p / "__init__.py").is_file()}
+def test_packages_are_all_named() -> None:
+    packages = {p.name for p in (ROOT / "pipeline").iterdir() if (p / "__init__.py").is_file()}
     named = set(re.findall(r"^ {6}([a-z]+)/ ", README, flags=re.MULTILINE))
-    assert named <= rooms
-    assert rooms - named <= {"lots"}
+    assert named <= packages
+    assert packages - named <= {"lots"}
 
 
 def test_example_estimator_finds_the_supply() -> None:
@@ -150,18 +150,18 @@ def test_example_exporter() -> None:
 
 
 @pytest.mark.parametrize(
-    "room", ["estimation/estimators", "crosscheck/rules", "contracts/gates", "export/exporters"]
+    "package", ["estimation/estimators", "crosscheck/rules", "contracts/gates", "export/exporters"]
 )
-def test_examples_are_in_the_style_of_the_house(room: str) -> None:
-    """Each example passes the linter and the formatter in the room it is for."""
+def test_examples_are_in_the_style_of_the_project(package: str) -> None:
+    """Each example passes the linter and the formatter in the package it is for."""
     mark = {
         "estimation/estimators": "ESTIMATOR",
         "crosscheck/rules": "RULE",
         "contracts/gates": "GATE",
         "export/exporters": "EXPORTER",
     }
-    (source,) = [text for text in blocks("python") if f"\n{mark[room]} = " in text]
-    name = f"--stdin-filename=pipeline/{room}/example.py"
+    (source,) = [text for text in blocks("python") if f"\n{mark[package]} = " in text]
+    name = f"--stdin-filename=pipeline/{package}/example.py"
     for words in (["check", name], ["format", "--check", name]):
         command = [sys.executable, "-m", "ruff", *words, "-"]
         done = subprocess.run(

@@ -59,8 +59,8 @@ def test_one_heavy_file_costs_itself(
     assert main([command, f"input={folder}", f"output={output}", LITTLE]) == 3
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("refused: ") and "heavy.mcap" in line and HEAVY in line
-    room = {"compare": "comparison", "diagnose": "diagnosis"}[command]
-    assert (output / room / "m.json").is_file()
+    folder = {"compare": "comparison", "diagnose": "diagnosis"}[command]
+    assert (output / folder / "m.json").is_file()
     assert not (output / ".work").exists()
 
 

@@ -22,7 +22,7 @@ from types import ModuleType
 
 from tests.recovery.harness import Case, Draw, draw
 
-ROOMS = ("pipeline", "tests")
+OF_PROJECT = ("pipeline", "tests")
 LIBRARIES = ("numpy", "scipy", "polars", "numba")
 
 
@@ -94,7 +94,7 @@ def _imports(name: str) -> tuple[str, ...]:
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    own = {n for n in found if n.split(".")[0] in ROOMS}
+    own = {n for n in found if n.split(".")[0] in OF_PROJECT}
     return tuple(sorted(n for n in own if _origin(n) is not None))
 
 

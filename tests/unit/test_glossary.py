@@ -230,8 +230,8 @@ def test_plug_ins_speak_of_known_names() -> None:
 
 
 def test_plug_ins_have_names_of_their_own() -> None:
-    for room in (estimators(), rules(), gates()):
-        names = [plug.name for plug in room]
+    for plug_ins in (estimators(), rules(), gates()):
+        names = [plug.name for plug in plug_ins]
         assert len(names) == len(set(names))
         assert all(re.fullmatch(r"[a-z][a-z0-9_]*", name) for name in names)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-ROOMS = {
+GROUPS = {
     "readers": ("pipeline.io.tables.foreign", "readers"),
     "gates": ("pipeline.contracts.registry", "gates"),
     "estimators": ("pipeline.estimation.registry", "estimators"),
@@ -66,12 +66,12 @@ def example(mark: str) -> str:
     return source
 
 
-@pytest.mark.parametrize("group", ROOMS)
+@pytest.mark.parametrize("group", GROUPS)
 def test_one_file_of_another_package_is_found(group: str, tmp_path: Path) -> None:
     """The documented examples, each in a package outside; nothing of this one is edited."""
     mark = MARKS.get(group, "READER")
     package(tmp_path, group, READER if group == "readers" else example(mark), mark)
-    module, function = ROOMS[group]
+    module, function = GROUPS[group]
     code = (
         f"import json, outside_plug_in as o\n"
         f"from {module} import {function} as found\n"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-import pipeline.criticism as room
+import pipeline.criticism as criticism_package
 
-FILES = sorted(Path(room.__file__).parent.rglob("*.py"))
+FILES = sorted(Path(criticism_package.__file__).parent.rglob("*.py"))
 READS = {
     *("test", "pole_pairs", "slots", "ambient_degc", "pair", "theta_elec_deg", "voltage_timing"),
     # what the station states of its own instruments

@@ -63,9 +63,9 @@ def test_hidden_effects_do_not_spoil_the_electrical_constants(motor):
     campaign = Campaign(motor, tuple(read_capture(folder, entry) for entry in entries))
     true = json.loads((folder / "truth.json").read_bytes())["constants"]
     known = Constants()
-    rooms = (resistance, open_circuit, current_step, heat_run)
-    for room in rooms:
-        fit = room.ESTIMATOR.fit(campaign, known, room.ESTIMATOR.options)
+    modules = (resistance, open_circuit, current_step, heat_run)
+    for module in modules:
+        fit = module.ESTIMATOR.fit(campaign, known, module.ESTIMATOR.options)
         known = known.adding(fit.estimates)
     limits = {"r_phase_ohm": 0.003, "ld_h": 0.01, "lq_h": 0.01, "psi_pm_wb": 0.002}
     for name, limit in limits.items():

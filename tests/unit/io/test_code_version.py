@@ -284,13 +284,15 @@ def test_every_python_gives_the_same_digest() -> None:
 def test_datasheets_hang_on_every_plug_in_and_on_nothing_that_shows_them() -> None:
     closure = own_code().closure(WORK)
     root = Path(pipeline.__file__).parent
-    for room in ("estimation/estimators", "contracts/gates", "crosscheck/rules", "io/readers"):
-        home = f"pipeline.{room.replace('/', '.')}"
-        plug_ins = {f"{home}.{p.stem}" for p in (root / room).glob("*.py")} - {f"{home}.__init__"}
+    for package in ("estimation/estimators", "contracts/gates", "crosscheck/rules", "io/readers"):
+        home = f"pipeline.{package.replace('/', '.')}"
+        plug_ins = {f"{home}.{p.stem}" for p in (root / package).glob("*.py")} - {
+            f"{home}.__init__"
+        }
         assert plug_ins and plug_ins <= closure
-    rooms = {module.split(".")[1] for module in closure}
-    assert {"records", "physics", "numerics"} <= rooms
-    assert not rooms & {
+    packages = {module.split(".")[1] for module in closure}
+    assert {"records", "physics", "numerics"} <= packages
+    assert not packages & {
         "report",
         "lots",
         "export",

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pipeline.simulator
 
-ROOM = Path(pipeline.simulator.__file__).parent
+PACKAGE = Path(pipeline.simulator.__file__).parent
 KERNELS = ("field.py", "motion.py", "converter.py", "locked.py")
 
 
 def pytest_configure() -> None:
     """Forget kernels compiled before the newest of their sources, so that no edit goes untested."""
-    newest = max((ROOM / name).stat().st_mtime for name in KERNELS)
-    for kept in (ROOM / "__pycache__").glob("*.nb[ic]"):
+    newest = max((PACKAGE / name).stat().st_mtime for name in KERNELS)
+    for kept in (PACKAGE / "__pycache__").glob("*.nb[ic]"):
         if kept.stat().st_mtime < newest:
             kept.unlink(missing_ok=True)

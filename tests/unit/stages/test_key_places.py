@@ -159,19 +159,19 @@ def test_every_setting_that_changes_a_result_changes_the_work(found: Survey) -> 
 
 def test_every_option_of_every_plug_in_changes_the_work(found: Survey) -> None:
     base = job_of(RunSettings(), found)
-    rooms = {
+    groups = {
         "fit": {e.name: e.options for e in estimators()},
         "gates": {g.name: g.settings() for g in gates()},
         "crosscheck": {r.name: r.options for r in rules()},
     }
     asked = 0
-    for room, plug_ins in rooms.items():
+    for group, plug_ins in groups.items():
         for name, options in plug_ins.items():
             for option, value in options.items():
-                settings = RunSettings(**{room: {name: {option: value + 1e-9}}})
+                settings = RunSettings(**{group: {name: {option: value + 1e-9}}})
                 job = job_of(settings, found)
-                assert job.config_sha256 != base.config_sha256, (room, name, option)
-                assert job.key != base.key, (room, name, option)
+                assert job.config_sha256 != base.config_sha256, (group, name, option)
+                assert job.key != base.key, (group, name, option)
                 asked += 1
     assert asked > 100
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.__main__ import main as door
+from pipeline.__main__ import main as command_line
 from pipeline.crosscheck.plan import Known, settling_tests
 from pipeline.estimation.registry import estimators, fit_all
 from pipeline.io.storage.datasheets import datasheet_of, read_datasheets
@@ -146,15 +146,15 @@ def test_plan_from_captures_is_that_of_a_run_of_them(
     folder.mkdir()
     for path in DEMO.glob("resistance*"):
         shutil.copyfile(path, folder / path.name)
-    assert door(["plan", f"motor={DEMO.name}", f"input={folder}"]) == 0
+    assert command_line(["plan", f"motor={DEMO.name}", f"input={folder}"]) == 0
     planned = capsys.readouterr().out
     quiet = ["report=false", "recordings=false", "registry=null", "workers=1"]
-    door(["run", f"input={folder}", f"output={output}", *quiet])
+    command_line(["run", f"input={folder}", f"output={output}", *quiet])
     capsys.readouterr()
-    assert door(["plan", f"output={output}"]) == 0
+    assert command_line(["plan", f"output={output}"]) == 0
     assert planned == capsys.readouterr().out
     assert "open_circuit" in planned
-    assert door(["plan", "motor=other", f"input={folder}"]) == 2
+    assert command_line(["plan", "motor=other", f"input={folder}"]) == 2
     assert f"there are {DEMO.name}" in capsys.readouterr().err
 
 

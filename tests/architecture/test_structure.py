@@ -1,4 +1,4 @@
-"""The house stands as it was drawn: import direction, small files, nothing done at import."""
+"""The structure is as documented: import direction, small files, nothing done at import."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "pipeline"
 LINES = 450
 SLOW = ("pandera", "rerun", "altair", "numba", "scipy.stats", "scipy.optimize", "polars", "mcap")
-THE_DOOR = "__main__.py"
+ENTRY_POINT = "__main__.py"
 EVERYTHING = {"Exception", "BaseException"}
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -82,16 +82,16 @@ def test_no_module_imports_one_that_imports_it() -> None:
 
 
 def test_an_import_upwards_is_seen(tmp_path: Path) -> None:
-    """The tool itself: in a house of two rooms, the lower one that looks up is reported."""
+    """The tool itself: an import of the upper of two layers by the lower one is reported."""
     pytest.importorskip("importlinter", reason="import-linter is a development tool")
-    house = tmp_path / "house"
-    for room in ("", "upper", "lower"):
-        (house / room).mkdir()
-        (house / room / "__init__.py").write_text("")
-    (house / "lower" / "__init__.py").write_text("import house.upper\n")
+    plant = tmp_path / "plant"
+    for layer in ("", "upper", "lower"):
+        (plant / layer).mkdir()
+        (plant / layer / "__init__.py").write_text("")
+    (plant / "lower" / "__init__.py").write_text("import plant.upper\n")
     (tmp_path / ".importlinter").write_text(
-        "[importlinter]\nroot_package = house\n[importlinter:contract:1]\nname = down\n"
-        "type = layers\nlayers =\n    upper\n    lower\ncontainers = house\n"
+        "[importlinter]\nroot_package = plant\n[importlinter:contract:1]\nname = down\n"
+        "type = layers\nlayers =\n    upper\n    lower\ncontainers = plant\n"
     )
     code = (
         f"import os, sys; os.chdir({str(tmp_path)!r}); sys.path.insert(0, '.')\n"
@@ -99,7 +99,7 @@ def test_an_import_upwards_is_seen(tmp_path: Path) -> None:
     )
     done = _python("-c", code)
     assert done.returncode == 1, done.stdout + done.stderr
-    assert "house.lower -> house.upper" in done.stdout
+    assert "plant.lower -> plant.upper" in done.stdout
 
 
 def test_no_file_is_long() -> None:
@@ -108,7 +108,7 @@ def test_no_file_is_long() -> None:
 
 
 def test_no_drawer_for_everything() -> None:
-    """Neither a module nor a room is named for having no subject."""
+    """No module or package has a name without a subject."""
     drawers = {"utils", "util", "helpers", "helper", "misc", "common", "tools"}
     names = {part.removesuffix(".py") for p in SOURCES for part in p.relative_to(PACKAGE).parts}
     assert names & drawers == set()
@@ -122,7 +122,7 @@ def test_print_is_the_doors_alone() -> None:
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Name)
         and node.func.id == "print"
-        and path != THE_DOOR
+        and path != ENTRY_POINT
     ]
     assert callers == []
 
@@ -177,17 +177,17 @@ def test_the_door_opens_light() -> None:
     assert sorted(loaded & set(SLOW)) == []
 
 
-@pytest.mark.parametrize("room", ["validate", "registry", "motor", "json_schema", "schemas"])
-def test_contracts_load_without_pandera(room: str) -> None:
+@pytest.mark.parametrize("module", ["validate", "registry", "motor", "json_schema", "schemas"])
+def test_contracts_load_without_pandera(module: str) -> None:
     """Importing pandera costs most of a second; only a capture that is validated pays it."""
-    loaded = _modules_after(f"import pipeline.contracts.{room}")
+    loaded = _modules_after(f"import pipeline.contracts.{module}")
     assert sorted(loaded & {"pandera", "rerun", "altair", "numba"}) == []
 
 
-@pytest.mark.parametrize("room", ["pipeline.estimation.registry", "pipeline.crosscheck.registry"])
-def test_plug_ins_load_light(room: str) -> None:
+@pytest.mark.parametrize("module", ["pipeline.estimation.registry", "pipeline.crosscheck.registry"])
+def test_plug_ins_load_light(module: str) -> None:
     """Finding the plug-ins costs neither a plotting library nor a compiler."""
-    name = room.rsplit(".", 2)[1]
+    name = module.rsplit(".", 2)[1]
     find = {"estimation": "estimators", "crosscheck": "rules"}[name]
-    loaded = _modules_after(f"import {room}\n{room}.{find}()")
+    loaded = _modules_after(f"import {module}\n{module}.{find}()")
     assert sorted(loaded & {"pandera", "rerun", "altair", "scipy.stats"}) == []

@@ -1,4 +1,4 @@
-"""The one door: commands, keys, positional words and exit codes."""
+"""The entry point: commands, keys, positional words and exit codes."""
 
 from __future__ import annotations
 
