@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import functools
 import hashlib
 import json
@@ -20,35 +21,42 @@ MEASURING_CPU_S = 3600.0
 
 @dataclass
 class Coverage:
-    """Tests by line, their CPU seconds under the tracer, and those that fail unchanged code."""
+    """Tests by line, by file, by file that their own one imports, and their CPU seconds traced.
+
+    `failed` are those that fail unchanged code.
+    """
 
     by_line: dict[tuple[str, int], set[str]] = field(default_factory=lambda: defaultdict(set))
     by_file: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+    by_import: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
     seconds: dict[str, float] = field(default_factory=dict)
     failed: set[str] = field(default_factory=set)
 
-    def add(self, kept: dict[str, dict]) -> None:
-        """Takes in the tests of one file."""
+    def add(self, kept: dict[str, dict], imported: frozenset[str]) -> None:
+        """Takes in the tests of one file, which imports some files of the package."""
         self.failed |= set(kept["failed"])
         for test, files in kept["lines"].items():
-            if test in self.failed or not files:
+            if test in self.failed or not (files or imported):
                 continue
             self.seconds[test] = kept["seconds"][test]
+            for path in imported:
+                self.by_import[path].add(test)
             for path, lines in files.items():
                 self.by_file[path].add(test)
                 for line in lines:
                     self.by_line[path, line].add(test)
 
     def of(self, mutant: Mutant, root: Path) -> set[str]:
-        """Tests that run the line; for what runs at import, those that run what uses its name.
+        """Tests that run the line; for what runs at import, those that may use what it made.
 
-        A name of a module is used where a file of the package says it; where none does, every test
-        that runs something of the file counts.
+        That are the tests of files that import the mutant's file, and those that run a line with
+        the name that was made; where there are none, every test that runs something of the file.
         """
         end = mutant.line + mutant.before.count("\n")
         run = {t for line in range(mutant.line, end + 1) for t in self.by_line[mutant.path, line]}
         if run:
             return run
+        run = set(self.by_import[mutant.path])
         if mutant.function.isupper():
             for path, line in _uses(root, mutant.function):
                 run |= self.by_line[path, line]
@@ -92,8 +100,19 @@ def measure(scratch: Scratch, package: Package, cache: Path) -> Coverage:
                 said = (scratch.tree.parent / "output").read_text()[-2000:]
                 raise RuntimeError(f"{name} cannot be measured: {said}")
             kept.write_text(text)
-        found.add(json.loads(kept.read_text()))
+        found.add(json.loads(kept.read_text()), _imported(path) & files)
     return found
+
+
+def _imported(path: Path) -> frozenset[str]:
+    """Files that a test file imports, by their paths in the tree."""
+    modules: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            modules |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return frozenset(f"{module.replace('.', '/')}.py" for module in modules)
 
 
 def _digest(tree: Path) -> str:

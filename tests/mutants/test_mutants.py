@@ -159,6 +159,8 @@ def test_a_mutant_dies_and_an_equivalent_one_lives(
     line = next(m.line for m in changed("max"))
     assert covered.by_line["pipeline/sample.py", line] == {"tests/test_sample.py::test_area"}
     (product,) = changed("width * height")
+    limit = next(m for m in changed("3.0"))
+    assert covered.of(limit, tree) >= {"tests/test_sample.py::test_elsewhere"}
     (equal,) = changed("max")
     (loop,) = changed("n -= 1")
     tried = {m.key: run.attempt(m, scratch, covered, "") for m in (product, equal, loop)}
