@@ -49,15 +49,16 @@ class Coverage:
     def of(self, mutant: Mutant, root: Path) -> set[str]:
         """Tests that run the line; for what runs at import, those that may use what it made.
 
-        That are the tests of files that import the mutant's file, and those that run a line with
+        Those are the tests of files that import the mutant's file, and those that run a line with
         the name that was made; where there are none, every test that runs something of the file.
         """
         end = mutant.line + mutant.before.count("\n")
         run = {t for line in range(mutant.line, end + 1) for t in self.by_line[mutant.path, line]}
-        if run:
+        at_import = mutant.function.isupper() or mutant.function == "module"
+        if run and not at_import:
             return run
-        run = set(self.by_import[mutant.path])
-        if mutant.function.isupper():
+        run |= self.by_import[mutant.path]
+        if at_import:
             for path, line in _uses(root, mutant.function):
                 run |= self.by_line[path, line]
         return run or self.by_file[mutant.path]

@@ -58,6 +58,9 @@ U_UNKNOWN_K = 15.0
 HOLD = "assumed:voltage_hold"
 D_FLUX = "d flux"
 CANDIDATES = ("zero", "acceleration", "turned", "cross flux")
+# A drive's voltage is late by a period of computing and half a one of holding (Bae and Sul, IEEE
+# Trans. Ind. Appl. 39(3), 2003), the row of its log may be another half.
+LATEST_PERIODS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +68,9 @@ class VoltageRows:
     """Window means of the q voltage equation; every array is [w].
 
     `speed_rad_s` and `current_a` come with their products with temperature above 25 degC;
-    `columns` holds the nuisances; `hold_doubt` is what it may matter that an inverter holds its
-    voltage still over a centred period while the rotor turns (relative, of the back-EMF).
+    `columns` holds the nuisances; `period_s` is that of the samples; `hold_doubt` is what
+    it may matter that an inverter holds its voltage still over a centred period while the rotor
+    turns (relative, of the back-EMF).
     """
 
     captures: tuple[Capture, ...]
@@ -79,6 +83,7 @@ class VoltageRows:
     warm_current_k_a: Array
     warm_speed_k_rad_s: Array
     columns: Mapping[str, Array]
+    period_s: float
     hold_doubt: float
 
 
@@ -92,7 +97,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     temperatures the values hold for those of the log. Reference: Messenger and Bortz 2021 (weak
     form); dq equations of IEEE Std 1812-2014.
     """
-    rows = _rows(campaign.of("drive"), pole_pairs_of(known, campaign.nameplate("pole_pairs")))
+    pole_pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    rows = _rows(campaign.of("drive"), pole_pairs)
     if rows is None or rows.voltage_v.size < 20 or float(np.ptp(rows.speed_rad_s)) == 0.0:
         return Fit(tuple(not_identifiable(n, _unit(n), NAME, EXPERIMENT) for n in GIVES))
     magnet, magnet_parts = magnet_coefficient(known)
@@ -107,7 +113,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     regression = Regression(design, rows.voltage_v, ones, rows.cluster)
     split = partial(_partitions, rows)
     doubts = [disagreement(regression, k, split, options["level"]) for k in range(len(GIVES))]
-    estimates = _estimates(rows, found, covariance, dof, (magnet, magnet_parts), chosen, doubts)
+    moved = _moved(rows, found.coefficients, magnet, chosen, pole_pairs or 1)
+    scatter = np.sqrt(np.diag(covariance)[: len(GIVES)])
+    estimates = _estimates(
+        rows, found, (scatter, dof), (magnet, magnet_parts), chosen, (moved, doubts)
+    )
     return Fit(estimates, _evidence(rows, found))
 
 
@@ -147,6 +157,7 @@ def _rows(captures: Sequence[Capture], pole_pairs: int | None) -> VoltageRows | 
         speed_rad_s=joined.pop("speed_rad_s"),
         warm_current_k_a=joined.pop("warm_current_k_a"),
         warm_speed_k_rad_s=joined.pop("warm_speed_k_rad_s"),
+        period_s=float(np.median(joined.pop("period"))),
         hold_doubt=float(np.sqrt(np.mean(joined.pop("hold") ** 2))),
         columns=joined,
     )
@@ -191,6 +202,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         "inductive": weak.integral(i_q, 1),
         "drop": weak.integral(i_q / np.sqrt(modulus**2 + noise**2 + 1e-300)),
         "zero": np.ones(weak.count),
+        "period": np.full(weak.count, period),
         "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
         "cross flux": weak.integral(speed * i_q**2),
         "acceleration": weak.integral(theta, 2),
@@ -268,12 +280,12 @@ def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
 def _estimates(
     rows: VoltageRows,
     found: LinearFit,
-    covariance: Array,
-    dof: int,
+    scatter: tuple[Array, int],
     coefficient: tuple[float, Budget],
     chosen: Sequence[str],
-    doubts: Sequence[Disagreement | None],
+    model: tuple[Array, Sequence[Disagreement | None]],
 ) -> tuple[Estimate, ...]:
+    (deviation, dof), (moved, doubts) = scatter, model
     magnet, magnet_parts = coefficient
 
     def values(shift: Mapping[str, float]) -> Array:
@@ -283,7 +295,6 @@ def _estimates(
 
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
-    moved = _moved(rows, found.coefficients[:2], magnet, chosen)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
     paths = tuple(sorted(c.path for c in rows.captures))
     words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
@@ -295,7 +306,7 @@ def _estimates(
     place = {GIVES[0]: "temp_magnet_degc", GIVES[1]: "temp_winding_degc"}
     estimates = []
     for i, name in enumerate(GIVES):
-        value, u = float(found.coefficients[i]), float(np.sqrt(covariance[i, i]))
+        value, u = float(found.coefficients[i]), float(deviation[i])
         if value <= 2.0 * u:
             note = f"{value:.3g} ± {u:.2g} {_unit(name)} from this log; {EXPERIMENT}"
             estimates.append(not_identifiable(name, _unit(name), NAME, note))
@@ -320,18 +331,24 @@ def _estimates(
     return tuple(estimates)
 
 
-def _moved(rows: VoltageRows, values: Array, magnet: float, chosen: Sequence[str]) -> Array:
+def _moved(
+    rows: VoltageRows, values: Array, magnet: float, chosen: Sequence[str], pole_pairs: int
+) -> Array:
     """How far Ke and R [2] move with one of the nuisances left out, at most.
 
     On a free shaft q current goes with acceleration, and R with the lateness of the voltage: what
-    little parts them is also what any other error of the model follows.
+    little parts them is also what any other error of the model follows. So a nuisance counts
+    unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d.
     """
-    moved = np.zeros(2)
-    for left in chosen:
-        design = _design(rows, magnet, [n for n in chosen if n != left], {})
-        moved = np.maximum(
-            moved, np.abs(linear_fit(design, rows.voltage_v).coefficients[:2] - values)
-        )
+    latest = LATEST_PERIODS * rows.period_s
+    most = {"acceleration": abs(float(values[0])) * latest, "turned": pole_pairs * latest}
+    moved = np.zeros(len(GIVES))
+    for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):
+        if abs(float(size)) <= most.get(name, 0.0):
+            continue
+        design = _design(rows, magnet, [n for n in chosen if n != name], {})
+        without = linear_fit(design, rows.voltage_v).coefficients[: len(GIVES)]
+        moved = np.maximum(moved, np.abs(without - values[: len(GIVES)]))
     return moved
 
 

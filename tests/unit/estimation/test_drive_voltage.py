@@ -128,3 +128,21 @@ def test_a_bent_instrument_moves_the_results_as_their_budgets_say(
         assert moved == pytest.approx(said * share / one.number, rel=0.03, abs=2e-6)
         assert (abs(moved) > 1e-5) == (sign != 0)
         assert moved * sign >= 0.0
+
+
+@pytest.mark.parametrize(("late_samples", "counts"), [(1, False), (30, True)])
+def test_a_nuisance_beyond_what_it_stands_for_is_doubt(late_samples: int, counts: bool) -> None:
+    """A voltage late by one row is lateness; one late by thirty is anything, and R carries it."""
+    log, station = recorded((("drive_0", "drive", {"voltage_timing": "held"}),), 6)
+    (drive,) = log.of("drive")
+    table = drive.tables[0]
+    moved = table.with_columns(table[n].shift(late_samples) for n in ("vd_v", "vq_v"))
+    late = replace(drive, tables=(moved.slice(late_samples),))
+    found = estimates(ESTIMATOR, late)["r_phase_ohm"]
+    ratio = station.voltage_commanded / station.current
+    if not found.known:
+        assert counts
+        return
+    doubt = sum(p.u for p in found.budget if p.source == "assumed:drive_voltage:nuisances")
+    assert (doubt > 0.005 * found.number) == counts
+    assert abs(found.number - ratio * MOTOR.r_phase_ohm) < max(2.0 * found.u, 0.01 * found.number)
