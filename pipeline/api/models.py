@@ -264,8 +264,8 @@ def diagnose(
 
 def model_spec(name: str, effects: Sequence[str], effects_path: str | None = None) -> ModelSpec:
     """The model asked for; raises UsageError for a model or an effect that there is not."""
-    from pipeline.criticism.registry import known_effects
-    from pipeline.criticism.specification import MODELS
+    from pipeline.criticism.library.named_models import MODELS
+    from pipeline.criticism.library.registry import known_effects
 
     if name not in MODELS:
         raise UsageError(f"no model {name!r}", f"known are {', '.join(MODELS)}")

@@ -12,20 +12,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.asked import Begun, fit_of
-from pipeline.criticism.climb import End, ended
+from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
+from pipeline.criticism.data.segment import told_signal
+from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import TOO_LITTLE, enough, not_shown, verdict_of
 from pipeline.criticism.effect import Array
-from pipeline.criticism.judge import HeldOut, leave_out, remainder
 from pipeline.criticism.ladder import parameters_of
-from pipeline.criticism.maps import unit_of
-from pipeline.criticism.registry import effects
-from pipeline.criticism.segment import told_signal
-from pipeline.criticism.segments import segments
-from pipeline.criticism.size import PAIRLESS, machine_of
-from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import own_columns
-from pipeline.criticism.wander import wandering
+from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.regression.goodness import HeldOut, leave_out, remainder
+from pipeline.criticism.regression.linear_system import own_columns
+from pipeline.criticism.search import End, ended
+from pipeline.criticism.selection.drift import wandering
+from pipeline.criticism.selection.requested_model import Begun, fit_of
+from pipeline.criticism.validation.error_maps import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -62,9 +62,9 @@ def model_verdict(campaign: Campaign, model: ModelSpec, start: Constants) -> Mod
     Notes
     -----
     A residual of group g (signal, capture, order a turn) counts by the root of χ²_g/n_g over the
-    noise floor of `floors.noise_floor`. A group is over the floor by the rule of
-    `judge.remainder`: chance passes it as seldom as five standard deviations, the variance is twice
-    the floor's, and the size is one that somebody would act on.
+    noise floor of `noise_floors.noise_floor`. A group is over the floor by the rule of
+    `goodness.remainder`: chance passes it as seldom as five standard deviations, the variance is
+    twice the floor's, and the size is one that somebody would act on.
 
     """
     machine = machine_of(campaign, start)

@@ -8,21 +8,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.asked import fit_of
-from pipeline.criticism.captured import at_ambient, unused
-from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.determined import combinations_told, parameters_told
-from pipeline.criticism.held_out import effective, run_errors, simulate, traces
-from pipeline.criticism.judge import HeldOut, in_common, leave_out
-from pipeline.criticism.mains import told_hum
-from pipeline.criticism.maps import all_maps, unit_of
-from pipeline.criticism.model import Model
-from pipeline.criticism.optional import trimmed
-from pipeline.criticism.segment import Segment, told_signal
-from pipeline.criticism.segments import segments
-from pipeline.criticism.size import PAIRLESS, machine_of
-from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, own_columns, system
+from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
+from pipeline.criticism.data.segment import Segment, told_signal
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
+from pipeline.criticism.regression.identifiability import combinations_told, parameters_told
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.mains_hum import told_hum
+from pipeline.criticism.selection.missing_data import at_ambient, unused
+from pipeline.criticism.selection.pruning import trimmed
+from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.validation.error_maps import all_maps, unit_of
+from pipeline.criticism.validation.held_out import effective, run_errors, simulate, traces
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import (
     Comparison,

@@ -8,28 +8,28 @@ from dataclasses import replace
 
 from scipy.special import gammaincc
 
-from pipeline.criticism.asked import fit_of
-from pipeline.criticism.captured import at_ambient, unexcited, unused
-from pipeline.criticism.climb import End, ended
-from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.determined import combinations_told
+from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
+from pipeline.criticism.data.segment import Segment, told_signal
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.experiments import separations
-from pipeline.criticism.judge import (
+from pipeline.criticism.ladder import parameters_of, rung_record
+from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import (
     HeldOut,
     over_floor,
 )
-from pipeline.criticism.ladder import parameters_of, rung_record
-from pipeline.criticism.mains import told_hum
-from pipeline.criticism.registry import effects
-from pipeline.criticism.rivals import experiment_for, remedies, rivals_of
-from pipeline.criticism.scores import TIE, Candidate, Score, candidates
-from pipeline.criticism.segment import Segment, told_signal
-from pipeline.criticism.segments import segments
-from pipeline.criticism.selection import Rung, loss_without
-from pipeline.criticism.size import PAIRLESS, machine_of
-from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import System
+from pipeline.criticism.regression.identifiability import combinations_told
+from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.regression.mains_hum import told_hum
+from pipeline.criticism.search import End, ended
+from pipeline.criticism.selection.alternatives import experiment_for, remedies, rivals_of
+from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
+from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.selection.score_test import TIE, Candidate, Score, candidates
+from pipeline.criticism.selection.stepwise import Rung, loss_without
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import KnownCombination, ModelSpec

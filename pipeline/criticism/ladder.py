@@ -7,17 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.criticism.determined import parameters_told
-from pipeline.criticism.judge import HeldOut, signal_errors
-from pipeline.criticism.maps import (
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.regression.goodness import HeldOut, signal_errors
+from pipeline.criticism.regression.identifiability import parameters_told
+from pipeline.criticism.selection.stepwise import Rung
+from pipeline.criticism.validation.error_maps import (
     angle_maps,
     histograms,
     speed_current_map,
     unit_of,
     window_errors,
 )
-from pipeline.criticism.segment import Segment
-from pipeline.criticism.selection import Rung
 from pipeline.records.diagnosis import LadderRung, RungError, ToldParameter
 
 

@@ -13,8 +13,8 @@ from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
-from pipeline.criticism.each import Work, by_threads, done_by
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.regression.parallel import Work, by_threads, done_by
 from pipeline.execution.pools import Cluster, core_count, open_pool
 
 _log = logging.getLogger(__name__)
@@ -113,7 +113,7 @@ def _forget() -> None:
 
 def _load_effects(effects_path: str | None) -> None:
     """Imports the user's effects, so that they can be unpickled by name."""
-    from pipeline.criticism.registry import effects
+    from pipeline.criticism.library.registry import effects
 
     effects(effects_path)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.size import counted_pole_pairs
+from pipeline.criticism.data.machine_scale import counted_pole_pairs
 from pipeline.estimation.registry import fit_all
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants

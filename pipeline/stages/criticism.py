@@ -39,7 +39,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     """
     input_folder(settings.input)
     if settings.model.effects or settings.effects_path is not None:
-        from pipeline.criticism.registry import known_effects
+        from pipeline.criticism.library.registry import known_effects
 
         known_effects(settings.model.effects, settings.effects_path)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)

@@ -66,7 +66,7 @@ def main(settings: RunSettings) -> Outcome:
     ReadLimits(settings.read_seconds, settings.read_memory_mb)
     input_folder(settings.input)
     if settings.residual_test:
-        from pipeline.criticism.registry import known_effects
+        from pipeline.criticism.library.registry import known_effects
 
         known_effects(settings.model.effects)
     if settings.workers < 0:

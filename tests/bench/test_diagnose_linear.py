@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import diagnose
-from pipeline.criticism.segments import segments
-from pipeline.criticism.size import machine_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -33,7 +33,7 @@ def repeated(campaign: Campaign, times: int) -> Campaign:
 @pytest.mark.slow
 def test_twice_and_four_times_the_samples_take_twice_and_four_times_as_long(monkeypatch) -> None:
     # an order that a copy of a capture has as well is in no second capture
-    monkeypatch.setattr("pipeline.criticism.climb.orders_left", lambda *_: ())
+    monkeypatch.setattr("pipeline.criticism.search.orders_left", lambda *_: ())
     once = campaigns(str(RIG / "P0"))[0][0]
     told = []
     for times in (1, 2, 4):

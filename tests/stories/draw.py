@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.criticism.orders import holding_orders, sector_errors
+from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
 from tests.stories.fits import REAL, campaign, fit
 from tests.stories.svg import COLOURS, INK, Panel, page
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.criticism.asked import fit_of
-from pipeline.criticism.judge import leave_out, signal_errors
-from pipeline.criticism.optional import trimmed
-from pipeline.criticism.residuals import measured, residual
-from pipeline.criticism.segment import Segment
-from pipeline.criticism.segments import segments
-from pipeline.criticism.size import machine_of
-from pipeline.criticism.specification import model_of
-from pipeline.criticism.system import Fitted, System, own_columns
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.equations.residuals import measured, residual
+from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.regression.goodness import leave_out, signal_errors
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.selection.pruning import trimmed
+from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.execution.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec

@@ -18,7 +18,7 @@ GROUPS = {
     "estimators": ("pipeline.estimation.registry", "estimators"),
     "rules": ("pipeline.crosscheck.registry", "rules"),
     "exporters": ("pipeline.export.registry", "exporters"),
-    "effects": ("pipeline.criticism.registry", "effects"),
+    "effects": ("pipeline.criticism.library.registry", "effects"),
 }
 MARKS = {
     "gates": "GATE",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.criticism.coupling import closer, far_drag, passed_on, side_of, spring_twist
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.machine.two_masses import closer, far_drag, passed_on, side_of, spring_twist
 
 
 def _torque(x: Operating, q: Values) -> Array:

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.descent import gauss_newton
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Machine, Operating
-from pipeline.criticism.model import GAINS, Model
-from pipeline.criticism.registry import effects
-from pipeline.criticism.segment import Segment
-from pipeline.criticism.system import Fitted, floors
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import GAINS, Model
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linear_system import Fitted, floors
 from pipeline.numerics.projection import projection
 
 BASE = {

@@ -11,8 +11,8 @@ import pytest
 
 from pipeline.criticism import adequacy
 from pipeline.criticism.adequacy import model_verdict
+from pipeline.criticism.data.machine_scale import PAIRLESS
 from pipeline.criticism.diagnosis import TOO_LITTLE, diagnose
-from pipeline.criticism.size import PAIRLESS
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

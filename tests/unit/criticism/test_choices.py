@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.choices import reconsidered
-from pipeline.criticism.descent import gauss_newton
-from pipeline.criticism.model import Model, zero
-from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import residual
-from pipeline.criticism.system import Fitted, floors
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.selection.choices import reconsidered
 from tests.unit.criticism.machines import BASE, log, machine
 
 WAVES = effects()["bemf_harmonics"]
@@ -52,5 +52,5 @@ def test_choices_are_left_where_nothing_is_left_over_the_floor(monkeypatch):
     loud = tuple(np.full_like(sigma, 1e3) for sigma in floors(segments, MODEL, TRUE))
     start = {**TRUE, "bemf_harmonics.ripple_share": 0.0}
     ended = gauss_newton(segments, Fitted(MODEL, start, loud, start))
-    monkeypatch.setattr("pipeline.criticism.choices.gauss_newton", None)
+    monkeypatch.setattr("pipeline.criticism.selection.choices.gauss_newton", None)
     assert reconsidered(segments, *ended)[0] is ended[0]

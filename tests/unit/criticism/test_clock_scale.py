@@ -8,14 +8,14 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segment import RECORDER
+from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.effect import RECORDERS
-from pipeline.criticism.model import Model, clock_gain
-from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import over_inertia, residual
-from pipeline.criticism.segment import RECORDER
-from pipeline.criticism.segments import segments
-from pipeline.criticism.size import machine_of
+from pipeline.criticism.equations.residuals import over_inertia, residual
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, clock_gain
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

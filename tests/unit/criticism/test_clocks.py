@@ -6,8 +6,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.clocks import counted
-from pipeline.criticism.traces import even_clock
+from pipeline.criticism.data.clocks import counted
+from pipeline.criticism.data.traces import even_clock
 from pipeline.records.capture import Capture, CaptureMeta
 
 PERIOD = 1e-4

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.stats import ncx2
 
-from pipeline.criticism import experiments
+from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.design import experiments
+from pipeline.criticism.design.experiments import separations
+from pipeline.criticism.design.planned_tests import PLANNED, planned
 from pipeline.criticism.effect import Parameter
-from pipeline.criticism.experiments import separations
-from pipeline.criticism.floors import noise_floor
-from pipeline.criticism.model import Model
-from pipeline.criticism.planned import PLANNED, planned
-from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import residual
-from pipeline.criticism.scores import candidates, widened
-from pipeline.criticism.segment import row_index
-from pipeline.criticism.system import Fitted, floors
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.selection.score_test import candidates, widened
 from tests.unit.criticism.machines import BASE, log, machine
 
 ALL = effects()
@@ -39,7 +39,7 @@ def state(name, size, others, segments):
 
 
 def _base():
-    from pipeline.criticism.model import BASE as CONSTANTS
+    from pipeline.criticism.machine.model import BASE as CONSTANTS
 
     return CONSTANTS
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
-from pipeline.criticism.free_run import Run, free_run
-from pipeline.criticism.model import Model
-from pipeline.criticism.registry import effects
-from pipeline.criticism.segment import Segment
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.validation.free_run import Run, free_run
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, machine
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.floors import offsets
-from pipeline.criticism.linearise import _Sampler, absorb, effect_columns, whitened_anew
-from pipeline.criticism.model import Model, zero
-from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import row_index
-from pipeline.criticism.system import Fitted, _kept, floors, own_columns, system
+from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.linear_system import Fitted, _kept, floors, own_columns, system
+from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
+from pipeline.criticism.regression.noise_floors import offsets
 from tests.unit.criticism.machines import BASE, log, machine
 
 PLAIN = Model(machine(), ())

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.model import Model
-from pipeline.criticism.order_scan import Part, orders_left
-from pipeline.criticism.segment import electrical_orders, row_index
-from pipeline.criticism.system import Fitted, floors, system
+from pipeline.criticism.data.segment import electrical_orders, row_index
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.selection.order_scan import Part, orders_left
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
 from pipeline.criticism.diagnosis import diagnose
-from pipeline.criticism.judge import signal_errors
-from pipeline.criticism.orders import holding_orders, sector_errors
+from pipeline.criticism.regression.goodness import signal_errors
 from pipeline.execution.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from tests.stories.fits import REAL, campaign, fit

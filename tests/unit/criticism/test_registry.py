@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.criticism.registry import effects
+from pipeline.criticism.library.registry import effects
 from pipeline.records.errors import UsageError
 
 BRAKE = """

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.floors import noise_floor, reading_error
-from pipeline.criticism.linearise import effect_columns, linearise
-from pipeline.criticism.model import Model, mean_current, zero
-from pipeline.criticism.noise import sensor_noise
-from pipeline.criticism.operate import finer_of
-from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import _averaged, residual
-from pipeline.criticism.segment import projected, row_index, slow_orders
+from pipeline.criticism.data.segment import projected, row_index, slow_orders
+from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.equations.residuals import _averaged, residual
+from pipeline.criticism.equations.true_signals import finer_of
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, mean_current, zero
+from pipeline.criticism.regression.linearise import effect_columns, linearise
+from pipeline.criticism.regression.noise_floors import noise_floor, reading_error
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, coasting, log, machine, operating
 

@@ -8,13 +8,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.floors import window_gain
-from pipeline.criticism.free_run import free_run
-from pipeline.criticism.model import Model
-from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import clock, projected
-from pipeline.criticism.segments import segments
-from pipeline.criticism.size import machine_of
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segment import clock, projected
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.noise_floors import window_gain
+from pipeline.criticism.validation.free_run import free_run
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from tests.unit.criticism.machines import BASE, machine

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism import coupling
-from pipeline.criticism.registry import effects
-from pipeline.criticism.traces import PAD, even_angle, reversals, travel
+from pipeline.criticism.data.traces import PAD, even_angle, reversals, travel
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine import two_masses
 from tests.unit.criticism.machines import BASE, operating
 
 LIBRARY = effects()
@@ -62,7 +62,7 @@ def test_noise_of_an_encoder_makes_no_reversal():
     assert reversals(np.zeros(9), 0.0).size == 0
 
 
-def two_masses(share: float, softness: float):
+def simulated_shaft(share: float, softness: float):
     """Motor and far inertia under a wandering torque and load: angle, torques, coupling [n]."""
     near, far = (1 - share) * BASE["j_kgm2"], share * BASE["j_kgm2"]
     fine = 40
@@ -88,7 +88,7 @@ def test_a_compliant_shaft_is_two_masses_and_a_spring(between: float):
     rigid shaft misses by.
     """
     share, softness = 0.33, 0.002
-    theta, torque, load, through = two_masses(share, softness)
+    theta, torque, load, through = simulated_shaft(share, softness)
     x = replace(shaft(theta), torque_em_nm=torque, inverter=True)
     twist_rad = softness * x.machine.scales["torque_nm"]
     q = {"share": share, "twist_rad": twist_rad, "damping_s": 0.0, "between": between}
@@ -106,7 +106,7 @@ def test_a_twist_smoothed_twice_stays_within_the_samples_around_a_window():
     x = operating(400)
     theta = np.where(np.arange(400) < 200, 0.0, 3.0)
     x = replace(x, theta_rad=theta, torque_em_nm=np.zeros(400), inverter=True)
-    drag = coupling.far_drag(x, 0.3, False, lambda: coupling.passed_on(x, 0.3))
+    drag = two_masses.far_drag(x, 0.3, False, lambda: two_masses.passed_on(x, 0.3))
     drag = np.abs(drag[60:-60])
     touched = np.flatnonzero(drag > 1e-6 * drag.max()) + 60
     assert touched.size and touched.min() >= 200 - PAD and touched.max() < 200 + PAD

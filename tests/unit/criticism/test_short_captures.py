@@ -8,9 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.segments import TESTS, segments
-from pipeline.criticism.size import machine_of
-from pipeline.criticism.traces import tellable
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segments import TESTS, segments
+from pipeline.criticism.data.traces import tellable
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 

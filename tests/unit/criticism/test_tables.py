@@ -8,17 +8,17 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.bounds import bounded_step, limits_of
+from pipeline.criticism.data.drive_segments import q_log
+from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
+from pipeline.criticism.data.holding_segments import standing
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.data.table_segments import flux_table, levels_of, set_levels
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.effect import Machine
-from pipeline.criticism.linearise import Column
-from pipeline.criticism.model import Model, values_of
-from pipeline.criticism.orders import holding_orders, sector_errors
-from pipeline.criticism.registry import effects
-from pipeline.criticism.segments import segments
-from pipeline.criticism.segments_log import q_log
-from pipeline.criticism.segments_standing import standing
-from pipeline.criticism.segments_table import flux_table, levels_of, set_levels
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, values_of
+from pipeline.criticism.regression.bounds import bounded_step, limits_of
+from pipeline.criticism.regression.linearise import Column
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

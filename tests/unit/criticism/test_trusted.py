@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.asked import Begun
-from pipeline.criticism.climb import climbed
 from pipeline.criticism.diagnosis import _drop, _ranking
-from pipeline.criticism.judge import HeldOut
-from pipeline.criticism.linearise import Column
-from pipeline.criticism.model import Model, zero
-from pipeline.criticism.registry import effects
-from pipeline.criticism.scores import Candidate, Score
-from pipeline.criticism.selection import Rung, _holds, _refitted, _sure, search
-from pipeline.criticism.system import Fitted, System, own_columns
-from pipeline.criticism.trust import denied, explained, trusted
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.goodness import HeldOut
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linearise import Column
+from pipeline.criticism.search import climbed
+from pipeline.criticism.selection.requested_model import Begun
+from pipeline.criticism.selection.score_test import Candidate, Score
+from pipeline.criticism.selection.stepwise import Rung, _holds, _refitted, _sure, search
+from pipeline.criticism.selection.truncation import denied, explained, trusted
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
 
@@ -50,7 +50,7 @@ def missing_by(**spreads):
 def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, kept, monkeypatch):
     rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     totals = [HeldOut(rungs[0].around.residual, total) for total in (10.0, 5.0, after)]
     assert len(trusted((), rungs, totals)[0]) == kept
 
@@ -76,15 +76,15 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     around = replace(rung.around, columns=tuple(columns), matrix=matrix)
     second = Rung(("skin_effect",), Fitted(model, values, (), BASE), around, ())
     over = (Remainder("one", "vq_v", 0, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
-    monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
     held = [HeldOut(first.around.residual, total) for total in (10.0, 5.0)]
     assert len(trusted((log(),), (first, second), held)[0]) == kept
     assert ("meter_rise of 0" in denied(second)) is (kept == 1)
     found, totals = (first, second), iter(held)
-    monkeypatch.setattr("pipeline.criticism.climb.search", lambda *_: found)
-    monkeypatch.setattr("pipeline.criticism.climb.leave_out", lambda *_: next(totals))
-    monkeypatch.setattr("pipeline.criticism.climb.in_common", lambda _, alone: list(alone))
+    monkeypatch.setattr("pipeline.criticism.search.search", lambda *_: found)
+    monkeypatch.setattr("pipeline.criticism.search.leave_out", lambda *_: next(totals))
+    monkeypatch.setattr("pipeline.criticism.search.in_common", lambda _, alone: list(alone))
     cut = climbed(Begun((log(),), first.fitted, first.around, ()), {}).cut
     assert list(cut) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0)
@@ -107,8 +107,8 @@ def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeyp
     """Cogging beside a brake of nobody's library, which is nearly all of the error."""
     rungs = with_waves(1e6, 20.0, 5e3), with_waves(*left)
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
-    monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
     held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 98.0)]
     assert len(trusted((log(),), rungs, held)[0]) == kept
 
@@ -124,8 +124,8 @@ def test_waves_that_another_signal_keeps_do_not_make_a_guess_of_what_clears_one(
         for rung in (missing_by(cogging=5e3, winding=1e6), missing_by(cogging=after, winding=1e6))
     ]
     over = (Remainder("one", "vd_v", 42, 9.0, 1.0),)
-    monkeypatch.setattr("pipeline.criticism.trust.remainder", lambda *_: over)
-    monkeypatch.setattr("pipeline.criticism.trust.explained", lambda *_: False)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
+    monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
     held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 97.0)]
     assert len(trusted((log(), log()), rungs, held)[0]) == kept
 
@@ -212,7 +212,7 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
         misfit = foreseen if asked[-1] == 0.4 else near
         return start, replace(before, residual=np.full(before.size, misfit))
 
-    monkeypatch.setattr("pipeline.criticism.selection.gauss_newton", gauss_newton)
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise.gauss_newton", gauss_newton)
     monkeypatch.setattr(System, "misfit", property(lambda one: float(one.residual[0])))
     wide = missing_by(torque_shaft_nm=100.0**2).around
     fitted = Fitted(Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)

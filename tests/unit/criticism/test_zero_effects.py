@@ -8,12 +8,12 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.hearing import HEARS, hears
-from pipeline.criticism.model import Model, zero
-from pipeline.criticism.registry import effects
-from pipeline.criticism.residuals import residual
-from pipeline.criticism.segment import Kind, Segment
-from pipeline.criticism.segments import segments
+from pipeline.criticism.data.segment import Kind, Segment
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.equations.observability import HEARS, hears
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from tests.unit.criticism.machines import BASE, machine
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.criticism.model import BASE
+from pipeline.criticism.machine.model import BASE
 from pipeline.estimation.registry import fit_all
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.records.capture import UNSTATED_U, Campaign, Capture, CaptureMeta

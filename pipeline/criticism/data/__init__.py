@@ -1,0 +1,1 @@
+"""Captures as the signals that equations need: even clocks, sensor noise, the machine's scale."""

@@ -1,0 +1,243 @@
+"""How large the machine is: what the captures say before any fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.holding_orders import holding_orders
+from pipeline.criticism.data.sensor_noise import rounding_step
+from pipeline.criticism.data.traces import LINES_V, tellable
+from pipeline.criticism.effect import Array, Machine
+from pipeline.numerics.orders import TURN_RAD
+from pipeline.physics.frames import vector_of_lines
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.constants import Constants
+
+_TRACED = ("torque_map", "drive", "heat_run")
+_TABLES = ("flux_map", "holding_current")
+_TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
+_LINES_A = ("ia_a", "ib_a", "ic_a")
+# orders a turn that a slow turn is searched for, and harmonics of the cogging order
+_HIGHEST = 400
+_HARMONICS = 3
+_SAME_STEP = 0.02
+"""Share by which two logs may differ on the encoder's step, by judgement: the next encoder has half
+of it or twice."""
+
+
+PAIRLESS = (
+    "nothing tells the pole pairs, without which no speed means anything to the winding: record an "
+    "open circuit spin with line voltages and angle, or state pole_pairs in the captures"
+)
+
+
+def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
+    """Pole pairs, slots and scales of the motor on the bench; None where it turned and nothing
+    tells its pole pairs, without which no speed means anything to a winding.
+
+    Pole pairs come from the back-EMF against the angle, else from `start`, else the nameplate.
+    """
+    slots, stated = campaign.nameplate("slots"), stated_u(campaign)
+    pole_pairs = pole_pairs_of(campaign, start)
+    if pole_pairs is None:
+        if any(capture.has(name) for capture in campaign.captures for name in _TURNING):
+            return None
+        pole_pairs = 1
+    captures = tuple(c for c in map(tellable, campaign.captures) if c is not None)
+    campaign = replace(campaign, captures=captures)
+    logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
+    current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, _LINES_A)
+    current = current or _largest(tables, ("id_a", "iq_a"))
+    voltage = _largest(logs, ("vd_v", "vq_v")) or _largest(campaign.captures, LINES_V)
+    voltage = voltage or _largest(tables, ("vq_v",))
+    speed = max((_speed(c) for c in campaign.captures), default=0.0) or 1.0
+    flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
+    voltage = voltage or flux * pole_pairs * speed
+    # without a winding on record the torque's own size is all there is
+    shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
+    current, voltage = current or 1.0, voltage or 1.0
+    psi = voltage / (pole_pairs * speed)
+    known = start.best("psi_pm_wb")
+    psi = known.number if known is not None else psi
+    period = min((_period(c) for c in logs), default=1e-4)
+    scales = {
+        "current_a": current,
+        "voltage_v": voltage,
+        "speed_rad_s": speed,
+        "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
+        "torque_nm": shaft or 1.5 * pole_pairs * psi * current,
+        "period_s": period,
+        "flux_wb": psi,
+    }
+    bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
+    highest = _HARMONICS * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
+    orders = torque_orders(campaign.of("cogging"), max(highest, _HIGHEST)) or holding_orders(
+        campaign.of("holding_current"), bases
+    )
+    return Machine(
+        pole_pairs,
+        int(str(slots)) if slots else None,
+        scales,
+        orders,
+        stated,
+        encoder_step(campaign),
+    )
+
+
+def encoder_step(campaign: Campaign) -> float:
+    """The step of the encoder in drive logs [rad], 0 where there is none that they agree on.
+
+    A log at many speeds shows it; at one speed an angle may move by nearly whole steps a sample,
+    and look finer or coarser than it is.
+    """
+    logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
+    found = [rounding_step(c.arrays("theta_mech_rad")["theta_mech_rad"]) for c in logs]
+    step = float(np.median(found)) if found else 0.0
+    agree = all(abs(one - step) <= _SAME_STEP * step for one in found)
+    return step if agree else 0.0
+
+
+def stated_u(campaign: Campaign) -> dict[str, float]:
+    """Standard uncertainty of the station's gains [1] and thermometers [K], by nuisance.
+
+    The largest that the captures state; what none of them states is not in it.
+    """
+    found: dict[str, float] = {}
+    for capture in campaign.captures:
+        meta = capture.meta
+        volts = "gain_commanded" if meta.voltage_kind == "commanded" else "gain_voltage"
+        for name, u in (
+            ("gain_current", meta.u_rel_current),
+            (volts, meta.u_rel_voltage),
+            ("gain_torque", meta.u_rel_torque),
+            ("offset_temp_k", meta.u_temp_degc),
+            ("gain_lcr", _u_lcr(meta)),
+            ("gain_clock", meta.u_rel_clock),
+        ):
+            if u:
+                found[name] = max(found.get(name, 0.0), u)
+    return found
+
+
+def _u_lcr(meta: CaptureMeta) -> float | None:
+    """Gain of an LCR meter: as stated, else that of the voltage and current it is made of."""
+    if meta.test != "lcr":
+        return None
+    stated = meta.stated_u_rel("u_rel_lcr")
+    if stated is not None:
+        return stated
+    return math.hypot(meta.u_rel_voltage or 0.0, meta.u_rel_current or 0.0)
+
+
+def base_scales(machine: Machine) -> dict[str, float]:
+    """Order of magnitude [unit of the name] of every base constant."""
+    s = machine.scales
+    impedance = s["voltage_v"] / s["current_a"]
+    return {
+        "r_ohm": impedance,
+        "ld_h": s["flux_wb"] / s["current_a"],
+        "lq_h": s["flux_wb"] / s["current_a"],
+        "psi_wb": s["flux_wb"],
+        "j_kgm2": s["torque_nm"] / s["speed_rad_s"] * 0.1,
+        "b_nm_s_rad": 0.1 * s["torque_nm"] / s["speed_rad_s"],
+    }
+
+
+def pole_pairs_of(campaign: Campaign, start: Constants) -> int | None:
+    """Electrical cycles a turn: counted, else from `start`, else the nameplate's; None unknown."""
+    counted = counted_pole_pairs(campaign)
+    if counted is not None:
+        return counted
+    known = start.best("pole_pairs")
+    if known is not None:
+        return round(known.number)
+    stated = campaign.nameplate("pole_pairs")
+    return int(str(stated)) if stated else None
+
+
+def counted_pole_pairs(campaign: Campaign) -> int | None:
+    """Electrical cycles a turn, counted in an open-circuit spin of a turn; None where none is."""
+    for recorded in campaign.of("open_circuit"):
+        capture = tellable(recorded)
+        if capture is None or not capture.has("theta_mech_rad"):
+            continue
+        lines = [name for name in LINES_V if capture.has(name)]
+        if len(lines) < 2:
+            continue
+        found = capture.arrays(*lines, "theta_mech_rad")
+        theta = found.pop("theta_mech_rad")
+        turned = float(np.ptp(theta)) if theta.size else 0.0
+        if turned < TURN_RAD:
+            continue
+        ratio = float(np.ptp(np.unwrap(np.angle(vector_of_lines(found))))) / turned
+        if ratio > 0.5 and abs(ratio - round(ratio)) < 0.02:
+            return round(ratio)
+    return None
+
+
+def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:
+    top = 0.0
+    for capture in captures:
+        for name in names:
+            if capture.has(name):
+                top = max(top, float(np.nanquantile(np.abs(capture.arrays(name)[name]), 0.999)))
+    return top
+
+
+def _speed(capture: Capture) -> float:
+    if capture.has("omega_mech_rad_s"):
+        speed = capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"]
+        return float(np.nanquantile(np.abs(speed), 0.999))
+    if capture.has("t_s", "theta_mech_rad"):
+        found = capture.arrays("t_s", "theta_mech_rad")
+        if found["t_s"].size > 1 and (np.diff(found["t_s"]) > 0.0).all():
+            speed = np.gradient(found["theta_mech_rad"], found["t_s"])
+            return float(np.nanquantile(np.abs(speed), 0.999))
+    return 0.0
+
+
+def _period(capture: Capture) -> float:
+    return float(np.median(np.diff(capture.arrays("t_s")["t_s"])))
+
+
+def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple[int, ...]:
+    """Orders a turn that stand out of every slow turn's torque spectrum, up to `highest`, or to 400
+    where samples are too few for that.
+
+    The torque is averaged in even bins of angle over whole turns; an order counts where its
+    amplitude is 6 times the spectrum's median (of a Rayleigh floor 2^-36 of orders pass that), in
+    every capture of at least one turn.
+    """
+    found: set[int] | None = None
+    for capture in captures:
+        if not capture.has("theta_mech_rad", "torque_shaft_nm"):
+            continue
+        signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
+        both = signals["theta_mech_rad"], signals["torque_shaft_nm"]
+        here = _standing_out(*both, highest)
+        if here is None and highest > _HIGHEST:
+            here = _standing_out(*both, _HIGHEST)
+        if here is not None:
+            found = here if found is None else found & here
+    return tuple(sorted(found or ()))
+
+
+def _standing_out(theta: Array, torque: Array, highest: int) -> set[int] | None:
+    turns = int(np.ptp(theta) / (2 * math.pi))
+    if turns < 1:
+        return None
+    bins = 4 * highest
+    place = np.floor((theta - theta.min()) / (2 * math.pi) * bins).astype(np.int64)
+    inside = place < turns * bins
+    place = place[inside] % bins
+    count = np.bincount(place, minlength=bins)
+    if (count == 0).any():
+        return None
+    mean = np.bincount(place, torque[inside], minlength=bins) / count
+    spectrum = np.abs(np.fft.rfft(mean))[1 : highest + 1]
+    floor = float(np.median(spectrum))
+    return {int(k) + 1 for k in np.flatnonzero(spectrum > 6.0 * floor)}

@@ -1,0 +1,183 @@
+"""One capture's signals for one kind of equation: what every residual is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.sensor_noise import rounding_step
+from pipeline.criticism.effect import Array, Machine
+from pipeline.numerics.projection import Projection
+from pipeline.records.capture import Capture
+
+Kind = Literal[
+    "dq", "q", "shaft", "motion", "open", "terminal", "lcr", "flux_map", "steady", "standing"
+]
+PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
+"""Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
+RECORDER: Mapping[Kind, str] = {
+    "dq": "log",
+    "q": "log",
+    "motion": "log",
+    "open": "open",
+    "shaft": "shaft",
+    "terminal": "step",
+}
+"""Whose clock the equations of a kind of segment go by (`effect.RECORDERS`); tables go by none."""
+_REFERENCE_DEGC = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What a recording says of its sensors: `noise` of every column, its rounding in it; `steps` of
+    the columns that are rounded too coarsely for their noise to dither; the shaft's runs.
+    """
+
+    noise: Mapping[str, float]
+    steps: Mapping[str, float] = field(default_factory=dict)
+    runs_rad: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One capture's signals [n] for one kind of equation, with its weak form.
+
+    `recorded` holds capture columns on an even clock of period `ts_s`; `noise` the standard
+    deviation of each one's sensor. `channels` are the equations: the recorded signal that each
+    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` the
+    nuisance that is its voltmeter's gain; `angle_step_rad` is the resolution of an angle whose
+    noise is its rounding. `blocks` [W] numbers the parts of a capture that are held out one by one
+    where there is no other capture to predict it from; `offsets` [K, n] are offsets of the
+    channel, of their prior size, that the capture may have; `runs_rad` the angles turned between
+    reversals, of which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak
+    samples of the mains lines, and of the wander of sensors, that there may be; `whole` are the
+    columns of a drive log before it was thinned, with `good`, the samples that were recorded well;
+    `steps` the resolution of columns whose rounding error follows the signal; `log` what an
+    instrument may be late with, at all samples, where the others were thinned.
+    """
+
+    capture: str
+    test: str
+    kind: Kind
+    instrument: str
+    timing: str
+    ts_s: float
+    recorded: Mapping[str, Array]
+    noise: Mapping[str, float]
+    channels: tuple[str, ...]
+    weak: Projection | None
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    meter: str = "gain_voltage"
+    angle_step_rad: float = 0.0
+    blocks: NDArray[np.int64] | None = None
+    offsets: Array | None = None
+    runs_rad: Array | None = None
+    lines: Array | None = None
+    whole: Mapping[str, Array] | None = None
+    steps: Mapping[str, float] = field(default_factory=dict)
+    log: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Samples."""
+        return int(next(iter(self.recorded.values())).size)
+
+
+def told_signal(segment: Segment, channel: str) -> str:
+    """A channel as outputs name it: of a coasting shaft the equation gives an acceleration."""
+    coasting = segment.kind == "shaft" and channel == "omega_mech_rad_s"
+    return "alpha_mech_rad_s2" if coasting else channel
+
+
+def segment_of(
+    capture: Capture,
+    kind: Kind,
+    instrument: str,
+    period: float,
+    *,
+    found: Mapping[str, Array],
+    sensors: Sensors,
+    channels: tuple[str, ...],
+    weak: Projection | None,
+    blocks: NDArray[np.int64] | None = None,
+    offsets: Array | None = None,
+    **fixed: float,
+) -> Segment:
+    """A segment with what the capture's metadata says of it."""
+    stated = capture.meta.ambient_degc
+    ambient = 0.0 if stated is None else stated - _REFERENCE_DEGC
+    timing = capture.meta.voltage_timing
+    return Segment(
+        capture.path,
+        capture.meta.test,
+        kind,
+        instrument,
+        timing,
+        period,
+        found,
+        sensors.noise,
+        channels,
+        weak,
+        {"ambient_k": ambient, **fixed},
+        "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage",
+        rounding_step(found["theta_mech_rad"]) if "theta_mech_rad" in found else 0.0,
+        blocks,
+        offsets,
+        sensors.runs_rad,
+        steps=sensors.steps,
+    )
+
+
+def clock(segment: Segment) -> Array:
+    """Time [n, s] of every sample; a log that was thinned to its windows has its own in `t_s`."""
+    even: Array = segment.ts_s * np.arange(segment.size, dtype=np.float64)
+    return segment.recorded.get("t_s", even)
+
+
+def projected(segment: Segment, sampled: Array) -> Array:
+    """Weak samples [C, W, M] of sampled channels [C, n]; a table is its own projection."""
+    if segment.weak is None:
+        return sampled[:, :, None]
+    return segment.weak.project(sampled)
+
+
+def row_index(
+    segment: Segment,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], tuple[tuple[str, int], ...]]:
+    """Group and window of every weak sample [C, W, M], which are valid, and the group names."""
+    weak = segment.weak
+    orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
+    windows = segment.size if weak is None else weak.starts.size
+    valid = np.ones((windows, 1), dtype=bool) if weak is None else weak.valid
+    told = [int(k) if k == int(k) else k for k in orders.tolist()]
+    distinct = sorted(set(told))
+    groups = tuple((c, k) for c in segment.channels for k in distinct)
+    number = {group: n for n, group in enumerate(groups)}
+    shape = (len(segment.channels), windows, orders.size)
+    table = np.array([[number[(c, k)] for k in told] for c in segment.channels])
+    group = np.broadcast_to(table[:, None, :], shape)
+    window = np.broadcast_to(np.arange(windows)[None, :, None], shape)
+    return group, window, np.broadcast_to(valid[None], shape), groups
+
+
+def electrical_orders(machine: Machine) -> tuple[float, ...]:
+    """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn; and others
+    that were seen under load.
+    """
+    p = machine.pole_pairs
+    return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *machine.load_orders}))
+
+
+def slow_orders(machine: Machine) -> tuple[float, ...]:
+    """Orders a turn looked at in a slow turn."""
+    seen = set(electrical_orders(machine)) | set(machine.torque_orders)
+    if machine.slots:
+        seen.add(machine.slots)
+    if machine.cogging_order is not None:
+        seen |= {machine.cogging_order, 2 * machine.cogging_order}
+    return tuple(sorted(seen))

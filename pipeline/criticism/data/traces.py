@@ -1,0 +1,298 @@
+"""Columns of a capture as even, smoothed, decimated or thinned signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.clocks import counted, sampled_unevenly
+from pipeline.criticism.data.segment import Sensors
+from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
+from pipeline.criticism.effect import Array, Machine
+from pipeline.numerics.projection import window_starts
+from pipeline.records.capture import Capture
+
+if TYPE_CHECKING:
+    import polars as pl
+
+ANGLES = frozenset({"theta_mech_rad", "theta_elec_rad"})
+LINES_V = ("vab_v", "vbc_v", "vca_v")
+_WINDOW_S = 0.02
+_WINDOW_SAMPLES = 40
+"""Length of a weak window [s], and its fewest samples: 5 ms bias J, 80 ms and more blur what moves,
+and a bump of fewer samples is none."""
+_SMOOTHING_S = 0.05
+"""Half of the time [s] that a temperature is averaged over: windings warm in seconds."""
+SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
+_TURNING_S = 0.002
+"""Length of the mean of an angle that says how far the rotor turns during a delay [s]: shorter, and
+its rounding is in the current's angle; longer, and a step of the speed is blurred."""
+PAD = 24
+"""Samples kept on either side of a window that is cut out: what differences and smoothing of a
+speed reach over."""
+_SHORTEST = 24
+"""Fewest rows of a capture with a clock: three windows of eight, by judgement."""
+_WITHOUT_CLOCK = frozenset({"lcr", "flux_map"})
+_SLACK = 6.0
+"""Standard deviations of the angle's noise that a shaft must turn back for a reversal."""
+_RIPPLE = 1.5
+"""Scatter of an angle about its local parabola, over its noise, from which on the shaft itself
+moves, by judgement: too high a limit would take a ripple of the speed away."""
+
+
+def tellable(capture: Capture) -> Capture | None:
+    """The capture without columns that hold no value at the samples of its richest table; None
+    where nothing is left, and of a test with a clock, where that does not rise or is too short.
+    """
+    table = max(capture.tables, key=lambda t: (len(t.columns), t.height), default=None)
+    if table is None or table.height == 0:
+        return None
+    if capture.meta.test not in _WITHOUT_CLOCK and not _rises(table):
+        return None
+    kept = [[n for n in t.columns if _has_values(t, n, table)] for t in capture.tables]
+    if all(set(names) <= {"t_s"} for names in kept):
+        return None
+    if all(len(names) == len(t.columns) for names, t in zip(kept, capture.tables, strict=True)):
+        return capture
+    tables = tuple(t.select(names) for names, t in zip(kept, capture.tables, strict=True))
+    return replace(capture, tables=tables)
+
+
+def _rises(table: pl.DataFrame) -> bool:
+    if "t_s" not in table.columns or table.height < _SHORTEST:
+        return False
+    return bool((np.diff(table["t_s"].to_numpy()) > 0.0).all())
+
+
+def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame) -> bool:
+    """Whether a column has a finite value, and one of another clock has it while this one ran."""
+    good = np.isfinite(table[name].to_numpy())
+    if table is home or not good.any() or "t_s" not in table.columns:
+        return bool(good.any())
+    known, time = table["t_s"].to_numpy()[good], home["t_s"].to_numpy()
+    return bool(known[0] <= time[-1] and known[-1] >= time[0])
+
+
+def even_clock(
+    capture: Capture, names: tuple[str, ...]
+) -> tuple[float, dict[str, Array], NDArray[np.bool_]]:
+    """Sample period [s], columns [n each] on an even clock and the samples to keep [n].
+
+    A clock that is even within a thousandth is taken as it is. Of another one it is asked whether
+    the samples came unevenly, and are interpolated, or only their stamps, and are counted. Missing
+    values are bridged and not kept; so are samples inside a gap of over 1.5 periods.
+    """
+    home = capture.table_of("t_s", *names)
+    found = capture.arrays("t_s", *names, masked=False)
+    keep = capture.kept(home).copy()
+    time = found.pop("t_s")
+    period = float(np.median(np.diff(time)))
+    for name, column in found.items():
+        good = np.isfinite(column)
+        if not good.all() and good.any():
+            found[name] = np.interp(time, time[good], column[good])
+            keep &= good
+    uneven = np.abs(np.diff(time) - period).max() > 1e-3 * period
+    clock = counted(time) if uneven else None
+    if clock is not None and not sampled_unevenly(time, clock[1], found.values()):
+        period, number = clock
+        even = np.arange(number[-1] + 1)
+        recorded = np.zeros(even.size, dtype=bool)
+        recorded[number] = keep
+        found = {name: np.interp(even, number, column) for name, column in found.items()}
+        keep = recorded
+    elif uneven:
+        even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
+        after = np.clip(np.searchsorted(time, even), 1, time.size - 1)
+        near = (time[after] - time[after - 1] < 1.5 * period) & keep[after] & keep[after - 1]
+        found = {name: np.interp(even, time, column) for name, column in found.items()}
+        keep = near
+    keep[:1] = keep[-1:] = False
+    return period, found, keep
+
+
+def smoothed(signal: Array, width: int) -> Array:
+    """Centred moving mean [n] of an odd width, edges held."""
+    half = min(width, signal.size) // 2
+    if half == 0:
+        return signal
+    padded = np.concatenate(
+        [np.full(half, signal[:half].mean()), signal, np.full(half, signal[-half:].mean())]
+    )
+    total = np.concatenate([[0.0], np.cumsum(padded)])
+    mean: Array = (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+    return mean
+
+
+def decimated(signal: Array, factor: int) -> Array:
+    """Means [n // factor] of consecutive samples."""
+    n = signal.size // factor * factor
+    mean: Array = signal[:n].reshape(-1, factor).mean(axis=1)
+    return mean
+
+
+def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
+    """First samples of the runs after each reversal: the extremes that an angle [n, rad] then
+    leaves by more than `slack`, which is what its noise may do.
+    """
+    step = np.diff(theta)
+    moving = np.flatnonzero(step)
+    sense = step[moving] > 0
+    extremes = moving[1:][sense[1:] != sense[:-1]]
+    found: list[int] = []
+    going, best = 0, 0
+    values = theta[extremes].tolist()
+    at = [0, *extremes.tolist(), theta.size - 1]
+    lowest = highest = (float(theta[0]), 0)
+    for place, value in zip(at, [float(theta[0]), *values, float(theta[-1])], strict=True):
+        lowest, highest = min(lowest, (value, place)), max(highest, (value, place))
+        if going <= 0 and value > lowest[0] + slack:
+            best = lowest[1]
+        elif going >= 0 and value < highest[0] - slack:
+            best = highest[1]
+        else:
+            continue
+        if going:
+            found.append(best)
+        going = 1 if value > theta[best] else -1
+        lowest = highest = (value, place)
+    return np.array(found, dtype=np.int64)
+
+
+def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
+    """Angle [n] turned since the last reversal, infinite before the first one; number of the run
+    [n]; and the angle turned in each run [runs], negative backwards [rad].
+    """
+    starts = np.concatenate([[0], reversals(theta, slack)])
+    run = np.searchsorted(starts, np.arange(theta.size), side="right") - 1
+    since = np.abs(theta - theta[starts[run]])
+    since[run == 0] = np.inf
+    ends = np.concatenate([starts[1:], [theta.size - 1]])
+    turned = theta[ends] - theta[starts]
+    turned[0] = math.copysign(math.inf, turned[0])
+    return since, run.astype(float), turned
+
+
+def thinned(
+    found: Mapping[str, Array],
+    keep: NDArray[np.bool_],
+    length: int,
+    most: int,
+    pad: int = PAD,
+) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    """Signals cut to an even selection of `most` windows, and their first samples in them.
+
+    A bench log holds far more windows than the effects need, and cost goes with samples. A few
+    samples on each side of a window keep what is smoothed or differenced out of its weights.
+    """
+    starts = window_starts(keep, length, length, most)
+    if starts.size * (length + 2 * pad) >= keep.size:
+        return dict(found), window_starts(keep, length)
+    starts = starts[(starts >= pad) & (starts + length + pad <= keep.size)]
+    rows = (starts[:, None] - pad + np.arange(length + 2 * pad)[None, :]).ravel()
+    cut = {name: column[rows] for name, column in found.items()}
+    return cut, pad + (length + 2 * pad) * np.arange(starts.size)
+
+
+def whole_log(found: Mapping[str, Array], period: float) -> dict[str, Array]:
+    """Currents and torque of all samples, which may be late by many, and the angle, smoothed."""
+    names = ("id_a", "iq_a", "torque_shaft_nm")
+    turned = smoothed(found["theta_mech_rad"], 2 * round(_TURNING_S / period / 2) + 1)
+    return {"theta_mech_rad": turned, **{name: found[name] for name in names if name in found}}
+
+
+def window_of(period: float, size: int) -> int:
+    """Samples a window: 20 ms, but 40 samples at least and four windows in the capture."""
+    wanted = max(round(_WINDOW_S / period), _WINDOW_SAMPLES)
+    return max(min(wanted, size // 4), 8)
+
+
+def with_angle(capture: Capture, names: list[str]) -> list[str]:
+    """The columns and the first there is of those that tell of the angle."""
+    for name in ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s"):
+        if capture.has(name):
+            return [*names, name]
+    return names
+
+
+def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> None:
+    """Puts `theta_mech_rad` [n] into the columns, from whatever tells of the angle."""
+    if "theta_mech_rad" in found:
+        return
+    if "theta_elec_rad" in found:
+        found["theta_mech_rad"] = found.pop("theta_elec_rad") / machine.pole_pairs
+    elif "omega_mech_rad_s" in found:
+        speed = found.pop("omega_mech_rad_s")
+        found["theta_mech_rad"] = np.concatenate(
+            [[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * period]
+        )
+    else:
+        found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
+
+
+def prepared(found: dict[str, Array], period: float) -> Sensors:
+    """Noise, coarse steps and runs of columns; smooths the temperatures and adds the travel since a
+    reversal.
+    """
+    noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
+    steps = coarse_steps(found, noise)
+    width = max(2 * round(_SMOOTHING_S / period) + 1, 51)
+    for name in SMOOTHED:
+        if name in found:
+            found[name] = smoothed(found[name], width)
+            noise[name] /= math.sqrt(width)
+    runs = np.array([math.inf])
+    if "theta_mech_rad" in found:
+        runs = with_travel(found, noise)
+    return Sensors(noise, steps, runs)
+
+
+def coarse_steps(found: Mapping[str, Array], noise: Mapping[str, float]) -> dict[str, float]:
+    """Steps of the columns that are rounded too coarsely for their noise; an angle has its own."""
+    steps = {n: coarse_step(c, noise[n]) for n, c in found.items() if not n.startswith("theta")}
+    return {name: step for name, step in steps.items() if step > 0.0}
+
+
+def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) -> None:
+    """Takes an angle that shows nothing but its noise around an even run as its local parabola.
+
+    A dynamometer that holds its speed leaves only the encoder's rounding to difference twice;
+    times J that would be a torque, and a model that takes inertia away would seem to explain it.
+    """
+    theta, width = found["theta_mech_rad"], 2 * (window // 2) + 1
+    if theta.size < 3 * width or noise["theta_mech_rad"] <= 0.0:
+        return
+    run = _parabolas(theta, width)
+    if float(np.std(theta - run)) > _RIPPLE * noise["theta_mech_rad"]:
+        return
+    found["theta_mech_rad"] = run
+    # variance of a parabola's middle by least squares
+    noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
+
+
+def _parabolas(signal: Array, width: int) -> Array:
+    """Local parabolas [n] of an odd width by least squares, those of the ends to the ends.
+
+    Reference: Savitzky & Golay, Anal. Chem. 36 (1964).
+    """
+    half = width // 2
+    at = np.arange(-half, half + 1) / half
+    basis = np.vander(at, 3, increasing=True)
+    weights = np.linalg.pinv(basis)
+    start, end = signal[:width], signal[-width:]
+    middle = np.convolve(signal, weights[0][::-1], mode="valid")
+    first, last = basis @ (weights @ start), basis @ (weights @ end)
+    fitted: Array = np.concatenate([first[:half], middle, last[half + 1 :]])
+    return fitted
+
+
+def with_travel(found: dict[str, Array], noise: Mapping[str, float]) -> Array:
+    """Adds travel and run to the columns; returns the runs [runs, rad]."""
+    slack = _SLACK * noise["theta_mech_rad"]
+    found["travel_rad"], found["run"], runs = travel(found["theta_mech_rad"], slack)
+    return runs

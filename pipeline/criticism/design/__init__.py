@@ -1,0 +1,1 @@
+"""Which further test would part two effects."""

@@ -1,0 +1,204 @@
+"""Which further test or calibration would part two effects, and with what power.
+
+Around a fit everything is linear. What an effect does is a vector d of weak samples over the
+noise; what its rival and all other constants can do instead is a plane. λ = |d|² (1 − cos²), the
+part of d off the plane, is the noncentrality of the test that tells the two apart [1]. Another
+capture adds its rows to both, a calibration adds a prior.
+
+References: [1] Kay, Fundamentals of Statistical Signal Processing II (1998), section 6.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, chndtr
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.design.planned_tests import PLANNED, planned
+from pipeline.criticism.effect import Array, Effect
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linearise import Column, linearise
+from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.selection.score_test import Candidate
+from pipeline.records.diagnosis import Separation
+
+_LEVEL = 0.01
+"""Probability of a false alarm of the test whose power is told."""
+_REPEATS = 4
+"""Recordings of a test that a repeat makes of one: they halve its noise."""
+_CALIBRATED = 2e-3
+"""Standard uncertainty of a calibrated instrument, as a share: as the words below say."""
+_GAIN_WORDS = {
+    "gain_current": "the current sensors calibrated to 0.2 %",
+    "gain_voltage": "the bench's voltmeters calibrated to 0.2 %",
+    "gain_commanded": "the drive's voltage calibrated to 0.2 %",
+    "gain_torque": "the torque transducer calibrated to 0.2 %",
+}
+_KNOWN_WORDS = {
+    "r_ohm": "the phase resistance known to 0.2 % (four-wire meter)",
+    "psi_wb": "the magnet's flux known to 0.2 % (back-EMF with a calibrated meter)",
+}
+_SEED = 20260303
+_MOST, _WORTH = 3, 0.02
+"""Experiments that are told at the most, and the power that one must add. By judgement: a longer
+list is not read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A further experiment: what it adds to the normal matrix of [d, others...]."""
+
+    words: str
+    normal: Array
+
+
+def separations(
+    effect: Effect,
+    against: Sequence[str],
+    fitted: Fitted,
+    wide: System,
+    offered: Sequence[Candidate],
+    segments: Sequence[Segment],
+    remedies: Mapping[str, str],
+) -> tuple[Separation, ...]:
+    """What would part an effect of the model from each rival in `against`, the best first.
+
+    Power is that of a test at the 1 % level, from the captures at hand and the experiment
+    together. If no experiment that can be predicted helps, the one in `remedies`, which the effects
+    themselves declare, is told without a power.
+    """
+    told: list[Separation] = []
+    for other in against:
+        columns = _nearest(effect, other, fitted, wide, offered)
+        if columns is None:
+            continue
+        now, places = _now(effect, columns, fitted, wide)
+        freedom = effect.dof(fitted.model.machine)
+        base = _power(_noncentrality(now), freedom)
+        ranked = sorted(
+            (
+                (_power(_noncentrality(now + plan.normal), freedom), plan.words)
+                for plan in _plans(effect, places, fitted, wide, segments)
+            ),
+            key=lambda one: (-one[0], one[1]),
+        )
+        better = [(power, words) for power, words in ranked if power > base + _WORTH][:_MOST]
+        told += [Separation(other, words, power) for power, words in better]
+        if not better and other in remedies:
+            told.append(Separation(other, remedies[other], None))
+    return tuple(told)
+
+
+def _power(noncentrality: float, freedom: int) -> float:
+    """Probability that a χ² test at the 1 % level sees a noncentrality."""
+    limit = float(chdtri(freedom, _LEVEL))
+    return float(np.clip(1.0 - chndtr(limit, freedom, max(noncentrality, 0.0)), 0.0, 1.0))
+
+
+def _nearest(
+    effect: Effect, other: str, fitted: Fitted, wide: System, offered: Sequence[Candidate]
+) -> NDArray[np.int64] | None:
+    """Places of the rival's columns, of its trial shapes the one that is hardest to part."""
+    first, best, least = len(own_columns(fitted.model)), None, np.inf
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        if candidate.effect.name == other:
+            left = _noncentrality(_now(effect, places, fitted, wide)[0])
+            if left < least:
+                best, least = places, left
+    return best
+
+
+def _amplitudes(effect: Effect, columns: Sequence[Column], fitted: Fitted) -> Array:
+    """The effect's fitted amplitudes [P], zero at every other column and at shapes."""
+    names = {
+        f"{effect.name}.{p.name}": fitted.values[f"{effect.name}.{p.name}"]
+        for p in effect.parameters_of(fitted.model.machine)
+        if p.amplitude
+    }
+    return np.array([names.get(column.name, 0.0) for column in columns])
+
+
+def _now(
+    effect: Effect, rival: NDArray[np.int64], fitted: Fitted, wide: System
+) -> tuple[Array, NDArray[np.int64]]:
+    """Normal matrix of [d, other columns of the model, the rival's], and the others' places."""
+    own = len(own_columns(fitted.model))
+    mine = f"{effect.name}."
+    others = np.array([n for n in range(own) if not wide.columns[n].name.startswith(mine)])
+    places = np.concatenate([others, rival]).astype(np.int64)
+    weight = wide.weights(wide.spreads(wide.residual))
+    matrix = _stacked(wide.matrix, _amplitudes(effect, wide.columns, fitted), places)
+    normal = (matrix * weight[:, None]).T @ matrix
+    return normal + np.diag(np.concatenate([[0.0], wide.penalty[places]])), places
+
+
+def _stacked(matrix: Array, amplitudes: Array, places: NDArray[np.int64]) -> Array:
+    return np.column_stack([matrix @ amplitudes, matrix[:, places]])
+
+
+def _noncentrality(normal: Array) -> float:
+    """|d|² (1 − cos²): what of the first column the others leave."""
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    balanced = normal / np.outer(size, size)
+    inverse = np.linalg.pinv(balanced[1:, 1:], rcond=1e-11, hermitian=True)
+    share = 1.0 - float(balanced[0, 1:] @ inverse @ balanced[1:, 0])
+    # what rounding leaves of an exact tie is nothing
+    return float(normal[0, 0]) * share if share > 1e-9 else 0.0
+
+
+def _plans(
+    effect: Effect,
+    places: NDArray[np.int64],
+    fitted: Fitted,
+    wide: System,
+    segments: Sequence[Segment],
+) -> Iterator[Plan]:
+    """Every experiment whose outcome can be predicted: repeats, tests not done, calibrations."""
+    amplitudes = _amplitudes(effect, wide.columns, fitted)
+    weight = wide.weights(wide.spreads(wide.residual))
+    test = np.array([wide.tests[number] for number, _, _ in wide.labels])[wide.group]
+    for name in sorted(set(wide.tests)):
+        rows = test == name
+        matrix = _stacked(wide.matrix[rows], amplitudes, places)
+        once = (matrix * weight[rows, None]).T @ matrix
+        yield Plan(f"{name} recorded {_REPEATS} times", (_REPEATS - 1) * once)
+    for name, words in PLANNED.items():
+        if name not in wide.tests:
+            rows_of = _planned_rows(name, fitted, wide.columns, segments)
+            if rows_of is not None:
+                matrix = _stacked(rows_of, amplitudes, places)
+                yield Plan(words, matrix.T @ matrix)
+    yield from _calibrations(places, fitted, wide)
+
+
+def _calibrations(places: NDArray[np.int64], fitted: Fitted, wide: System) -> Iterator[Plan]:
+    for place, column in enumerate(places):
+        name = wide.columns[column].name
+        if name in _GAIN_WORDS:
+            size, words = 1.0, _GAIN_WORDS[name]
+        elif name in _KNOWN_WORDS:
+            size, words = abs(fitted.values[name]), _KNOWN_WORDS[name]
+        else:
+            continue
+        normal = np.zeros((places.size + 1, places.size + 1))
+        normal[place + 1, place + 1] = (_CALIBRATED * size) ** -2.0 if size > 0.0 else 0.0
+        yield Plan(words, normal)
+
+
+def _planned_rows(
+    test: str, fitted: Fitted, columns: Sequence[Column], segments: Sequence[Segment]
+) -> Array | None:
+    """Columns [R, P] over the noise of a test that was not done."""
+    made = []
+    for number, segment in enumerate(planned(test, fitted, segments)):
+        model, values = fitted.model, fitted.values
+        sigma = noise_floor(segment, model, values, _SEED + number)
+        rows = linearise(segment, model, values, columns, sigma, np.zeros(sigma.size), values)
+        made.append(rows.columns)
+    return np.concatenate(made) if made else None

@@ -1,0 +1,1 @@
+"""Structure that no known effect explains: what it depends on, and an expression for it."""

@@ -1,0 +1,256 @@
+"""An unknown structure in words, numbers and as an effect file to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.criticism.discovery.dictionary import POWER
+from pipeline.criticism.discovery.effect_source import effect_source
+from pipeline.criticism.discovery.matching_pursuit import Expression, Pursuit, curve_about
+from pipeline.criticism.discovery.residual_inputs import Port
+from pipeline.criticism.effect import Array
+from pipeline.records.diagnosis import CurvePoint, UnknownStructure
+
+_POINTS, _TURN_POINTS, _DENSE = 17, 48, 2001
+"""Points of a curve that is told, of one over a turn, and of one that is looked at."""
+_SURE = 1.96
+"""Standard uncertainties to either side of a band of 95 %."""
+_ONE_SIDED, _SLACK = 0.1, 0.05
+"""Share of a curve's size that it may miss its own mirror image by to be called odd or even, and
+part of the range around zero that is not asked: friction jumps there. By judgement."""
+_INSIDE = 0.97
+_TAIL, _LEVEL = 0.1, 0.02
+"""Part of a range up to which a maximum lies inside it; the last part of a range, and the share of
+a change in it that is none. By judgement: they choose words and nothing else."""
+_WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
+_SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
+
+
+def told(
+    pursuit: Pursuit,
+    found: Expression,
+    smooth: Port,
+    others: Sequence[tuple[tuple[str, ...], float]],
+    signals: Sequence[str],
+    name: str,
+) -> UnknownStructure:
+    """The structure of a port with its expression, curve and effect file.
+
+    `smooth` is the port with the few smooth curves that its evidence rests on, `others` are the
+    variables of ports that explain nearly as much and their share of its evidence.
+    """
+    port = pursuit.port
+    carrier = _leading(pursuit, found)
+    curve = _curve(pursuit, found, smooth, carrier)
+    shape = _shape(port, curve, found, carrier, others)
+    size = pursuit.around.around.model.machine.scales["current_a"]
+    return UnknownStructure(
+        signal=_signal(port, carrier, signals),
+        variables=_columns(port, found),
+        shape=shape,
+        sketch=tuple(
+            (_term(port, found, n, size), float(found.amplitudes[n]), port.unit)
+            for n in range(len(found.terms))
+        ),
+        expression=_expression(port, found, size),
+        curve=curve,
+        times="" if not port.carriers else port.carriers[carrier].words,
+        alternatives=tuple(others),
+        effect=name,
+        source=effect_source(port, found, name, shape, size),
+    )
+
+
+def _columns(port: Port, found: Expression) -> tuple[str, ...]:
+    if not port.monomials:
+        return port.columns
+    used = [port.monomials[term.monomial] for term in found.terms]
+    names = ("id_a", "iq_a")
+    kept = tuple(c for n, c in enumerate(names) if any(powers[n] for powers in used))
+    return kept or names
+
+
+def _signal(port: Port, carrier: int, signals: Sequence[str]) -> str:
+    """The recorded signal that the structure is told of: one that misses, where it acts on it."""
+    told_of = port.signals[min(carrier, len(port.signals) - 1)]
+    if port.hook == "flux" and signals and told_of not in signals:
+        return signals[0]
+    return told_of
+
+
+def _leading(pursuit: Pursuit, found: Expression) -> int:
+    """The carrier with the largest curve."""
+    basis, count = pursuit.port.basis, len(pursuit.port.carriers)
+    if basis is None or count < 2:
+        return 0
+    at = np.linspace(0.0, 2 * np.pi, _DENSE)
+    return int(np.argmax([np.ptp(found.value(at, n)) for n in range(count)]))
+
+
+def _visited(pursuit: Pursuit) -> tuple[float, float]:
+    """Range of the variable that the captures cover."""
+    basis = pursuit.port.basis
+    if basis is None or not basis.nodes.size:
+        return 0.0, 2 * np.pi
+    hats = pursuit.around.matrix[:, pursuit.own : pursuit.own + basis.nodes.size]
+    seen = np.abs(hats).max(axis=0)
+    live = np.flatnonzero(seen > 1e-3 * seen.max())
+    return float(basis.nodes[live[0]]), float(basis.nodes[live[-1]])
+
+
+def _curve(
+    pursuit: Pursuit, found: Expression, smooth: Port, carrier: int
+) -> tuple[CurvePoint, ...]:
+    """Bin centres with the curve's value and its 95 % band."""
+    port = pursuit.port
+    if port.variable is None or port.basis is None:
+        return _map_curve(pursuit, found)
+    turning = port.variable.kind == "turn"
+    if turning:
+        at = 2 * np.pi * np.arange(_TURN_POINTS) / _TURN_POINTS
+    else:
+        low, high = _visited(pursuit)
+        at = np.linspace(low, high, _POINTS)
+    value, spread = curve_about(pursuit, found, _smooth_in_hats(pursuit, smooth), at, carrier)
+    return tuple(
+        CurvePoint(float(a), float(v), float(v - _SURE * u), float(v + _SURE * u))
+        for a, v, u in zip(at, value, spread, strict=True)
+    )
+
+
+def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
+    """The smooth curves of a port [K, k] as coefficients of its hats, one block a carrier."""
+    fine, few = pursuit.port.basis, smooth.basis
+    if fine is None or few is None or not fine.nodes.size:
+        return np.eye(pursuit.around.matrix.shape[1] - pursuit.own)
+    block = np.zeros((len(fine.names), len(few.names)))
+    for n in range(len(few.names)):
+        weights = np.zeros(len(few.names))
+        weights[n] = 1.0
+        block[: fine.nodes.size, n] = few.curve(fine.nodes, weights)
+    for n, order in enumerate(fine.orders):
+        first = 2 * few.orders.index(order)
+        block[:, first : first + 2] = 0.0
+        block[fine.nodes.size + 2 * n, first] = block[fine.nodes.size + 2 * n + 1, first + 1] = 1.0
+    every: Array = np.asarray(np.kron(np.eye(len(pursuit.port.carriers)), block), dtype=float)
+    return every
+
+
+def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:
+    """Flux linkage along the axis whose own current bends it most, the other current zero."""
+    size = pursuit.around.around.model.machine.scales["current_a"]
+    at = np.linspace(-1.0, 1.0, _POINTS)
+    best: tuple[float, Array, Array] | None = None
+    for axis in (0, 1):
+        rows = []
+        for term in found.terms:
+            powers = pursuit.port.monomials[term.monomial]
+            own, other = powers[axis], powers[1 - axis]
+            rows.append(own * at ** max(own - 1, 0) if other == 0 else np.zeros(at.size))
+        slopes = np.stack(rows) if rows else np.zeros((0, at.size))
+        value = found.amplitudes @ slopes
+        spread = np.sqrt(
+            np.maximum(np.einsum("iv,ij,jv->v", slopes, found.covariance, slopes), 0.0)
+        )
+        if best is None or np.ptp(value) > best[0]:
+            best = float(np.ptp(value)), value, spread
+    if best is None:
+        return ()
+    return tuple(
+        CurvePoint(float(size * a), float(v), float(v - _SURE * u), float(v + _SURE * u))
+        for a, v, u in zip(at, best[1], best[2], strict=True)
+    )
+
+
+def _shape(
+    port: Port,
+    curve: Sequence[CurvePoint],
+    found: Expression,
+    carrier: int,
+    others: Sequence[tuple[tuple[str, ...], float]],
+) -> str:
+    """The curve in words: parity, where it is largest, and what else would explain as much."""
+    words = port.effect.words
+    variable = port.variable
+    if variable is not None and curve:
+        words += f": {_run(port, curve, found, carrier)}"
+    if others:
+        listed = "; ".join(" and ".join(columns) for columns, _ in others)
+        words += f"; the captures would be explained nearly as well by {listed}"
+    return words
+
+
+def _run(port: Port, curve: Sequence[CurvePoint], found: Expression, carrier: int) -> str:
+    variable = port.variable
+    if variable is None:
+        raise ValueError("a port without a variable has no curve")
+    low, high = curve[0].at, curve[-1].at
+    dense = np.linspace(low, high, _DENSE)
+    values = found.value(dense, carrier)
+    if not found.terms:
+        dense = np.array([p.at for p in curve])
+        values = np.array([p.value for p in curve])
+    top = int(np.argmax(np.abs(values)))
+    warm = variable.kind == "warm"
+    at = f"{dense[top] + 25.0:.3g} degC" if warm else f"{abs(dense[top]):.3g} {variable.unit}"
+    place = f"{abs(values[top]):.3g} {port.unit} at {at}"
+    if variable.kind == "turn":
+        return f"at most {place}"
+    parity = _parity(dense, values) if variable.kind == "signed" else ""
+    return f"{parity}{'largest,' if warm else _ending(dense, np.abs(values))} {place}"
+
+
+def _ending(at: Array, size: Array) -> str:
+    """How a curve's size [n] runs out where its variable is largest."""
+    top = int(np.argmax(size))
+    end = 0 if abs(at[0]) > abs(at[-1]) or (at[0] < 0.0 and top == 0) else -1
+    before = float(np.interp(at[end] - _TAIL * (at[end] - at[-1 - end]), at, size))
+    level = size[end] <= (1.0 + _LEVEL) * before
+    if level and size[end] >= (1.0 - _LEVEL) * size[top]:
+        return "level towards the end of the range,"
+    if abs(at[top]) < _INSIDE * abs(at[end]):
+        return "largest," if top == 0 else "with its maximum"
+    return "largest," if level else "still growing at the end of the range,"
+
+
+def _parity(at: Array, values: Array) -> str:
+    mirrored = np.interp(-at, at, values)
+    both = (np.abs(at) <= min(abs(at[0]), abs(at[-1]))) & (np.abs(at) > _SLACK * np.abs(at).max())
+    if at[0] >= 0.0 or at[-1] <= 0.0 or not both.any():
+        return ""
+    span = float(np.abs(values).max())
+    if float(np.abs(values + mirrored)[both].max()) < _ONE_SIDED * span:
+        return "odd, "
+    if float(np.abs(values - mirrored)[both].max()) < _ONE_SIDED * span:
+        return "even, "
+    return "neither odd nor even, "
+
+
+def _term(port: Port, found: Expression, n: int, current_a: float) -> str:
+    """One term in words, its carrier in front."""
+    term = found.terms[n]
+    if term.kind == POWER or port.variable is None:
+        d, q = port.monomials[term.monomial]
+        over = f"/({current_a:.4g} A)"
+        parts = [f"(id_a{over})^{d}"] * (d > 0) + [f"(iq_a{over})^{q}"] * (q > 0)
+        return " ".join(parts)
+    words = term.words(port.variable)
+    carrier = port.carriers[term.carrier].words
+    axis = ""
+    if len(port.carriers) > 1:
+        axis = "d axis: " if term.carrier == 0 else "q axis: "
+    return f"{axis}{carrier} · {words}" if carrier else f"{axis}{words}"
+
+
+def _expression(port: Port, found: Expression, current_a: float) -> str:
+    """The whole expression on one line, amplitudes with their standard uncertainty."""
+    if not found.terms:
+        return ""
+    parts = []
+    for n in range(len(found.terms)):
+        u = found.u(n, "amplitude")
+        amplitude = f"({found.amplitudes[n]:.4g} ± {u:.1g}) {port.unit}"
+        parts.append(f"{amplitude} · [{_term(port, found, n, current_a)}]")
+    return f"{_SYMBOLS[port.hook]} = " + " + ".join(parts)

@@ -1,0 +1,376 @@
+"""A sparse expression for an unknown curve: orthogonal matching pursuit over the dictionary.
+
+The weak residual is linear in a port's narrow hats, so once their columns are there any curve is
+a product of small matrices, and scales are searched at no cost.
+
+References: [1] Pati, Rezaiifar & Krishnaprasad, Asilomar Conf. (1993), orthogonal matching
+pursuit; [2] Schwarz, Ann. Stat. 6 (1978), the price of a parameter; [3] Golub & Pereyra, SIAM J.
+Numer. Anal. 10 (1973), scales with the amplitudes eliminated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.discovery.bases import Variable
+from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVES, Term
+from pipeline.criticism.discovery.residual_inputs import Port
+from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.selection.score_test import TIE
+
+_MOST, _WORTH = 4, 0.01
+"""Groups of terms at the most, and the share of the whole gain that one must add. By judgement: a
+longer formula is the curve once more, and says nothing."""
+_TRIED = 6
+"""Groups whose scales are refined at each step. By judgement: each costs a search."""
+_SCALES = 18
+"""Trial scales from a hundredth to twice the range, a third apart: refining goes on from there."""
+_CENTRES = 24
+_WIDTHS_RAD = (0.15, 0.3, 0.6, 1.2)
+"""Places a turn at which a bump is tried, and its widths [rad]: neighbours overlap."""
+_PARTS = (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9)
+_PARTS_WIDE = (0.03, 0.06, 0.12, 0.25)
+"""Where in its range a variable may have a hump, and how wide it may be, as shares of the range."""
+_ROUNDS, _SETTLED = 12, 0.3
+"""Renewals of the weights at the most, and the change of −2 log L that ends them, as in `grams`."""
+_RIDGE = 1e-9
+"""Share of a curve's own information that is added to it: two curves of one shape do not run away,
+and no amplitude moves by more than that."""
+Group = tuple[Term, ...]
+"""Terms that come in together, as the sine and cosine of an order do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """Terms with amplitudes [unit of the port] and the covariance of amplitudes and scales.
+
+    `covariance` is in the order of `directions`: (term, "amplitude" or a field of the term).
+    `gain`: fall of −2 log likelihood. `left` [R]: the residual with everything refitted.
+    """
+
+    terms: tuple[Term, ...]
+    amplitudes: Array
+    directions: tuple[tuple[int, str], ...]
+    covariance: Array
+    gain: float
+    left: Array
+    own_step: Array
+
+    def value(self, v: Array, carrier: int = 0) -> Array:
+        """The expression [n] on one carrier."""
+        total = np.zeros(np.shape(v))
+        for term, amplitude in zip(self.terms, self.amplitudes, strict=True):
+            if term.carrier == carrier:
+                total = total + amplitude * term.value(v)
+        return total
+
+    def spread(self, v: Array, carrier: int = 0) -> Array:
+        """Standard uncertainty [n] of the expression on one carrier."""
+        rows = [
+            _direction(self.terms[n], self.amplitudes[n], name, v)
+            if self.terms[n].carrier == carrier
+            else np.zeros(np.shape(v))
+            for n, name in self.directions
+        ]
+        if not rows:
+            return np.zeros(np.shape(v))
+        slope = np.stack(rows)
+        variance = np.einsum("iv,ij,jv->v", slope, self.covariance, slope)
+        found: Array = np.sqrt(np.maximum(variance, 0.0))
+        return found
+
+    def u(self, term: int, name: str) -> float:
+        """Standard uncertainty of a term's amplitude or scale."""
+        place = self.directions.index((term, name))
+        return math.sqrt(max(float(self.covariance[place, place]), 0.0))
+
+
+def _direction(term: Term, amplitude: float, name: str, v: Array) -> Array:
+    if name == "amplitude":
+        return term.value(v)
+    step = 1e-4 * (term.scale if name == "scale" else 1.0)
+    moved = replace(term, **{name: getattr(term, name) + step})
+    return amplitude * (moved.value(v) - term.value(v)) / step
+
+
+class Pursuit:
+    """One port's weak columns in hats, over the noise, with the model's own refitted.
+
+    `around`: a system whose first `own` columns are the model's and whose others are the port's;
+    `weight` [R] the weights of rows under the port's best fit.
+    """
+
+    def __init__(self, around: System, own: int, port: Port, weight: Array) -> None:
+        self.around, self.own, self.port = around, own, port
+        self.weight = weight
+        self.price = math.log(around.size)
+        hats = around.matrix[:, own:]
+        mine, pull = around.matrix[:, :own], around.pull[:own]
+        root = weight[:, None]
+        normal = mine.T @ (root * mine) + np.diag(around.penalty[:own])
+        inverse = np.linalg.pinv(_balanced(normal), hermitian=True)
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        inverse = inverse / np.outer(scale, scale)
+        cross = mine.T @ (root * hats)
+        slope = mine.T @ (weight * around.residual) + pull
+        self.gram = hats.T @ (root * hats) - cross.T @ inverse @ cross
+        self.moment = -(hats.T @ (weight * around.residual) - cross.T @ inverse @ slope)
+
+    def hats_of(self, term: Term) -> Array:
+        """A term as coefficients [K] of the port's hats and waves."""
+        basis = self.port.basis
+        found = np.zeros(self.around.matrix.shape[1] - self.own)
+        if basis is None or term.kind == POWER:
+            found[term.monomial] = 1.0
+            return found
+        first = term.carrier * len(basis.names)
+        nodes = basis.nodes.size
+        if term.kind in WAVES and term.order in basis.orders:
+            place = basis.orders.index(term.order)
+            found[first + nodes + 2 * place + (term.kind == "cos")] = 1.0
+        else:
+            found[first : first + nodes] = term.value(basis.nodes)
+        return found
+
+    def linear_gain(self, known: Array, new: Array) -> float:
+        """Fall of the weighted squares by curves `new` [K, m] beside `known` [K, k]."""
+        both = np.column_stack([known, new])
+        return self._fall(both) - (self._fall(known) if known.shape[1] else 0.0)
+
+    def _fall(self, curves: Array) -> float:
+        return float(self.moment @ curves @ self.amplitudes(curves))
+
+    def amplitudes(self, curves: Array) -> Array:
+        """Best amplitudes [k] of some curves [K, k]."""
+        normal = curves.T @ self.gram @ curves
+        found: Array = np.linalg.lstsq(
+            normal + _RIDGE * np.diag(np.diag(normal)), curves.T @ self.moment, rcond=1e-10
+        )[0]
+        return found
+
+    def curves(self, terms: Sequence[Term]) -> Array:
+        """Coefficients [K, k] of terms."""
+        width = self.around.matrix.shape[1] - self.own
+        return np.column_stack([np.empty((width, 0)), *(self.hats_of(t) for t in terms)])
+
+    def fitted(self, curves: Array) -> tuple[Array, Array, Array, float]:
+        """Own step, amplitudes, residual [R] and misfit with curves [K, k] beside own columns."""
+        around, own = self.around, self.own
+        matrix = np.column_stack([around.matrix[:, :own], around.matrix[:, own:] @ curves])
+        penalty = np.concatenate([around.penalty[:own], np.zeros(curves.shape[1])])
+        pull = np.concatenate([around.pull[:own], np.zeros(curves.shape[1])])
+        weight, before = self.weight, np.inf
+        step, left, now = np.zeros(matrix.shape[1]), around.residual, np.inf
+        places = np.arange(own)
+        for _ in range(_ROUNDS):
+            weighted = matrix * weight[:, None]
+            normal = weighted.T @ matrix + np.diag(penalty)
+            scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+            inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-11, hermitian=True)
+            step = -(inverse @ ((weighted.T @ around.residual + pull) / scale)) / scale
+            left = around.residual + matrix @ step
+            spreads = around.spreads(left)
+            now = around.misfit_of(spreads) + float(around.prior_costs(places, step[:own]).sum())
+            weight = around.weights(spreads)
+            if abs(before - now) < _SETTLED:
+                break
+            before = now
+        return step[:own], step[own:], left, now
+
+
+def _balanced(normal: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    balanced: Array = normal / np.outer(scale, scale)
+    return balanced
+
+
+def expression(pursuit: Pursuit) -> Expression:
+    """The expression at which the Bayesian information criterion [2] stops; four steps at most."""
+    chosen: list[Group] = []
+    none = pursuit.curves([])
+    best = pursuit.fitted(none)
+    start = cost = best[3]
+    offered = list(_dictionary(pursuit.port))
+    for _ in range(_MOST):
+        flat = [t for group in chosen for t in group]
+        tried = [
+            (*_judged(pursuit, [*chosen, group]), [*chosen, group])
+            for group in _promising(pursuit, flat, offered)
+        ]
+        tried.sort(key=lambda one: one[0])
+        if not tried:
+            break
+        now = tried[0][0]
+        if cost - now < max(TIE, _WORTH * (start - now)):
+            break
+        chosen, cost = tried[0][1], now
+    return _finished(pursuit, chosen, start)
+
+
+def _promising(pursuit: Pursuit, known: Sequence[Term], offered: Sequence[Group]) -> list[Group]:
+    """The groups that help most beside the known terms, each at its best trial scale."""
+    base = pursuit.curves(known)
+    best: dict[tuple[object, ...], tuple[float, Group]] = {}
+    for group in offered:
+        if any(t in known for t in group):
+            continue
+        gain = pursuit.linear_gain(base, pursuit.curves(group))
+        key = tuple((t.kind, t.parity, t.carrier, t.order, t.monomial) for t in group)
+        if gain > best.get(key, (0.0, group))[0]:
+            best[key] = gain, group
+    ranked = sorted(best.values(), key=lambda one: -one[0])
+    return [group for _, group in ranked[:_TRIED]]
+
+
+def _judged(pursuit: Pursuit, groups: Sequence[Group]) -> tuple[float, list[Group]]:
+    """Misfit and price of groups with their scales refined together."""
+    refined = _refined(pursuit, groups)
+    terms = [t for group in refined for t in group]
+    free = sum(1 + len(t.free) for t in terms)
+    misfit = pursuit.fitted(pursuit.curves(terms))[3]
+    return misfit + free * pursuit.price, refined
+
+
+def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
+    """Scales and centres of all terms at their best, amplitudes eliminated."""
+    places = [
+        (g, n, name)
+        for g, group in enumerate(groups)
+        for n, term in enumerate(group)
+        for name in term.free
+    ]
+    if not places:
+        return list(groups)
+
+    def moved(z: Array) -> list[Group]:
+        found = [list(group) for group in groups]
+        for (g, n, name), one in zip(places, z, strict=True):
+            old = groups[g][n]
+            if name == "scale":
+                found[g][n] = replace(found[g][n], scale=old.scale * math.exp(one))
+            elif old.kind in CENTRED:
+                found[g][n] = replace(found[g][n], centre=old.centre * math.exp(one))
+            else:
+                found[g][n] = replace(found[g][n], centre=old.centre + one)
+        return [tuple(group) for group in found]
+
+    def loss(z: Array) -> float:
+        curves = pursuit.curves([t for group in moved(z) for t in group])
+        return -pursuit._fall(curves) / size
+
+    from scipy.optimize import minimize  # dear to import, and seldom asked for
+
+    size = max(abs(pursuit._fall(pursuit.curves([t for g in groups for t in g]))), 1e-300)
+    found = minimize(
+        loss,
+        np.zeros(len(places)),
+        method="L-BFGS-B",
+        bounds=[(-1.2, 1.2)] * len(places),
+        options={"ftol": 1e-14, "gtol": 1e-12},
+    )
+    return moved(found.x) if found.fun <= loss(np.zeros(len(places))) else list(groups)
+
+
+def _dictionary(port: Port) -> Iterator[Group]:
+    """Every group of terms offered for a port, at trial scales."""
+    variable, basis = port.variable, port.basis
+    if variable is None or basis is None:
+        yield from ((Term(POWER, monomial=n),) for n in range(len(port.monomials)))
+        return
+    for carrier in range(len(port.carriers)):
+        if variable.kind == "turn":
+            yield from _turning(basis.orders, bool(basis.nodes.size), carrier)
+        else:
+            yield from _shapes(variable, carrier)
+
+
+def _turning(orders: tuple[float, ...], curved: bool, carrier: int) -> Iterator[Group]:
+    for k in (*(range(1, 9) if curved else ()), *orders):
+        yield Term("sin", carrier, order=k), Term("cos", carrier, order=k)
+    if curved:
+        for n in range(_CENTRES):
+            for width in _WIDTHS_RAD:
+                yield (Term("bump", carrier, scale=width, centre=2 * math.pi * n / _CENTRES),)
+        yield (Term("step", carrier),)
+
+
+def _shapes(variable: Variable, carrier: int) -> Iterator[Group]:
+    parities = {"signed": ("odd", "even"), "size": ("even",), "warm": ("plain",)}[variable.kind]
+    trial = variable.top * np.geomspace(0.01, 2.0, _SCALES)
+    for parity in parities:
+        for shape in SHAPES:
+            for scale in trial if shape.scaled else (variable.top,):
+                yield (Term(shape.name, carrier, parity, float(scale)),)
+        for kind, centre, width in product(CENTRED, _PARTS, _PARTS_WIDE):
+            place, wide = centre * variable.top, width * variable.top
+            yield (Term(kind, carrier, parity, wide, centre=place),)
+
+
+def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expression:
+    terms = tuple(t for group in chosen for t in group)
+    own, amplitudes, left, misfit = pursuit.fitted(pursuit.curves(terms))
+    directions = tuple((n, name) for n, t in enumerate(terms) for name in ("amplitude", *t.free))
+    columns = [
+        _hat_direction(pursuit, terms[n], float(amplitudes[n]), name) for n, name in directions
+    ]
+    width = pursuit.around.matrix.shape[1] - pursuit.own
+    slopes = np.column_stack([np.empty((width, 0)), *columns])
+    covariance = _inverse(slopes.T @ pursuit.gram @ slopes)
+    return Expression(terms, amplitudes, directions, covariance, start - misfit, left, own)
+
+
+def _hat_direction(pursuit: Pursuit, term: Term, amplitude: float, name: str) -> Array:
+    if name == "amplitude":
+        return pursuit.hats_of(term)
+    step = 1e-4 * (term.scale if name == "scale" else 1.0)
+    moved = replace(term, **{name: getattr(term, name) + step})
+    return amplitude * (pursuit.hats_of(moved) - pursuit.hats_of(term)) / step
+
+
+def _inverse(normal: Array) -> Array:
+    if not normal.size:
+        return normal
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse: Array = np.linalg.pinv(_balanced(normal), hermitian=True) / np.outer(scale, scale)
+    return inverse
+
+
+def curve_about(
+    pursuit: Pursuit, found: Expression, coarse: NDArray[np.float64], at: Array, carrier: int
+) -> tuple[Array, Array]:
+    """The curve and its standard uncertainty [n] at `at` [n].
+
+    It is the expression and a smooth curve of what that leaves, so that the data speak where the
+    expression is wrong. `coarse` [K, k] are smooth curves in hats. The model's own constants stay
+    where the expression put them, since else a curve and a constant of one shape cannot be parted.
+    """
+    hats = pursuit.around.matrix[:, pursuit.own :] @ coarse
+    weight = pursuit.around.weights(pursuit.around.spreads(found.left))
+    live = np.any(hats != 0.0, axis=0)
+    normal = hats[:, live].T @ (weight[:, None] * hats[:, live])
+    covariance = _inverse(normal)
+    step = -covariance @ (hats[:, live].T @ (weight * found.left))
+    basis = pursuit.port.basis
+    if basis is None:
+        raise ValueError("a port without a curve has no hats")
+    first = carrier * len(basis.names)
+    shapes = (
+        np.stack(
+            [basis.curve(at, one[first : first + len(basis.names)]) for one in coarse[:, live].T],
+            axis=1,
+        )
+        if live.any()
+        else np.zeros((at.size, 0))
+    )
+    spread = np.sqrt(
+        np.maximum(np.einsum("vi,ij,vj->v", shapes, covariance, shapes), 0.0)
+        + found.spread(at, carrier) ** 2
+    )
+    return found.value(at, carrier) + shapes @ step, spread

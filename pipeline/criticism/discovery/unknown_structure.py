@@ -1,0 +1,269 @@
+"""Structure that no known effect explains: on what it depends, and what it looks like."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.discovery.description import told
+from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
+from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
+from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.gauss_newton import clipped
+from pipeline.criticism.regression.goodness import told_groups
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linearise import Column, effect_columns
+from pipeline.criticism.selection.score_test import LEAST_SHARE, TIE
+from pipeline.records.diagnosis import UnknownStructure
+
+_NEAR = 0.05
+"""Share of the best port's evidence within which another does as well. By judgement: at 0 noise
+chooses the variable, at 0.5 most ports are named."""
+_PRIOR = 1.0
+"""Standard deviation of a port's coefficient, in the machine's own scale. By judgement:
+no curve is larger."""
+_CARRIED = 5.0
+"""Growth of a variance without a unit from which on the unit carries the constant alone, as in
+`judge`."""
+_PARTS = 12
+"""Parts that a capture without a second is held out in, as logs are (`segments_log`)."""
+_EFFORT = ((1.0, 0.0), 20)
+"""Exponents of the weights that a descent begins with, and its steps, as for a thorough score."""
+_SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
+"""Signals of the shaft, to which a torque comes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A port with the misfit it removes less its price, in sample and held out.
+
+    `left` [R] is the residual after it, `step` [k] the model's constants and its coefficients,
+    `place` where it stands in the list of ports.
+    """
+
+    port: Port
+    gain: float
+    held: float
+    left: Array
+    step: Array
+    place: int
+
+
+def unknown_structure(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    signals: Sequence[str],
+    before: System | None = None,
+    name: str = "unknown",
+    in_parts: bool = False,
+) -> tuple[UnknownStructure | None, float]:
+    """What the structure left in `signals` depends on, as curve, expression and effect file.
+
+    Ports are compared by the misfit they remove from whole captures that they were not fitted to.
+    Of those that do as well, the one of fewest variables is told, and the others are named beside
+    it. The result is None if the best takes less than a tenth of what is over the floor:
+    instruments that wander follow no state of the machine. Also returns the misfit (−2 log
+    likelihood) that the port removes.
+    `before`: a system around the same fit, whose columns are used again. `name`: of the effect.
+    `in_parts`: captures that miss the floor are held out a twelfth at a time, for a heat run that
+    has no second. A wander of an instrument would then pass for a state of the machine.
+    """
+    found, wide = _ranked(segments, fitted, _hooks(signals), before, in_parts)
+    if not found:
+        return None, 0.0
+    best = _simplest(found)
+    others = tuple(
+        (one.port.columns, one.held / best.held)
+        for one in found
+        if one is not best and one.held > (1.0 - _NEAR) * best.held
+    )
+    port = refined(best.port, fitted.model.machine)
+    near = _moved(fitted, wide, best.step)
+    fine = system(segments, near, effect_columns(port.effect, near.model), wide)
+    own = len(own_columns(fitted.model))
+    weight = fine.weights(fine.spreads(best.left))
+    pursuit = Pursuit(fine, own, port, weight)
+    sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
+    return sketch, best.gain
+
+
+def _moved(fitted: Fitted, wide: System, step: Array) -> Fitted:
+    """The fit with the model's own constants where the best port puts them.
+
+    A drag over an inertia is a product: the expression is sought around the inertia found.
+    """
+    own = wide.columns[: len(own_columns(fitted.model))]
+    values = dict(fitted.values)
+    for column, change in zip(own, step, strict=False):
+        values[column.name] += float(change)
+    return replace(fitted, values=clipped(fitted.model, values))
+
+
+def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
+    """Hooks that can reach the signals that miss: a shaft's own torque is not in the voltage."""
+    if signals and all(signal in _SHAFT for signal in signals):
+        return ("torque",)
+    if any(signal in _SHAFT for signal in signals) or not signals:
+        return ("torque", "drop", "flux")
+    return ("drop", "flux")
+
+
+def _ranked(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    hooks: Sequence[str],
+    before: System | None,
+    in_parts: bool,
+) -> tuple[list[Found], System]:
+    """Every port that is worth its price and helps where it was not fitted, the best first."""
+    offered = ports(fitted.model.machine, hooks)
+    columns = [effect_columns(port.effect, fitted.model) for port in offered]
+    wide = system(segments, fitted, [c for some in columns for c in some], before)
+    own = np.arange(len(own_columns(fitted.model)))
+    none = wide.grams(own).best()
+    left, base = wide.after(own, none.step), none.misfit
+    missed = _missed(wide, segments) if in_parts else None
+    units = _units(wide, own, left, missed)
+    reference = _held_out(wide, own, left, np.zeros(own.size), units)
+    excess = float(wide.counts @ np.log(np.maximum(wide.spreads(left), 1.0)))
+    price = math.log(wide.size)
+    found = []
+    first = own.size
+    for place, (port, mine) in enumerate(zip(offered, columns, strict=True)):
+        places = np.arange(first, first + len(mine))
+        first += len(mine)
+        live = places[np.any(wide.matrix[:, places] != 0.0, axis=0)]
+        if live.size == 0:
+            continue
+        chosen = np.concatenate([own, live])
+        end = wide.grams(chosen).best(*_EFFORT)
+        after = wide.after(chosen, end.step)
+        gain = base - end.misfit - live.size * price
+        if gain <= 0.0:
+            continue
+        ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
+        held = reference - _held_out(wide, chosen, after, ridge, units)
+        if held > max(TIE, LEAST_SHARE * excess):
+            found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
+    return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
+
+
+def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fitted: Fitted) -> Array:
+    """Inverse prior variance [k] of a port's coefficients: the machine's own scale."""
+    machine = fitted.model.machine
+    scales = []
+    for n in live:
+        effect = columns[n].effect
+        parameter = None if effect is None else effect.parameters_of(machine)[0]
+        scales.append(1.0 if parameter is None else machine.scale(parameter))
+    return (_PRIOR * np.array(scales)) ** -2.0
+
+
+def _simplest(found: Sequence[Found]) -> Found:
+    """Of the ports that do about as well as the best, the one of fewest variables.
+
+    Of several that no evidence parts it is the one listed first, the commonest in machines.
+    """
+    enough = found[0].held - max(TIE, _NEAR * found[0].held)
+    close = [one for one in found if one.held >= enough]
+    fewest = min(len(one.port.columns) for one in close)
+    simple = [one for one in close if len(one.port.columns) == fewest]
+    level = max(one.held for one in simple) - TIE
+    return min((one for one in simple if one.held >= level), key=lambda one: one.place)
+
+
+def _missed(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
+    """Numbers of the segments in which a fit leaves something that is told."""
+    told = np.flatnonzero(told_groups(around, segments))
+    return np.unique([around.labels[place][0] for place in told])
+
+
+def _units(
+    around: System, own: NDArray[np.int64], left: Array, missed: NDArray[np.int64] | None
+) -> NDArray[np.int64]:
+    """For every row [R] the number of what is held out together: a capture, or a part of one of the
+    segments in `missed`; -1 for rows that are always in the fit.
+
+    Always in the fit is what alone carries a constant. With parts it is also every other capture,
+    which has nothing to predict, and the first and last part: no curve is known beyond its ends.
+    """
+    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    units = segment.astype(np.int64)
+    if missed is not None:
+        last = np.zeros(len(around.tests), dtype=np.int64)
+        np.maximum.at(last, segment, around.window)
+        part = _PARTS * around.window // (last[segment] + 1)
+        inner = np.isin(segment, missed) & (part > 0) & (part < _PARTS - 1)
+        units = np.where(inner, _PARTS * segment + part, -1)
+    carried = np.isin(units, _carrying(around, own, left, units))
+    return np.where(carried, -1, units)
+
+
+def _carrying(
+    around: System, own: NDArray[np.int64], left: Array, units: NDArray[np.int64]
+) -> list[int]:
+    """Units without which some constant of the model is lost."""
+    weight = around.weights(around.spreads(left))
+    live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
+    matrix = around.matrix[:, live]
+    normal = (matrix * weight[:, None]).T @ matrix + np.diag(around.penalty[live])
+    scale = np.sqrt(np.diag(normal))
+    spread = np.diag(np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True))
+    carrying = []
+    for number in np.unique(units[units >= 0]).tolist():
+        mine = units == number
+        rows = matrix[mine]
+        less = normal - (rows * weight[mine, None]).T @ rows
+        inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        grown = np.diag(inverse) / np.maximum(spread, 1e-300)
+        if grown.max() > _CARRIED or (np.diag(less) < 1e-5 * np.diag(normal)).any():
+            carrying.append(number)
+    return carrying
+
+
+def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
+    """Step [k] of least misfit; by `ridge`, a curve and a constant of one shape do not run away."""
+    weight = around.weights(around.spreads(left))
+    matrix = around.matrix[:, places]
+    weighted = matrix * weight[:, None]
+    normal = weighted.T @ matrix + np.diag(around.penalty[places] + ridge)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    slope = (weighted.T @ around.residual + around.pull[places]) / scale
+    step: Array = -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
+    return step
+
+
+def _held_out(
+    around: System,
+    places: NDArray[np.int64],
+    left: Array,
+    ridge: Array,
+    units: NDArray[np.int64],
+) -> float:
+    """Misfit of every unit as predicted without it, by the columns at `places`.
+
+    `left` [R] is the residual at their best fit, and gives the weights; rows of unit -1 keep it. A
+    coefficient that no other unit tells of stays at zero, by `ridge`.
+    """
+    weight = around.weights(around.spreads(left))
+    matrix = around.matrix[:, places]
+    weighted = matrix * weight[:, None]
+    penalty = np.diag(around.penalty[places] + ridge)
+    normal = weighted.T @ matrix + penalty
+    slope = weighted.T @ around.residual + around.pull[places]
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    predicted = left.copy()
+    for number in np.unique(units[units >= 0]).tolist():
+        mine = units == number
+        if not np.any(matrix[mine]):
+            continue
+        less = (normal - weighted[mine].T @ matrix[mine]) / np.outer(scale, scale)
+        right = (slope - weighted[mine].T @ around.residual[mine]) / scale
+        step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
+        predicted[mine] = around.residual[mine] + matrix[mine] @ step
+    return around.misfit_of(around.spreads(predicted))

@@ -1,0 +1,1 @@
+"""What is measured, what the model predicts, and which parameters each kind of test observes."""

@@ -1,0 +1,24 @@
+"""Named models: ideal, standard, and what the user adds or takes away."""
+
+from __future__ import annotations
+
+from pipeline.criticism.effect import Machine
+from pipeline.criticism.library.registry import chosen
+from pipeline.criticism.machine.model import Model
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.errors import UsageError
+
+MODELS: dict[str, tuple[str, ...]] = {
+    "ideal": (),
+    "standard": ("copper_temperature", "magnet_temperature", "coulomb_friction"),
+}
+
+
+def model_of(spec: ModelSpec, machine: Machine) -> Model:
+    """The model a specification asks for. Raises UsageError for an unknown model or effect."""
+    if spec.name not in MODELS:
+        raise UsageError(f"unknown model {spec.name}", f"known are {', '.join(MODELS)}")
+    less = {name[1:] for name in spec.effects if name.startswith("-")}
+    more = [name for name in spec.effects if not name.startswith("-")]
+    names = [name for name in dict.fromkeys([*MODELS[spec.name], *more]) if name not in less]
+    return Model(machine, tuple(chosen(tuple(names), spec.effects_path).values()))

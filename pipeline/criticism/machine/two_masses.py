@@ -1,0 +1,149 @@
+"""A shaft in two parts: motor and far inertia, with a twist between them.
+
+The coupling passes S = T − drags − (1 − f) J θ″ on to the far part, f its share of the inertia.
+The far angle is θ less the twist, so that with a load at the far end
+
+    T_load = S − f J (θ″ − twist″) = [T − drags − J θ″] + f J twist″,
+
+while a dynamometer that holds the far end, or a transducer in the coupling, reads S itself,
+[T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S, that
+of a spring or of a spring behind a gap, which `closer` tells from whole logs. A coasting shaft
+passes on next to nothing.
+
+References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
+(2002), backlash as a dead zone of the twist; [3] Tukey, Exploratory Data Analysis (1977), ch. 16.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Operating, Told, Values, Whole
+from pipeline.criticism.machine.torsion import Shaft, law_of_twist
+
+_BLOCK_S = 0.5e-3
+"""Length of a running mean [s]: a ringing of 290 Hz passes to one per cent (docs/criticism.md).
+Longer means take a part of it, shorter ones leave the encoder's rounding."""
+_MOST = 7
+"""Samples of a running mean at the most: six of them and a difference stay within the samples
+that are kept around a window."""
+_SURE = 3.5
+"""Standard uncertainties that a gap or softness must be away from what it is held against. By
+judgement: chance passes it once in four thousand."""
+_FEW = 6
+"""Windows with torque of both signs that a look needs: their scatter is the uncertainty, and of
+fewer it is not known. By judgement."""
+_NO_GAP_RAD = 2e-4
+"""Gap [rad] below which none matters: the negligible size of `backlash`, by judgement."""
+
+
+def passed_on(x: Operating, share: float) -> Array:
+    """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
+
+    `share` of the inertia is at the far end. Three running means keep the encoder's rounding out
+    of S. They are twiced [3], so that a ringing up to a seventh of 1/block passes to one per cent.
+    """
+    block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
+    block -= 1 - block % 2
+    box = np.full(block, 1.0 / block)
+    smooth = np.convolve(np.convolve(box, box), box)
+    kernel = 2.0 * np.pad(smooth, smooth.size // 2) - np.convolve(smooth, smooth)
+    found = np.zeros(x.theta_rad.size)
+    if found.size < kernel.size + 2:
+        return found
+    near = (1.0 - share) * x.base["j_kgm2"] / x.ts_s**2
+    through = x.torque_nm[1:-1] - near * np.diff(x.theta_rad, 2)
+    first = kernel.size // 2 + 1
+    found[first : x.theta_rad.size - first] = np.convolve(through, kernel, mode="valid")
+    return found
+
+
+def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
+    """Twist [n] of a spring and damper side by side, by the torque they pass on [rad].
+
+    S = k (twist + c/k twist′), so the twist lags S by c/k, to first order in it.
+    """
+    late = through_nm - q["damping_s"] / x.ts_s * np.gradient(through_nm)
+    twist: Array = q["twist_rad"] / x.machine.scales["torque_nm"] * late
+    return twist
+
+
+def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
+    """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m].
+
+    `between`: the transducer stands between the two parts, and reads S whether or not the far end
+    is held. The twist is not smoothed before it is differenced: the weak form's windows do that.
+    """
+    if not x.inverter:
+        return np.zeros(np.shape(x.omega_rad_s))
+    far = share * x.base["j_kgm2"]
+    moved = x.theta_rad if x.held or between else twist_rad()
+    drag = np.zeros(x.theta_rad.size)
+    drag[1:-1] = -far / x.ts_s**2 * np.diff(moved, 2)
+    return drag
+
+
+def side_of(through_nm: Array, least_nm: float) -> Array:
+    """Side of a gap [n], −1 to 1, that the torque passed on presses to.
+
+    Below `least_nm` the gap is open. If the torque comes back with the other sign, the gap is
+    crossed in between: slowly at first, at an even acceleration.
+    """
+    closed = np.flatnonzero(np.abs(through_nm) > least_nm)
+    if closed.size == 0:
+        return np.zeros(through_nm.size)
+    at = np.arange(through_nm.size)
+    place = np.searchsorted(closed, at, side="right")
+    last = closed[np.maximum(place - 1, 0)]
+    after = closed[np.minimum(place, closed.size - 1)]
+    passed = np.clip((at - last) / np.maximum(after - last, 1), 0.0, 1.0)
+    begin, end = np.sign(through_nm[last]), np.sign(through_nm[after])
+    side: Array = begin + (end - begin) * passed**2
+    return side
+
+
+def closer(wholes: Sequence[Whole], q: Values) -> Told | None:
+    """Backlash or compliance, from drive logs in which the torque changes its sign.
+
+    It is a gap if the gap is surely there, and wider than the spring's twist at the torque passed
+    on. It is a spring if such a gap is surely not there. Else neither is told.
+    """
+    between, share = q["between"] > 0.0, q["share"]
+    if share <= 0.0 or not wholes:
+        return None
+    law = law_of_twist(_shaft(one, between, share) for one in wholes)
+    if law is None or law.windows < _FEW:
+        return None
+    part = 1.0 if between else share
+    gap, u_gap = law.gap_rad / part, law.u_gap_rad / part
+    torque = wholes[0].x.machine.scales["torque_nm"] / part
+    values = {"twist_rad": (torque * law.softness, torque * law.u_softness)}
+    if law.softness < _SURE * law.u_softness:
+        values.clear()
+    matters = max(_NO_GAP_RAD, law.softness / part * law.torque_nm)
+    if gap > max(matters, _SURE * u_gap):
+        return Told("backlash", {**values, "gap_rad": (gap, u_gap)})
+    return Told("compliance", {}) if gap + _SURE * u_gap < matters else None
+
+
+def _shaft(one: Whole, between: bool, share: float) -> Shaft:
+    """A log as `law_of_twist` takes it: the coupling's torque, or the momentum of both parts."""
+    x, inertia = one.x, one.x.base["j_kgm2"]
+    driving = x.torque_nm - one.drag_nm
+    u_both = math.hypot(one.u_shaft_nm, one.u_air_gap_nm)
+    u_shaft = one.u_shaft_nm
+    return Shaft(
+        x.ts_s,
+        x.theta_rad,
+        one.shaft_nm if between else driving,
+        one.shaft_nm if between else driving - one.shaft_nm,
+        0.0 if between else (1.0 - share) * inertia,
+        share * inertia if between else inertia,
+        one.u_theta_rad,
+        u_shaft if between else one.u_air_gap_nm,
+        u_shaft if between else u_both,
+        one.good,
+    )

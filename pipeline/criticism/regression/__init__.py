@@ -1,0 +1,1 @@
+"""Weighted least squares over all segments: linear system, Gauss-Newton, noise floors."""

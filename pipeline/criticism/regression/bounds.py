@@ -1,0 +1,80 @@
+"""Steps of a fit that respect bounds: a parameter that leans on one is not in the step.
+
+Reference: Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), 16.5, active sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.machine_scale import base_scales
+from pipeline.criticism.effect import Array, Values
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linearise import Column
+
+_AT = 1e-9
+"""Share of its own size by which a value that stands at a bound may miss it by rounding."""
+_LEAST_INERTIA = 1e-3
+"""Least inertia, in the machine's order of magnitude for it: by judgement, far below any motor's.
+At zero a coasting shaft's equation divides by nothing."""
+
+
+def limits_of(model: Model) -> dict[str, tuple[float, float]]:
+    """Lowest and highest value [unit of the name] of what has bounds.
+
+    A resistance or inductance below zero, or an inertia next to nothing, would stand for an effect
+    that is not in the model.
+    """
+    limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
+    limits["j_kgm2"] = (_LEAST_INERTIA * base_scales(model.machine)["j_kgm2"], np.inf)
+    for name, (_, p) in model.parameters().items():
+        scale = model.machine.scale(p)
+        limits[name] = (p.low * scale, p.high * scale)
+    return limits
+
+
+class Step(Protocol):
+    """What a best step along some columns has to tell."""
+
+    @property
+    def step(self) -> Array:
+        """Change [k] of the parameters."""
+        ...
+
+
+Best = Callable[[NDArray[np.int64]], Step]
+
+
+def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Values) -> Array:
+    """Best step [P] along all columns that moves no parameter beyond a bound it stands at.
+
+    `best` gives the best step along some of the columns. A parameter that would leave its bound is
+    taken out, and the others step anew without it.
+    """
+    limits = limits_of(model)
+    live = np.arange(len(columns))
+    step = np.zeros(len(columns))
+    while live.size:
+        moved = best(live).step
+        out = [
+            n
+            for n, change in zip(live.tolist(), moved.tolist(), strict=True)
+            if _leaves(values[columns[n].name], change, limits.get(columns[n].name))
+        ]
+        if not out:
+            step[live] = moved
+            break
+        live = np.setdiff1d(live, out)
+    return step
+
+
+def _leaves(value: float, change: float, limits: tuple[float, float] | None) -> bool:
+    if limits is None:
+        return False
+    low, high = limits
+    near = _AT * abs(value)
+    return (change < 0.0 and value <= low + near) or (change > 0.0 and value >= high - near)

@@ -1,0 +1,239 @@
+"""How good a fit is: held-out error, errors of each signal, and what is left over the floor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, ndtr
+
+from pipeline.criticism.data.segment import Segment, told_signal
+from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.regression.noise_floors import channel_scale
+from pipeline.records.diagnosis import Remainder
+
+_GROWTH = 5.0
+"""Growth of a variance without a capture from which on the capture carries the constant alone."""
+_MOST_BLOCKS = 10_000
+"""More than the blocks of any capture, so that every block has a number of its own."""
+_OVER = 1.0
+"""Excess of χ²/n that is told: a floor from the recording itself is good to a factor of two."""
+_CHANCE = float(ndtr(-5.0))
+"""Probability that chance alone may have of what is told: of five standard deviations, one side."""
+_MATERIAL, _MATERIAL_BENCH, _MATERIAL_READING = 5e-4, 1e-2, 5e-3
+"""Error that matters: of the machine's own scale, of a bench meter's largest reading, and of the
+largest voltage of a log, which is less than the machine's at standstill."""
+_VOLTS = ("vd_v", "vq_v")
+"""Channels whose reading is little beside the machine's voltage at standstill."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """A fit's errors where each capture is predicted without itself.
+
+    `residual` [R] is NaN in a capture that alone carries a constant, and so is always in the fit.
+    `total` is the rms of the others over the noise floor; of the fit itself if there are none.
+    `steps` [own columns] are how far the parameters move without a capture, by its number.
+    """
+
+    residual: Array
+    total: float
+    steps: Mapping[int, Array] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What whoever reads `total` must know."""
+        if np.isfinite(self.residual).any():
+            return ()
+        return ("no capture can be predicted from the others: errors are those of the fit",)
+
+
+def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> HeldOut:
+    """Predicts every capture from all the others, by one weighted step from the full fit.
+
+    Of `segments` that are parted in blocks, every block is predicted from all else. This is to
+    first order: noise floors, weights and shapes stay those of the full fit.
+    """
+    places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
+    weight = around.weights(around.spreads(around.residual))
+    matrix = around.matrix[:, places]
+    unit = _units(around, segments)
+    weighted = matrix * weight[:, None]
+    normal = weighted.T @ matrix + np.diag(around.penalty[places])
+    slope = weighted.T @ around.residual + around.pull[places]
+    spread = np.diag(np.linalg.pinv(_unit(normal), hermitian=True))
+    left = np.full(around.size, np.nan)
+    steps: dict[int, Array] = {}
+    for number in sorted(set(unit.tolist())):
+        mine = unit == number
+        less = normal - weighted[mine].T @ matrix[mine]
+        scale = np.sqrt(np.diag(normal))
+        inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        grown = np.diag(inverse) / np.maximum(spread, 1e-300)
+        if not np.isfinite(grown).all() or grown.max() > _GROWTH or _lost(less, normal):
+            continue
+        step = -(inverse @ ((slope - weighted[mine].T @ around.residual[mine]) / scale)) / scale
+        left[mine] = around.residual[mine] + matrix[mine] @ step
+        steps[number] = np.zeros(own)
+        steps[number][places] = step
+    predicted = np.isfinite(left)
+    told = np.where(predicted, left, around.residual) / around.soft
+    told = told[predicted] if predicted.any() else told
+    return HeldOut(left, math.sqrt(float((told**2).mean())), steps)
+
+
+def in_common(fits: Sequence[System], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
+    """The same rows held out of several fits to the same captures, so that their errors compare.
+
+    A parameter that one capture alone carries keeps that capture in the fit. If it counted in one
+    fit and not in the other, that would pass for a better prediction.
+    """
+    shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
+    told = shared if shared.any() else np.ones(shared.size, dtype=bool)
+    made = []
+    for around, one in zip(fits, held, strict=True):
+        residual = np.where(shared, one.residual, np.nan)
+        errors = (np.where(shared, one.residual, around.residual) / around.soft)[told]
+        made.append(replace(one, residual=residual, total=math.sqrt(float((errors**2).mean()))))
+    return tuple(made)
+
+
+def predicted_spreads(around: System, held: HeldOut) -> Array:
+    """χ²/n [G] of every group as `held` out; captures that are always in the fit as fitted."""
+    return around.spreads(np.where(np.isfinite(held.residual), held.residual, around.residual))
+
+
+def _units(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
+    """Number of what is held out together, of every row [R]: a capture or a block of one.
+
+    Segments of one capture that are parted alike are held out together.
+    """
+    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    units = segment.astype(np.int64)
+    names = [s.capture for s in segments]
+    first = len(names)
+    for number, one in enumerate(segments):
+        if one.blocks is not None:
+            mine = segment == number
+            units[mine] = first + names.index(one.capture) * _MOST_BLOCKS
+            units[mine] += one.blocks[around.window[mine]]
+    return units
+
+
+def _unit(normal: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    unit: Array = normal / np.outer(scale, scale)
+    return unit
+
+
+def _lost(less: Array, normal: Array) -> bool:
+    """Whether some constant keeps less than 1e-5 of its information."""
+    return bool((np.diag(less) < 1e-5 * np.diag(normal)).any())
+
+
+def signal_errors(segments: Sequence[Segment], around: System, residual: Array) -> dict[str, float]:
+    """Rms error [unit of the signal] of each signal's window means."""
+    found: dict[str, float] = {}
+    plain = (
+        told_signal(segments[number], channel) if order == 0 else ""
+        for number, channel, order in around.labels
+    )
+    names = np.array(list(plain))
+    of_row = names[around.group]
+    for name in sorted({n for n in names.tolist() if n}):
+        mine = (of_row == name) & np.isfinite(residual)
+        if mine.any():
+            found[name] = math.sqrt(float(((residual[mine] * around.unit[mine]) ** 2).mean()))
+    return found
+
+
+def remainder(
+    around: System, segments: Sequence[Segment], residual: Array, large: bool = False
+) -> tuple[Remainder, ...]:
+    """Groups that are over their floor significantly and by a size that matters, the worst first.
+
+    With `large`, the size must matter to the machine as a whole. A floor from the recording itself
+    is good to a factor of 2 in variance, and nobody acts on an error below 5e-4 of the machine's
+    voltage or torque.
+    """
+    return tuple(one for one in over_floor(around, segments, residual, large) if one.matters)
+
+
+def over_floor(
+    around: System, segments: Sequence[Segment], residual: Array, large: bool = False
+) -> tuple[Remainder, ...]:
+    """Groups that are over their floor significantly, at any size, the worst first.
+
+    They say where a held-out error over the floor comes from when `remainder` is empty.
+    """
+    found = []
+    for place, chi2_per_n, size, matters in _over(around, segments, residual, around.soft, large):
+        number, channel, order = around.labels[place]
+        capture = segments[number].capture
+        found.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
+    return tuple(
+        sorted(found, key=lambda r: (not r.matters, -r.chi2_per_n, r.capture, r.signal, r.order))
+    )
+
+
+def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_]:
+    """Groups [G] that a fit leaves over their floor, judged as `remainder` does, but with the
+    tolerance of form of the effects found in that floor.
+    """
+    told = np.zeros(len(around.labels), dtype=bool)
+    as_whitened = np.ones(around.size)
+    over = _over(around, segments, around.residual, as_whitened)
+    told[[place for place, _, _, matters in over if matters]] = True
+    return told
+
+
+def _over(
+    around: System,
+    segments: Sequence[Segment],
+    residual: Array,
+    soft: Array,
+    large: bool = False,
+) -> Iterator[tuple[int, float, float, bool]]:
+    """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is
+    `soft` [R] of the scale that rows are divided by.
+    """
+    spreads, counts = around.spreads(residual / soft), around.counts
+    for place, (number, channel, _) in enumerate(around.labels):
+        n, q = counts[place], spreads[place]
+        if n == 0 or q <= max(1.0 + _OVER, _highest_by_chance(n)):
+            continue
+        mine = around.group == place
+        unit = float(((around.unit * soft)[mine] ** 2).mean())
+        more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
+        size = math.sqrt(max(more, 0.0))
+        matters = size > material_size(segments[number], channel, around, large)
+        yield place, float(q), size, matters
+
+
+@cache
+def _highest_by_chance(n: float) -> float:
+    """χ²/n of n samples that chance passes as seldom as five standard deviations.
+
+    The tail of χ² itself is used: of four samples, 1 + 5 √(2/n) is passed one time in a thousand.
+    """
+    return float(chdtri(n, _CHANCE)) / n
+
+
+def material_size(segment: Segment, channel: str, around: System, large: bool = False) -> float:
+    """Error [unit of the signal] below which nobody would act, or that is `large` for the machine.
+
+    Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
+    """
+    bench = segment.kind in ("terminal", "lcr", "flux_map", "standing")
+    fitted = around.around
+    scale = channel_scale(segment, channel, fitted.model, fitted.values)
+    size = (_MATERIAL_BENCH if bench else _MATERIAL) * scale
+    if segment.kind == "dq" and channel in _VOLTS and not large:
+        reading = max(float(np.abs(segment.recorded[name]).max()) for name in _VOLTS)
+        size = min(size, _MATERIAL_READING * reading)
+    return size

@@ -1,0 +1,259 @@
+"""Which of a model's parameters the captures and the station's priors determine, and how well."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.criticism.data.machine_scale import base_scales
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array
+from pipeline.criticism.machine.model import BASE, PHYSICAL, Model
+from pipeline.criticism.regression.bounds import limits_of
+from pipeline.criticism.regression.goodness import HeldOut
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linearise import Column
+from pipeline.numerics.identifiability import (
+    REACH,
+    Combination,
+    Identified,
+    identify,
+    known_combinations,
+    walked,
+    within,
+)
+from pipeline.records.comparison import KnownCombination, ModelParameter
+
+POSITIVE = ("psi_wb", "j_kgm2", "r_ohm", "ld_h", "lq_h")
+"""Constants that no motor is without, in the order in which others are told over them."""
+_WALK = math.log(2.0)
+"""How far a direction without information is walked to see that nothing changes: everything in it
+is doubled or halved, or moves by as much of its size."""
+_EDGE = 1e-9
+"""Share of a bound by which a value that stands there may miss it."""
+_HARDLY = 1e-3
+"""Information, over that of a prior, below which rounding may have made it."""
+_RISE = 1.0
+"""Change of −2 log L on such a walk that is still none: a quarter of what two standard
+uncertainties make."""
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What a fit knows of its `own` parameters.
+
+    `found` is what the rows and the priors of the station say of them, `steps` [K, own] how far
+    they move without each capture that can be left out, `rest` [own] the step that the equations
+    still ask for where a bound or the end of the iterations keeps it from being done.
+    """
+
+    found: Identified
+    steps: Array
+    rest: Array
+
+    def u_of(self, gradient: Array, bent: bool = False) -> float:
+        """Standard uncertainty of a function with this gradient [own], `bent` where it is not
+        linear: from the samples' noise, or from leaving out one capture at a time, whichever is
+        larger, and from the rest; infinite where it is not identifiable.
+
+        A form that is a little wrong, or noise that is not white, disturbs every capture in its
+        own way; a covariance from samples does not know that. References: [1] Efron & Stein, Ann.
+        Stat. 9 (1981), jackknife variance (K − 1)/K Σ (θ_k − mean)².
+        """
+        noise = self.found.u_of_bent(gradient) if bent else self.found.u_of(gradient)
+        count, moves = len(self.steps), self.steps @ gradient
+        between = 0.0
+        if count > 1:
+            between = math.sqrt((count - 1) * float(np.var(moves)))
+        return math.hypot(max(noise, between), float(self.rest @ gradient))
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainty [own] of every parameter."""
+        return np.array([self.u_of(one) for one in np.eye(self.rest.size)])
+
+
+def known(around: System, held: HeldOut, own: int) -> Known:
+    """What a system and its priors say of a fit's first `own` columns.
+
+    Nothing that only keeps steps short, or where the fit began, is in it. The columns are those of
+    the fit itself: one that stayed from a near fit would tell apart what nothing tells apart.
+    """
+    return known_by(around, held, own, _sizes(around.around, around.columns[:own]))
+
+
+def known_by(around: System, held: HeldOut, own: int, sizes: Array) -> Known:
+    """The same with the parameters' `sizes` [own] given."""
+    weight = around.weights(around.spreads(around.residual))
+    matrix, penalty = around.matrix[:, :own], around.penalty[:own]
+    rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(penalty))])
+    found = identify(rows, sizes)
+    slope = matrix.T @ (weight * around.residual) + around.pull[:own]
+    steps = np.array(list(held.steps.values())).reshape(-1, own)
+    return Known(found, steps, -found.root @ (found.root.T @ slope))
+
+
+def surely_there(around: System, held: HeldOut, least: float) -> set[str]:
+    """Names of the parameters that are `least` standard uncertainties from zero, as they are or
+    over a constant that no motor is without.
+
+    A coast tells that there is windage though it tells no more than windage over inertia.
+    """
+    own = len(around.columns)
+    fit = known(around, held, own)
+    values = np.array([around.around.values[c.name] for c in around.columns])
+    below = [n for n, c in enumerate(around.columns) if c.name in POSITIVE and values[n] > 0.0]
+    sure = set()
+    for n, column in enumerate(around.columns):
+        over = {j: fit.u_of(_over(values, n, j), bent=True) for j in below if j != n}
+        told = [(values[n] / values[j], u) for j, u in over.items()]
+        told.append((values[n], fit.u_of(np.eye(own)[n])))
+        if any(abs(size) > least * u for size, u in told):
+            sure.add(column.name)
+    return sure
+
+
+def _over(values: Array, one: int, other: int) -> Array:
+    """Gradient [own] of a parameter over another one."""
+    gradient = np.zeros(values.size)
+    gradient[one] = 1.0 / values[other]
+    gradient[other] = -values[one] / values[other] ** 2
+    return gradient
+
+
+def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, ModelParameter]:
+    """Every physical parameter of a fit by name; without a value where it is not determined.
+
+    Determined is what is known better than to its own size. A constant that no motor is without
+    must have an interval without zero, and no bound that holds it; another parameter's interval
+    must be narrower than sizes that are seen on real benches. A number that was chosen of a few, or
+    told by a closer look, is determined where an amplitude of its effect is.
+    """
+    model, own = fitted.model, own_columns(fitted.model)
+    fit = known(around, held, len(own))
+    u = dict(zip((c.name for c in own), fit.u.tolist(), strict=True))
+    told = within(_beyond(fit.u, around.penalty[: len(own)]), fit.found.sizes)
+    sized = dict(zip(u, told.tolist(), strict=True))
+    limits = limits_of(model)
+    made = {}
+    for c in BASE:
+        if c.name in PHYSICAL:
+            value = fitted.values[c.name]
+            bound = _at(value, limits.get(c.name))
+            sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
+            made[c.name] = _told(value, u[c.name], c.unit, sized[c.name] and sure, bound)
+    for name, (effect, p) in model.parameters().items():
+        value = fitted.values[name]
+        beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
+        sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
+        bound = not p.choice and _at(value, limits[name])
+        made[name] = _told(value, u.get(name, p.u), p.unit, sure, bound)
+    return made
+
+
+def _beyond(u: Array, penalty: Array) -> Array:
+    """Standard uncertainties [P] without the priors of inverse variance `penalty` [P], infinite
+    where nothing else tells: what handbooks say is not measured.
+    """
+    information = np.maximum(u, 1e-300) ** -2.0 - penalty
+    told = information > _HARDLY * penalty
+    alone: Array = np.where(told, np.maximum(information, 1e-300) ** -0.5, math.inf)
+    return alone
+
+
+def _told(value: float, u: float, unit: str, known: bool, bound: bool) -> ModelParameter:
+    return ModelParameter(value if known else None, u if known else None, unit, bound and known)
+
+
+def _at(value: float, limits: tuple[float, float] | None) -> bool:
+    """Whether a value stands at a bound."""
+    return limits is not None and any(
+        abs(value - end) <= _EDGE * max(abs(end), 1e-30) for end in limits if math.isfinite(end)
+    )
+
+
+def combinations_told(
+    segments: Sequence[Segment], fitted: Fitted, around: System, held: HeldOut
+) -> tuple[KnownCombination, ...]:
+    """What the captures tell of parameters that they do not determine one by one.
+
+    A matrix speaks of where the fit stands. So the directions without information are walked: what
+    is told must be all there is to know far from here as well.
+    """
+    names = [c.name for c in around.columns[: len(own_columns(fitted.model))]]
+    fit = known(around, held, len(names))
+    found = fit.found
+    values = np.array([fitted.values[name] for name in names])
+    physical = {**dict.fromkeys(PHYSICAL), **fitted.model.parameters()}
+    heard = np.any(around.matrix[:, : len(names)] != 0.0, axis=0)
+    open_ = np.isinf(found.u) | ~found.determined
+    places = [n for n, name in enumerate(names) if name in physical and heard[n] and open_[n]]
+    positive = [names.index(name) for name in POSITIVE if fitted.values[name] > 0.0]
+    made = known_combinations(found, values, places, positive)
+    moving = np.zeros(len(names), dtype=bool)
+    for moved, there in walked(found, values, made, _WALK) if made else ():
+        at = replace(fitted, values=fitted.values | dict(zip(names, there.tolist(), strict=True)))
+        misfit = system(segments, at, before=around, chord=True).misfit
+        if not abs(misfit - around.misfit) < _RISE:
+            moving |= moved
+    wide = [(one, fit.u_of(one.gradient, bent=one.product)) for one in made]
+    return tuple(
+        _combined(one, u, names, fitted.model)
+        for one, u in wide
+        if not moving[[place for place, _ in one.weights]].any()
+        if within(np.array(u), np.array(one.size))
+    )
+
+
+def _combined(one: Combination, u: float, names: Sequence[str], model: Model) -> KnownCombination:
+    """A combination as it is told."""
+    units = {c.name: c.unit for c in BASE} | {n: p.unit for n, (_, p) in model.parameters().items()}
+    weights = {names[place]: weight for place, weight in one.weights}
+    if one.product:
+        return KnownCombination(
+            _fraction(list(weights), weights, "*"),
+            one.value,
+            u,
+            _fraction([units[name] for name in weights], weights, "·"),
+            tuple(weights),
+        )
+    (first, _), (second, factor) = weights.items()
+    words = f"{first} {'+' if factor > 0.0 else '-'} {abs(factor):.9g}*{second}"
+    return KnownCombination(words, one.value, u, units[first], tuple(weights))
+
+
+def _fraction(factors: Sequence[str], weights: Mapping[str, float], times: str) -> str:
+    """Names or units of powers of ±1 as one fraction."""
+    powers = list(weights.values())
+    above = [one for one, power in zip(factors, powers, strict=True) if power > 0]
+    below = [one for one, power in zip(factors, powers, strict=True) if power < 0]
+    bottom = times.join(below)
+    if len(below) > 1 or "·" in bottom or "/" in bottom:
+        bottom = f"({bottom})"
+    top = times.join(f"({one})" if "/" in one else one for one in above) or "1"
+    return f"{top}/{bottom}" if below else top
+
+
+def _sizes(fitted: Fitted, columns: Sequence[Column]) -> Array:
+    """Magnitude [P] at which every parameter matters, in its own unit.
+
+    Of a constant that no motor is without, its value, of a nuisance its prior, of the others their
+    value or a size seen on real benches, the larger; waves of one unit are of one size.
+    """
+    model, values = fitted.model, fitted.values
+    orders, priors = base_scales(model.machine), model.priors()
+    known = {name: abs(values[name]) or orders[name] for name in POSITIVE}
+    known["b_nm_s_rad"] = max(abs(values["b_nm_s_rad"]), orders["b_nm_s_rad"])
+    for name, (effect, p) in model.parameters().items():
+        alike = [
+            abs(values[f"{effect.name}.{q.name}"])
+            for q in effect.parameters_of(model.machine)
+            if q.amplitude and (q.unit, q.scale) == (p.unit, p.scale)
+        ]
+        own = alike if p.amplitude else [abs(values[name])]
+        known[name] = max(*own, p.typical * model.machine.scale(p), 1e-300)
+    known |= {c.name: priors[c.name][1] for c in BASE if c.name in priors}
+    return np.array([known.get(column.name, 1.0) for column in columns])

@@ -1,0 +1,386 @@
+"""All segments as one linear system around a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.machine_scale import base_scales
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Effect, Values
+from pipeline.criticism.equations.residuals import over_inertia
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linearise import (
+    Column,
+    Rows,
+    base_columns,
+    effect_columns,
+    linearise,
+    whitened_anew,
+)
+from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
+from pipeline.criticism.regression.normal_equations import Grams, misfit_of, pseudo_inverse
+from pipeline.criticism.regression.parallel import on_each
+
+_SEED = 20260302
+_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
+_HEAVIER, _OTHER = 0.05, 0.05
+"""Share of itself that a constant may move by before columns are computed anew, J before its own
+is, since a coasting shaft goes by 1/J, and an effect's parameter (or of its typical size, if that
+is larger) before columns of sensors and shapes are. By judgement: a stale column costs steps and
+no accuracy (`_kept`)."""
+_CURRENTS = frozenset({"id_a", "iq_a", "i_pair_a"})
+"""Signals whose noise is in the equations times a constant of the fit."""
+ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A model with the values that fit best.
+
+    `sigma` is each segment's noise floor by group, computed at the values `near`. Reading errors
+    are computed there too: those of a coasting shaft go with 1/J, and a fit could win by making J
+    small. `tolerance` is what the forms of effects found may be wrong by; empty: nothing.
+    """
+
+    model: Model
+    values: dict[str, float]
+    sigma: tuple[Array, ...]
+    near: Values
+    tolerance: tuple[Array, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
+
+    `group` [R] numbers the groups of (segment, channel, order), `labels` names them. `unit` [R] is
+    a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by `whiten`
+    [R]; `soft` [R] is the noise floor over the scale that a row is divided by, below 1 where a
+    tolerance of form was added. Rows of a group that misses its noise floor, χ²/n = q > 1, count
+    1/q: the likelihood of a group whose scatter is at least the floor but otherwise unknown. So an
+    equation that lacks an effect does not move constants that sound equations know. `penalty` [P]
+    is the inverse prior variance of nuisances, `pull` [P] the penalty's slope, `tests` each
+    segment's test, `made_at` the values at which each column was computed.
+    """
+
+    columns: tuple[Column, ...]
+    residual: Array
+    matrix: Array
+    group: NDArray[np.int64]
+    window: NDArray[np.int64]
+    unit: Array
+    soft: Array
+    whiten: Array
+    labels: tuple[tuple[int, str, int], ...]
+    penalty: Array
+    pull: Array
+    around: Fitted
+    tests: tuple[str, ...]
+    made_at: Mapping[ColumnKey, Values]
+
+    @property
+    def size(self) -> int:
+        """Weak samples."""
+        return int(self.residual.size)
+
+    @property
+    def counts(self) -> Array:
+        """Weak samples [G] of each group."""
+        return np.bincount(self.group, minlength=len(self.labels)).astype(float)
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of all weak residuals over their noise floor."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def misfit(self) -> float:
+        """−2 log likelihood, less constants, and the cost of the priors."""
+        cost = float(self.prior_costs().sum())
+        return self.misfit_of(self.spreads(self.residual)) + cost
+
+    @property
+    def excess(self) -> float:
+        """The part of the misfit that is over noise floors and priors."""
+        over = np.log(np.maximum(self.spreads(self.residual), 1.0))
+        return float(self.counts @ over) + float(self.prior_costs().sum())
+
+    def prior_costs(
+        self, places: NDArray[np.int64] | None = None, step: Array | None = None
+    ) -> Array:
+        """Squared distance [P] of every parameter from its prior's centre, in its standard
+        uncertainties, after a step along `places`; 0 where there is no prior.
+        """
+        pull = self.pull.copy()
+        if places is not None and step is not None:
+            pull[places] += self.penalty[places] * step
+        costs: Array = pull**2 / np.where(self.penalty > 0, self.penalty, np.inf)
+        return costs
+
+    def weights(self, spreads: Array) -> Array:
+        """How much each weak sample [R] counts where groups have these χ²/n."""
+        each: Array = 1.0 / np.maximum(spreads, 1.0)
+        return each[self.group]
+
+    def foreseen(self, step: Array) -> float:
+        """Misfit after a step along the first columns, to first order."""
+        places = np.arange(step.size)
+        cost = float(self.prior_costs(places, step).sum())
+        return self.misfit_of(self.spreads(self.after(places, step))) + cost
+
+    def spreads(self, residual: Array) -> Array:
+        """χ²/n [G] of each group, 1 where empty."""
+        counts = self.counts
+        total = np.bincount(self.group, residual**2, minlength=counts.size)
+        return np.where(counts > 0, total / np.maximum(counts, 1.0), 1.0)
+
+    def misfit_of(self, spreads: Array) -> float:
+        """−2 log likelihood of groups with these χ²/n [G]."""
+        return misfit_of(self.counts, spreads)
+
+    def place(self, names: Iterable[str]) -> NDArray[np.int64]:
+        """Indices of columns by name."""
+        wanted = set(names)
+        return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
+
+    def grams(self, places: NDArray[np.int64] | None = None) -> Grams:
+        """Normal matrices by group of the columns at `places`, of all without."""
+        along = np.arange(len(self.columns)) if places is None else places
+        elsewhere = self.prior_costs()
+        elsewhere[along] = 0.0
+        return Grams.of(
+            self.matrix[:, along],
+            self.residual,
+            self.group,
+            len(self.labels),
+            self.penalty[along],
+            self.pull[along],
+            float(elsewhere.sum()),
+        )
+
+    def along(self, places: Sequence[int]) -> System:
+        """The same system with some of its columns."""
+        columns = tuple(self.columns[n] for n in places)
+        penalty, pull = self.penalty[places], self.pull[places]
+        matrix = self.matrix[:, places]
+        return replace(self, columns=columns, matrix=matrix, penalty=penalty, pull=pull)
+
+    def after(self, places: NDArray[np.int64], step: Array) -> Array:
+        """The residual [R] after a step along some columns, to first order."""
+        left: Array = self.residual + self.matrix[:, places] @ step
+        return left
+
+    def covariance(self, places: NDArray[np.int64]) -> Array:
+        """Covariance [k, k] of the parameters at `places` when they are fitted together."""
+        weight = self.weights(self.spreads(self.residual))
+        matrix = self.matrix[:, places]
+        normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
+        return pseudo_inverse(normal)
+
+
+def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:
+    """Noise floor of every segment."""
+    seeds = range(_SEED, _SEED + len(segments))
+    return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
+
+
+def floors_grown(segments: Sequence[Segment], fitted: Fitted) -> tuple[Array, ...]:
+    """Noise floor of every segment at a fit's values, over the one that the fit was made with; the
+    same noise is added in both.
+    """
+    what = fitted.model, fitted.values
+    each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fitted.sigma)]
+    return on_each(_floor_grown, segments, each)
+
+
+def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, seed: int) -> Array:
+    """One but where there are currents, whose noise is in the equations times what is fitted."""
+    if _CURRENTS.isdisjoint(segment.recorded):
+        return np.ones(sigma.size)
+    return noise_floor(segment, model, values, seed) / sigma
+
+
+def tolerances(
+    segments: Sequence[Segment], fitted: Fitted, added: Sequence[Effect]
+) -> tuple[Array, ...]:
+    """What the forms of the effects found may be wrong by, of every segment."""
+    what = fitted.model, fitted.values, tuple(added)
+    return on_each(form_tolerance, segments, [what] * len(segments))
+
+
+def system(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    candidates: Sequence[Column] = (),
+    before: System | None = None,
+    chord: bool = False,
+) -> System:
+    """Linearises every segment around a fit, along its own columns and those of candidates.
+
+    Columns that hold at this fit too (`_holds`) stay as they were in `before`, a system around a
+    near fit; with `chord` all that it has stay.
+    """
+    model, values = fitted.model, fitted.values
+    columns = [*own_columns(model), *candidates]
+    known = _kept(before, fitted, columns, chord)
+    new = [column for column in columns if column.key not in known]
+    none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
+    floor = zip(fitted.sigma, fitted.tolerance or none, strict=True)
+    each = [(model, values, new, *both, fitted.near) for both in floor]
+    rows = on_each(linearise, segments, each)
+    group, labels = _numbered(rows)
+    penalty, pull = _priors(model, columns, values)
+    made = System(
+        columns=tuple(columns),
+        residual=np.concatenate([r.residual for r in rows]),
+        matrix=_placed(columns, new, np.concatenate([r.columns for r in rows])),
+        group=group,
+        window=np.concatenate([r.window for r in rows]),
+        unit=np.concatenate([r.unit for r in rows]),
+        soft=np.concatenate([r.soft for r in rows]),
+        whiten=np.concatenate([r.whiten for r in rows]),
+        labels=labels,
+        penalty=penalty,
+        pull=pull,
+        around=fitted,
+        tests=tuple(segment.test for segment in segments),
+        made_at={column.key: values for column in new},
+    )
+    return made if before is None or not known else _with_known(made, before, known, segments)
+
+
+def _numbered(
+    rows: Sequence[Rows],
+) -> tuple[NDArray[np.int64], tuple[tuple[int, str, int], ...]]:
+    """Group [R] of every row of all segments, and the groups' labels."""
+    first, labels, groups = 0, [], []
+    for number, one in enumerate(rows):
+        labels += [(number, channel, order) for channel, order in one.groups]
+        groups.append(one.group + first)
+        first += len(one.groups)
+    return np.concatenate(groups), tuple(labels)
+
+
+def _placed(columns: Sequence[Column], new: Sequence[Column], made: Array) -> Array:
+    """A matrix [R, P] of all columns with the `new` ones in it, as they were `made` [R, new]."""
+    matrix = np.empty((made.shape[0], len(columns)))
+    fresh = {column.key: n for n, column in enumerate(new)}
+    for place, column in enumerate(columns):
+        if column.key in fresh:
+            matrix[:, place] = made[:, fresh[column.key]]
+    return matrix
+
+
+def _with_known(
+    now: System,
+    before: System,
+    known: Mapping[ColumnKey, Array],
+    segments: Sequence[Segment],
+) -> System:
+    """The system with the `known` columns of the one `before` put where its matrix is still open:
+    over the noise of now, and those of a free shaft by its inertia of now.
+    """
+    free = np.array([over_inertia(segments[n], channel) for n, channel, _ in now.labels])
+    inertia = before.around.values["j_kgm2"] / now.around.values["j_kgm2"]
+    lighter = np.where(free, inertia, 1.0)[now.group]
+    places = [n for n, column in enumerate(now.columns) if column.key in known]
+    kept = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
+    segment = np.array([number for number, _, _ in now.labels])[now.group]
+    counts = np.bincount(segment, minlength=len(segments)).tolist()
+    now.matrix[:, places] = _over(segments, kept, before.whiten, now.whiten, counts)
+    made_at = {**now.made_at, **{key: before.made_at[key] for key in known}}
+    return replace(now, made_at=made_at)
+
+
+def _over(
+    segments: Sequence[Segment], kept: Array, before: Array, now: Array, counts: Sequence[int]
+) -> Array:
+    """Columns [R, P] that were whitened by `before` [R], whitened by `now` [R] instead; `counts`
+    are the rows of each segment.
+    """
+    if np.array_equal(before, now):
+        return kept
+    edges = np.cumsum(counts)[:-1]
+    each = zip(*(np.split(one, edges) for one in (kept, before, now)), strict=True)
+    whole: Array = np.concatenate(on_each(whitened_anew, segments, list(each)))
+    return whole
+
+
+def _kept(
+    before: System | None, fitted: Fitted, columns: Sequence[Column], chord: bool
+) -> dict[ColumnKey, Array]:
+    """Those of the columns that an earlier system has and that hold at a new fit too.
+
+    A stale column costs no accuracy. The residual is always computed anew, a fit ends where it has
+    nothing left along the columns, and the columns of two near fits span nearly the same space.
+    The exceptions: once an effect of the angle is found, the columns of other effects of the angle
+    have changed; and all have once one is found that may be far from zero.
+    """
+    if before is None:
+        return {}
+    known = before.around.model.effects
+    found = [e for e in fitted.model.effects if e not in known]
+    if any(p.starts for e in found for p in e.parameters_of(fitted.model.machine)):
+        return {}
+    turned = any(e.angle is not None for e in found)
+
+    def stays(column: Column) -> bool:
+        of_angle = column.effect is not None and column.effect.angle is not None
+        return not (turned and of_angle) and _holds(column, before.made_at[column.key], fitted)
+
+    places = {column.key: place for place, column in enumerate(before.columns)}
+    there = [column for column in columns if column.key in places]
+    kept = [column.key for column in there if chord or stays(column)]
+    return {key: before.matrix[:, places[key]] for key in kept}
+
+
+def _holds(column: Column, made_at: Values, fitted: Fitted) -> bool:
+    """Whether a column is near what it would be at a fit."""
+    model, now = fitted.model, fitted.values
+    if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n, far in _STEADY.items()):
+        return False
+    if column.name == "j_kgm2":
+        return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < _HEAVIER
+    if _linear(column, model):
+        return True
+    parameters = model.parameters()
+    gone = any(value and "." in name and name not in parameters for name, value in made_at.items())
+    return not gone and all(
+        abs(now[name] - made_at.get(name, 0.0))
+        <= _OTHER * max(abs(now[name]), p.typical * model.machine.scale(p))
+        for name, (_, p) in parameters.items()
+    )
+
+
+def _linear(column: Column, model: Model) -> bool:
+    """Whether the residual is linear along a column, whatever the other parameters are."""
+    effect = column.effect
+    if effect is None:
+        return column.name != "offset_temp_k"
+    if effect not in model.effects:
+        return True
+    shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))
+    return effect.hook != "sensor" and not shaped
+
+
+def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
+    penalty, pull = np.zeros(len(columns)), np.zeros(len(columns))
+    priors = model.priors()
+    for place, column in enumerate(columns):
+        if column.name in priors:
+            center, u = priors[column.name]
+            penalty[place] = u**-2
+            pull[place] = (values[column.name] - center) * u**-2
+    return penalty, pull
+
+
+def own_columns(model: Model) -> list[Column]:
+    """The columns of a model's own parameters, base first."""
+    columns = base_columns(base_scales(model.machine))
+    for effect in model.effects:
+        columns += effect_columns(effect, model)
+    return columns

@@ -1,0 +1,334 @@
+"""Weak residuals and their columns: one model against all segments, whitened by sensor noise.
+
+Each segment is projected once for all parameters together; what remains of it is its Gram matrix
+a group of (channel, order), so that any subset of effects or captures is then small algebra.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import RECORDER, Segment, projected, row_index
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
+from pipeline.criticism.equations.observability import HEARS, hears, hears_sensor
+from pipeline.criticism.equations.residuals import (
+    RIPPLES,
+    TORQUE_RIPPLES,
+    measured,
+    over_inertia,
+    predicted,
+    residual,
+)
+from pipeline.criticism.equations.true_signals import operate
+from pipeline.criticism.machine.model import (
+    BASE,
+    GAINS,
+    Model,
+    Pieces,
+    clock_gain,
+    effect_flux,
+    evaluate,
+    mean_current,
+    values_of,
+    zero,
+)
+from pipeline.criticism.regression.noise_floors import (
+    offsets,
+    reading_error,
+    told_unit,
+    window_gain,
+)
+
+_CHUNK = 8
+"""Columns that are projected at a time: more leave the processor's cache (of 32 a linearisation
+takes an eighth longer), fewer are more calls."""
+_NOTHING = 1e-40
+"""What complex steps leave of a term that is zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One direction of the parameter space: a base constant, or a parameter of an effect.
+
+    `at` fixes the effect's shape parameters while its amplitudes are zero.
+    """
+
+    name: str
+    step: float
+    effect: Effect | None = None
+    at: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def key(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+        """What tells columns apart."""
+        return self.name, self.at
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Weak samples of one segment: residual [R] and columns [R, P], both over the noise.
+
+    `group` [R] numbers (channel, order) pairs listed in `groups`, `window` [R] the window. `unit`
+    [R] is a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by
+    `whiten` [R]; `soft` [R] is the noise floor over the scale that a row is divided by, below 1
+    where a tolerance of form was added.
+    """
+
+    residual: Array
+    columns: Array
+    group: NDArray[np.int64]
+    window: NDArray[np.int64]
+    unit: Array
+    soft: Array
+    whiten: Array
+    groups: tuple[tuple[str, int], ...]
+
+
+def linearise(
+    segment: Segment,
+    model: Model,
+    values: Values,
+    columns: Sequence[Column],
+    sigma: Array,
+    tolerance: Array,
+    near: Values,
+) -> Rows:
+    """Whitened residual and columns of one segment at `values`, reading errors as at `near`."""
+    group, window, valid, groups = row_index(segment)
+    sampler = _Sampler(segment, model, dict(values))
+    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near, sampler.x)[valid])
+    whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
+    kept = _weak_columns(segment, sampler, columns, valid)
+    both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * whiten[:, None]
+    absorb(both, offsets(segment, valid, whiten))
+    unit = told_unit(segment, values) / (whiten * window_gain(segment))
+    soft = floor * whiten
+    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
+
+
+def _weak_columns(
+    segment: Segment, sampler: _Sampler, columns: Sequence[Column], valid: NDArray[np.bool_]
+) -> Array:
+    """Weak samples [R, P] of every column, zero where the segment does not hear it."""
+    kept = np.zeros((int(valid.sum()), len(columns)))
+    for first in range(0, len(columns), _CHUNK):
+        some = enumerate(columns[first : first + _CHUNK], first)
+        changes = {place: sampler.change(column) for place, column in some}
+        heard = {place: change for place, change in changes.items() if change is not None}
+        if not heard:
+            continue
+        stacked = np.concatenate(list(heard.values()))
+        moving = stacked.any(axis=1)
+        weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
+        weak[moving] = projected(segment, stacked[moving])
+        for place, one in zip(heard, weak.reshape(len(heard), *valid.shape), strict=True):
+            kept[:, place] = one[valid]
+    return kept
+
+
+def absorb(rows: Array, unknown: Sequence[Array]) -> None:
+    """Whitens rows [R, P] in place for the disturbances [R each, of standard size] in `unknown`.
+
+    The factor is (1 + N Nᵀ)^(−1/2), N the disturbances: what is orthogonal to them stays as it is.
+    """
+    if unknown:
+        axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
+        lost = 1.0 - 1.0 / np.sqrt(1.0 + sizes**2)
+        rows -= (axes * lost) @ (axes.T @ rows)
+
+
+def whitened_anew(segment: Segment, rows: Array, before: Array, after: Array) -> Array:
+    """Rows [R, P] of one segment, whitened by `after` [R] instead of `before` [R].
+
+    Disturbances are absorbed anew as well: beside a louder noise an offset is absorbed less.
+    """
+    _, _, valid, _ = row_index(segment)
+    bare = rows.copy()
+    _restore(bare, offsets(segment, valid, before))
+    bare *= (after / before)[:, None]
+    absorb(bare, offsets(segment, valid, after))
+    return bare
+
+
+def _restore(rows: Array, unknown: Sequence[Array]) -> None:
+    """Undoes `absorb` in place."""
+    if unknown:
+        axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
+        rows += (axes * (np.sqrt(1.0 + sizes**2) - 1.0)) @ (axes.T @ rows)
+
+
+_FINE = 1e-3
+"""Share of J that its finite difference steps by at the most: 1/J is then straight to 1e-3."""
+_BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
+"""Constants that change no flux, drop or drag."""
+
+
+class _Sampler:
+    """Sampled change of a segment's residual along columns; hooks are linear, sensors are not."""
+
+    def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:
+        self.segment, self.model, self.values = segment, model, values
+        self.x = operate(segment, segment.recorded, model, values)
+        pieces = self.pieces = evaluate(model, self.x, values)
+        self.own: dict[str, Pieces] = {}
+        self.paced: dict[float, Array] = {}
+        self.mean = mean_current(self.x, values)
+        self.start = predicted(segment, self.x, pieces, model, values)
+        self.here = measured(segment, segment.recorded, model, values) - self.start
+        # a hook's own column does without the small terms between samples
+        self.quiet = {**values, "j_kgm2": 0.0, **dict.fromkeys(RIPPLES + TORQUE_RIPPLES, 0.0)}
+
+    def change(self, column: Column) -> Array | None:
+        """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
+        if column.effect is None:
+            return self._base(column)
+        if self.segment.kind == "lcr":
+            return self._anew(column, column.effect)
+        if not hears(self.segment, column.effect):
+            return None
+        if column.effect.hook == "sensor":
+            return self._anew(column, column.effect)
+        return self._hook(column, column.effect)
+
+    def _base(self, column: Column) -> Array | None:
+        if column.name in GAINS:
+            return self._gain(column)
+        if column.name not in HEARS[self.segment.kind].constants:
+            return None
+        step = column.step
+        if column.name == "j_kgm2":
+            # a coasting shaft goes by 1 / J: a step must be small against what J has come to
+            step = min(step, _FINE * self.values[column.name])
+        moved = {**self.values, column.name: self.values[column.name] + step}
+        if column.name == "bench_angle_rad":
+            return (residual(self.segment, self.model, moved) - self.here) / step
+        x = replace(self.x, base=moved)
+        pieces = self.pieces
+        if column.name not in _BETWEEN:
+            pieces = evaluate(self.model, x, moved)
+        there = predicted(self.segment, x, pieces, self.model, moved)
+        if column.name == "j_kgm2" and over_inertia(self.segment, self.segment.channels[-1]):
+            # the slope of 1/J, not of its chord: friction over inertia is known better than 1e-3
+            step *= self.values[column.name] / moved[column.name]
+        return -(there - self.start) / step
+
+    def _gain(self, column: Column) -> Array | None:
+        """Along a gain of the station: of the prediction, or what it does to current and heat."""
+        heard = {
+            "gain_torque": hears_sensor(self.segment, "load"),
+            "gain_lcr": self.segment.kind == "lcr",
+            "gain_current": hears_sensor(self.segment, "current"),
+            "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
+            "gain_clock": hears_sensor(self.segment, "clock"),
+            self.segment.meter: hears_sensor(self.segment, "voltage"),
+        }
+        if not heard.get(column.name, False):
+            return None
+        if column.name == "gain_clock":
+            return self._along_time(column.step)
+        moved = {**self.values, column.name: self.values[column.name] + column.step}
+        if column.name in ("gain_current", "offset_temp_k"):
+            return (residual(self.segment, self.model, moved) - self.here) / column.step
+        there = predicted(self.segment, self.x, self.pieces, self.model, moved)
+        return -(there - self.start) / column.step
+
+    def _anew(self, column: Column, effect: Effect) -> Array | None:
+        inside = effect in self.model.effects
+        model = self.model if inside else self.model.with_effects(effect)
+        start = self._start(column, effect)
+        moved = {**start, column.name: start[column.name] + column.step}
+        if effect.clock is not None:
+            recorder = RECORDER.get(self.segment.kind)
+            gains = [clock_gain(recorder, model, values) for values in (start, moved)]
+            return self._along_time(column.step) * (gains[1] - gains[0]) / column.step
+        change: Array = (self._there(effect, model, moved) - self.here) / column.step
+        return change if np.any(change) else None
+
+    def _along_time(self, step: float) -> Array:
+        """d(residual)/d(gain of the clock) [C, n], once for all candidates that turn on it."""
+        if step not in self.paced:
+            moved = {**self.values, "gain_clock": self.values["gain_clock"] + step}
+            self.paced[step] = (residual(self.segment, self.model, moved) - self.here) / step
+        return self.paced[step]
+
+    def _there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
+        """The residual where an effect has moved. An error of a voltage or a torque leaves the
+        machine's state, and what its hooks gave, as they are.
+        """
+        if effect.hook != "sensor" or effect.angle is not None or effect.current is not None:
+            return residual(self.segment, model, moved)
+        there = predicted(self.segment, self.x, self.pieces, model, moved)
+        return measured(self.segment, self.segment.recorded, model, moved) - there
+
+    def _start(self, column: Column, effect: Effect) -> dict[str, float]:
+        """The values that a column departs from; an effect not in the model is not there."""
+        if effect in self.model.effects:
+            return self.values
+        return {**self.values, **zero(effect, self.model, column.at)}
+
+    def _hook(self, column: Column, effect: Effect) -> Array | None:
+        start = self._start(column, effect)
+        moved = {**start, column.name: start[column.name] + column.step}
+        change = self._pieces(effect, moved)
+        if effect in self.model.effects:
+            if effect.name not in self.own:
+                self.own[effect.name] = self._pieces(effect, start)
+            before = self.own[effect.name]
+            change = Pieces(
+                change.psi_wb - before.psi_wb,
+                change.slope_wb - before.slope_wb,
+                change.drop_v - before.drop_v,
+                change.drag_nm - before.drag_nm,
+            )
+        if effect.hook == "torque" and self.segment.kind == "dq":
+            # a drag is in the torque alone: no voltage needs to be predicted for it
+            drag = np.zeros_like(self.start)
+            drag[-1] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
+            return drag if np.any(drag) else None
+        plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
+        if self.segment.kind in ("q", "shaft", "motion", "standing"):
+            still = self._pieces_of_nothing()
+            there = predicted(self.segment, self.x, change, plain, self.values) - predicted(
+                self.segment, self.x, still, plain, self.values
+            )
+        else:
+            there = predicted(self.segment, self.x, change, plain, self.quiet)
+        return -there / column.step if np.any(np.abs(there) > _NOTHING) else None
+
+    def _pieces_of_nothing(self) -> Pieces:
+        nothing = np.zeros(self.x.omega_rad_s.shape)
+        still: Complex = nothing.astype(np.complex128)
+        return Pieces(still, nothing, still, nothing)
+
+    def _pieces(self, effect: Effect, values: Values) -> Pieces:
+        q = values_of(effect, self.model.machine, values)
+        x: Operating = self.x
+        shape = x.omega_rad_s.shape
+        nothing = np.zeros(shape)
+        flux, slope = effect_flux(effect, x, q)
+        still: Complex = nothing.astype(np.complex128)
+        drop = still if effect.drop is None else effect.drop(self.mean, q)
+        drag = nothing if effect.torque is None else effect.torque(x, q)
+        return Pieces(flux, slope, drop, drag)
+
+
+def base_columns(scales: Mapping[str, float]) -> list[Column]:
+    """One column a base constant, with the step of its finite difference."""
+    return [Column(c.name, 1e-3 * scales.get(c.name, 1.0)) for c in BASE]
+
+
+def effect_columns(
+    effect: Effect, model: Model, at: tuple[tuple[str, float], ...] = ()
+) -> list[Column]:
+    """One column a parameter: amplitudes, and shapes too once the effect is in the model."""
+    inside = effect in model.effects
+    made = []
+    for p in effect.parameters_of(model.machine):
+        if p.amplitude or (inside and not p.choice):
+            step = max(p.negligible, 1e-2 * p.typical) * model.machine.scale(p)
+            made.append(Column(f"{effect.name}.{p.name}", step, effect, at))
+    return made

@@ -1,0 +1,301 @@
+"""Mains hum in the recordings: found at its own frequencies, and taken as noise from then on.
+
+A line at 50 or 60 Hz, or a harmonic, that stands out of the residuals of several captures, whatever
+the shaft does there, is the building's and not the machine's. Every capture may then have it, of
+that size and of any phase.
+
+Reference: Kay, Fundamentals of Statistical Signal Processing II (1998), section 7.6.3, a sinusoid
+of unknown phase in noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import PAIR_RAD, Segment, clock
+from pipeline.criticism.effect import Array, Machine, Values
+from pipeline.criticism.equations.residuals import disturbed, residual
+from pipeline.criticism.machine.model import Model
+
+LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
+"""Mains of 50 and 60 Hz, and their second and third harmonics."""
+_BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
+"""Bins at either side that a line is held against: from the fifth on, clear of two Hann windows."""
+_CYCLES = 8.0
+"""Cycles that a recording must have of a line for bins to be there at either side of it."""
+_LOBE = 3
+"""Bins from a peak to where the skirt of a Hann window is low: in 200 ms, 50 and 60 Hz are two."""
+_CYCLES_EACH = 2.0
+"""Cycles of 50 Hz that a run must hold for its own mean to be free of the line. By judgement."""
+_STANDS_OUT = 20.0
+"""Power over that beside it: of white noise, one bin in e^14 has as much."""
+_SEEN = 4.0
+"""Median of that ratio over a signal's captures, from which on the signal has the line: less than
+what proves the mains, since that they are there is known by then. By judgement."""
+_CAPTURES = 3
+"""Captures that must have a line: what one or two tests are like there is their own."""
+_SLIDE = 0.03
+"""Share of its mean that a speed may vary by while orders of the turn are lines."""
+_PARTS = 8
+"""Parts of a recording that a line must be alike in: of eight, chance gives one sine an eighth."""
+_FINER = 2
+"""Points of the spectrum a bin, by zeros behind the record: between bins a Hann window's line
+loses up to 1.4 dB, between these 0.35 dB."""
+_STEADY = 0.5
+"""Of the share that one sine of that power has: below, its phase or size changed on the way."""
+_LARGEST = 0.01
+"""Of the machine's voltage or torque: more is no pick-up in a station that anybody would use."""
+_EVEN = 0.02
+"""Share that the time between two steps of a test may vary by while their rate makes lines."""
+_LINE_RAD = {"vab_v": PAIR_RAD["ab"], "vbc_v": PAIR_RAD["bc"], "vca_v": PAIR_RAD["ca"]}
+"""Where each line voltage of an open winding stands [rad, electrical]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hum:
+    """A line that the recordings of one signal share: frequency [Hz], rms [the signal's unit].
+
+    `kind` is that of the equations: terminals, drive and slow turn have instruments of their own.
+    """
+
+    kind: str
+    signal: str
+    freq_hz: float
+    rms: float
+
+
+def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Hum, ...]:
+    """The mains lines of every signal, from the residuals around a rough fit.
+
+    A line is there if its power is 20 times that beside it in three captures, in whatever signals.
+    A signal then has the line if it stands out there in half of the captures that can show it. A
+    capture cannot if an order of its turning shaft, or the rate of a map's levels, is too near.
+    """
+    powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
+    clear: dict[float, set[str]] = defaultdict(set)
+    for segment in segments:
+        spectrum = _Spectrum.of(segment)
+        if segment.weak is None or not spectrum.weight.any():
+            continue
+        lines = [
+            f
+            for f in LINES_HZ
+            if spectrum.duration_s * f >= _CYCLES
+            and 2.2 * f * segment.ts_s < 1.0
+            and not _turns_at(segment, f)
+            and not spectrum.repeats_at(f)
+        ]
+        for channel, one in _as_sensed(segment, model, values).items():
+            most = (_LARGEST * _whole(channel, model.machine)) ** 2
+            for freq, seen in zip(lines, spectrum.lines(one, lines, most), strict=True):
+                powers[segment.kind, channel, freq].append(seen)
+                if seen[0] > _STANDS_OUT * seen[1]:
+                    clear[freq].add(segment.capture)
+    ratios = {
+        key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
+    }
+    there = {freq for freq, captures in clear.items() if len(captures) >= _CAPTURES}
+    return tuple(
+        Hum(*key, math.sqrt(float(np.median([line for line, _ in powers[key]]))))
+        for key, ratio in ratios.items()
+        if key[-1] in there and float(np.median(ratio)) > _SEEN
+    )
+
+
+def with_hum(
+    segments: Sequence[Segment], heard: Sequence[Hum], model: Model, values: Values
+) -> tuple[Segment, ...]:
+    """The segments, each knowing the lines that its channels may have.
+
+    A sensor of current may pick up as much as one of voltage, both in multiples of their noise. The
+    model says what that does: its share of a torque grows with the current.
+    """
+    return tuple(_humming(segment, heard, model, values) for segment in segments)
+
+
+def told_hum(heard: Sequence[Hum]) -> tuple[str, ...]:
+    """A note on every signal with mains hum in it."""
+    notes = []
+    for signal in dict.fromkeys(hum.signal for hum in heard):
+        mine = [hum for hum in heard if hum.signal == signal]
+        lines = ", ".join(f"{freq:g}" for freq in sorted({hum.freq_hz for hum in mine}))
+        rms = max(hum.rms for hum in mine)
+        notes.append(f"mains hum in {signal} at {lines} Hz, {rms:.2g} rms: taken as noise")
+    return tuple(notes)
+
+
+def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Values) -> Segment:
+    weak = segment.weak
+    mine = [h for h in heard if h.kind == segment.kind and h.signal in _sensors(segment)]
+    if weak is None or not mine:
+        return segment
+    lines = []
+    for hum in mine:
+        waves = hum.rms * _waves(segment, hum.freq_hz)
+        if segment.kind == "open":
+            lines.append(disturbed(segment, weak, model, values, hum.signal, waves))
+            continue
+        both = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
+        both[:, segment.channels.index(hum.signal)] = weak.project(waves)
+        lines.append(both)
+    for name, rms, freq in _in_currents(segment, mine):
+        waves = rms * _waves(segment, freq)
+        lines.append(disturbed(segment, weak, model, values, name, waves))
+    return replace(segment, lines=np.concatenate(lines))
+
+
+def _sensors(segment: Segment) -> tuple[str, ...]:
+    """Signals that hum is in: the channels, of an open winding its line voltages."""
+    if segment.kind != "open":
+        return segment.channels
+    return tuple(name for name in _LINE_RAD if name in segment.recorded)
+
+
+def _as_sensed(segment: Segment, model: Model, values: Values) -> dict[str, Array]:
+    """Residual [n] of every sensor; what the rotor's frame turns at its speed, turned back."""
+    left = residual(segment, model, values)
+    if segment.kind != "open":
+        return dict(zip(segment.channels, left, strict=True))
+    eps = model.machine.pole_pairs * segment.recorded["theta_mech_rad"] - values["bench_angle_rad"]
+    winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))
+    return {name: (winding * np.exp(-1j * _LINE_RAD[name])).real for name in _sensors(segment)}
+
+
+def _in_currents(segment: Segment, mine: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:
+    """Name, rms [A] and frequency of what the current sensors may have of a voltage's lines."""
+    sensed = [h for h in mine if segment.noise.get(h.signal, 0.0) > 0.0 and "_v" in h.signal]
+    for freq in sorted({h.freq_hz for h in sensed}):
+        times = max(h.rms / segment.noise[h.signal] for h in sensed if h.freq_hz == freq)
+        for name, sigma in segment.noise.items():
+            if sigma > 0.0 and name.startswith("i"):
+                yield name, times * sigma, freq
+
+
+def _waves(segment: Segment, freq_hz: float) -> Array:
+    """Cosine and sine [2, n] of a line over a segment, of an rms of one."""
+    turn = 2.0 * math.pi * freq_hz * clock(segment)
+    return math.sqrt(2.0) * np.stack([np.cos(turn), np.sin(turn)])
+
+
+@dataclass(frozen=True, slots=True)
+class _Spectrum:
+    """Where a segment's samples stand on an even clock of `bins` periods: `runs` without a gap,
+    `place` [n] of every sample; `weight` [n] is a Hann window over each run, and over the whole.
+    """
+
+    ts_s: float
+    bins: int
+    runs: tuple[slice, ...]
+    place: NDArray[np.int64]
+    weight: Array
+
+    @classmethod
+    def of(cls, segment: Segment) -> _Spectrum:
+        """Of the segment's own clock; what is beside a gap is of no equation, and hardly counts."""
+        time = clock(segment)
+        place = np.rint((time - time[0]) / segment.ts_s).astype(np.int64)
+        ends = [0, *(np.flatnonzero(np.diff(place) > 1) + 1).tolist(), place.size]
+        weight = np.zeros(place.size)
+        for first, last in pairwise(ends):
+            weight[first:last] = np.hanning(last - first + 2)[1:-1]
+        runs = tuple(slice(*both) for both in pairwise(ends))
+        weight *= np.hanning(int(place[-1]) + 3)[1:-1][place]
+        return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight)
+
+    @property
+    def duration_s(self) -> float:
+        """From the first sample to the last [s]."""
+        return self.bins * self.ts_s
+
+    def repeats_at(self, freq_hz: float) -> bool:
+        """Whether this frequency is a multiple of the rate of the runs: whatever is alike after
+        every step of a test makes a line there.
+        """
+        starts = self.place[[run.start for run in self.runs]]
+        if starts.size < _CAPTURES:
+            return False
+        gaps = np.diff(starts)
+        usual = float(np.median(gaps))
+        if np.mean(np.abs(gaps - usual) < _EVEN * usual) < 0.5:
+            return False
+        cycles = freq_hz * usual * self.ts_s
+        return abs(cycles - round(cycles)) * starts.size < 2.0
+
+    def lines(
+        self, signal: Array, freqs_hz: Sequence[float], most: float
+    ) -> list[tuple[float, float]]:
+        """Mean square of each line in a signal [n], and of what lies beside it.
+
+        A peak is no line if its size or phase changes on the way, if it is more than `most`, or if
+        it is the skirt of a stronger one beside it. Its mean square is then that beside it.
+        """
+        flat = self.weight * self._about_its_mean(signal)
+        whole = np.zeros(_FINER * self.bins)
+        whole[self.place] = flat
+        power = 2.0 * (np.abs(np.fft.rfft(whole)) / self.weight.sum()) ** 2
+        told = []
+        for freq in freqs_hz:
+            middle = round(_FINER * freq * self.duration_s)
+            beside = middle + _FINER * np.array(_BESIDE)
+            beside = beside[(beside > 0) & (beside < power.size)]
+            level = max(float(np.median(power[beside])), 1e-300)
+            first = middle - _FINER
+            top = first + int(np.argmax(power[first : middle + _FINER + 1]))
+            line = float(power[top])
+            one_sine = line / (line + _PARTS * level)
+            skirt = power[max(middle - _LOBE * _FINER, 0) : middle + _LOBE * _FINER + 1].max()
+            if skirt > min(line, most) or self._share(flat, top) < _STEADY * one_sine:
+                line = level
+            told.append((line, level))
+        return told
+
+    def _about_its_mean(self, signal: Array) -> Array:
+        """A signal [n] less the mean of each run that holds two cycles of any line. With the gaps
+        between them, runs of different means would make lines.
+        """
+        level = np.full_like(signal, float(np.average(signal, weights=self.weight)))
+        for run in self.runs:
+            if (run.stop - run.start) * self.ts_s * LINES_HZ[0] > _CYCLES_EACH:
+                level[run] = float(np.average(signal[run], weights=self.weight[run] + 1e-12))
+        return signal - level
+
+    def _share(self, flat: Array, line: int) -> float:
+        """Share of a line's power, summed over eight parts of a recording, that one sine has.
+
+        About line / (line + 8 level) where there is one, an eighth where there is none.
+        """
+        wave = flat * np.exp(-2j * np.pi * line / (_FINER * self.bins) * self.place)
+        part = np.minimum(self.place * _PARTS // self.bins, _PARTS - 1)
+        size = np.bincount(part, self.weight, _PARTS)
+        seen = np.bincount(part, wave.real, _PARTS) + 1j * np.bincount(part, wave.imag, _PARTS)
+        there = size > 0.0
+        power = float((np.abs(seen[there]) ** 2 / size[there]).sum())
+        return float(np.abs(seen.sum()) ** 2 / size.sum()) / max(power, 1e-300)
+
+
+def _whole(channel: str, machine: Machine) -> float:
+    """The machine's own voltage or torque [the channel's unit]; of other signals no end."""
+    scale = {"v": "voltage_v", "nm": "torque_nm"}.get(channel.rsplit("_", 1)[-1], "")
+    return machine.scales.get(scale, math.inf)
+
+
+def _turns_at(segment: Segment, freq_hz: float) -> bool:
+    """Whether an order of a steadily turning shaft may make a line of this frequency."""
+    theta = segment.recorded.get("theta_mech_rad")
+    if theta is None or segment.kind in ("terminal", "lcr"):
+        return False
+    time = clock(segment)
+    speed = np.gradient(theta, time) / (2.0 * math.pi)
+    mean = float(np.abs(speed.mean()))
+    duration = float(time[-1] - time[0])
+    if mean * duration < 0.5 or float(speed.std()) > _SLIDE * mean:
+        return False
+    order = freq_hz / mean
+    return abs(order - round(order)) * mean * duration < 2.0 and order < 100.0

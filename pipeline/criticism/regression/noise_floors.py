@@ -1,0 +1,298 @@
+"""What no model of a bench gets right to: noise of the sensors, reading errors, offsets, form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment, projected, row_index
+from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
+from pipeline.criticism.effect import Array, Effect, Operating, Values
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.equations.true_signals import operate
+from pipeline.criticism.machine.model import Model, evaluate, zero
+
+_REPLICATES, _POOLED = 2, 128
+"""Times that noise is added at the least, and weak samples of a group that are then pooled: a floor
+is known to some 6 %, the root of 1/(2·128). Fewer make a floor of chance, more cost time."""
+_SHIFTS = 16
+"""Shifts of a coarse signal at the least: all its rounding can do depends on the shift."""
+_ALLOWANCE, _MODEL_DRIVE, _MODEL_BENCH = 5e-5, 1e-4, 2e-5
+"""Of the reading, and of the machine's own scale under a drive and on a bench: what no sensor and
+no equation is better than, by judgement. Smaller, and structure of no concern names effects;
+larger, and effects hide: half of the reference captures' floors is this allowance."""
+_OFFSET = 0.5
+"""Prior of a sensor's offset in one capture, in standard deviations of its noise. By judgement:
+a larger one lets offsets explain a drag, with none an offset passes for an effect."""
+_ZERO = 2e-3
+"""Prior of a terminal voltage's offset, as a share of its largest reading. By judgement: with
+none, the zero of a bench's voltmeter passes for a drop."""
+_ROUGH = 0.05
+"""Of the machine's own scale, how far equations may be off in a rough fit. By judgement: smaller,
+and equations far off are given up before the constants are near."""
+FORM = 0.02
+"""Of what an effect does, what its formula may be wrong by. By judgement: smaller, and the tail of
+a wrong form is named as a further effect; larger, and small effects beside it are lost."""
+_LINE = 0.03
+"""Steps of the encoder that a harmonic of its rounding has: 1/(10 π), the tenth of a saw-tooth."""
+_JUMP = 8.0
+"""Standard deviations of its noise from which on a bend of the voltage is a jump. White
+noise comes to 6 in a log of 1e5 samples."""
+_WHEN = 0.25
+"""Sample periods that a jump's instant is known to: 1/√12 = 0.29 for one that may be anywhere
+in between. With none, seven of the benchmark's twenty ties were named wrong, with this two."""
+_CREEPS, _REST_S = 1e-3, 5e-3
+"""Share of the machine's largest speed below which, for so long, friction may hold the shaft."""
+
+
+def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
+    """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
+
+    Noise is added to the recording and the residual computed again; the variance of the change is
+    pooled over the windows of one (channel, order). The noise is white, of each sensor's own level;
+    an angle that is rounded, and signals that are coarse, are rounded anew besides.
+    """
+    group, _, valid, groups = row_index(segment)
+    plain = projected(segment, residual(segment, model, values))
+    total, count = np.zeros(len(groups)), np.zeros(len(groups))
+    wanted = _POOLED // max(int(valid.sum()) // max(len(groups), 1), 1)
+    replicates = min(max(wanted, _REPLICATES), _POOLED)
+    if segment.steps:
+        replicates = max(replicates, _SHIFTS)
+    shifts = _shifts(segment, replicates, seed)
+    smooth = {name: unrounded(segment.recorded[name], q) for name, q in segment.steps.items()}
+    for replicate in range(replicates):
+        generator = np.random.default_rng([seed, replicate])
+        noisy = {
+            name: column + generator.normal(0.0, _white(segment, name), column.size)
+            for name, column in segment.recorded.items()
+        }
+        for name, step in segment.steps.items():
+            noisy[name] += rounding_error(smooth[name], step, shifts[name][replicate])
+        if segment.angle_step_rad:
+            theta = segment.recorded["theta_mech_rad"]
+            shift = generator.uniform(-0.5, 0.5)
+            noisy["theta_mech_rad"] = theta + rounding_error(theta, segment.angle_step_rad, shift)
+        change = projected(segment, residual(segment, model, values, noisy)) - plain
+        np.add.at(total, group[valid], change[valid] ** 2)
+        np.add.at(count, group[valid], 1.0)
+    return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
+
+
+def _white(segment: Segment, name: str) -> float:
+    """Standard deviation of a column's noise, without the rounding that follows the signal."""
+    rounding = segment.steps.get(name, 0.0) / math.sqrt(12.0)
+    return math.sqrt(max(segment.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
+
+
+def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
+    """Parts of a step [count] by which coarse signals are moved to be rounded anew.
+
+    They are evenly spread, since the error of a steady signal depends on the shift alone, and every
+    signal has them in an order of its own.
+    """
+    even = (np.arange(count) + 0.5) / count - 0.5
+    generator = np.random.default_rng([seed, count])
+    return {name: generator.permutation(even) for name in segment.steps}
+
+
+def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
+    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
+    _, _, _, groups = row_index(segment)
+    scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
+    floor: Array = _ROUGH * window_gain(segment) / told_unit(segment, values) * np.array(scales)
+    return floor
+
+
+def form_tolerance(
+    segment: Segment,
+    model: Model,
+    values: Values,
+    added: Sequence[Effect],
+    share: float = FORM,
+) -> Array:
+    """What the forms of the effects that were added may be wrong by [groups], as weak samples.
+
+    No formula of an effect is right to better than a fiftieth of what the effect does (`share`).
+    Where a found effect acts, an error below that is one of its form, and names no further effect.
+    """
+    group, _, valid, groups = row_index(segment)
+    total = np.zeros(len(groups))
+    here = residual(segment, model, values) if added else np.zeros(0)
+    for effect in added:
+        without = residual(segment, model, {**values, **zero(effect, model)})
+        power = projected(segment, without - here)[valid] ** 2
+        count = np.bincount(group[valid], minlength=len(groups))
+        total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
+    floor: Array = share * np.sqrt(total)
+    return floor
+
+
+def reading_error(
+    segment: Segment, model: Model, values: Values, state: Operating | None = None
+) -> Array:
+    """The error that any model of a bench is allowed, as weak samples [C, W, M]; `state` is the
+    segment's true state [n], where it is known already.
+
+    It is 5e-5 of the reading in a window, since no sensor is more linear, and for what happens
+    between samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. An
+    effect that hides in this is nobody's concern, and smaller structure names nothing.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros((len(segment.channels), segment.size, 1))
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+    sizes = []
+    for channel in segment.channels:
+        if channel == "torque_shaft_nm" and segment.kind == "dq":
+            sizes.append(kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"]))
+        elif channel in ("vd_v", "vq_v"):
+            names = ("vd_v", "vq_v") if segment.kind in ("dq", "q") else ("vab_v", "vbc_v")
+            present = [segment.recorded[n] for n in names if n in segment.recorded]
+            sizes.append(np.sqrt(sum(column**2 for column in present)))
+        else:
+            sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
+    reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
+    reading[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
+    part = _MODEL_DRIVE if segment.kind in ("dq", "q", "motion") else _MODEL_BENCH
+    scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
+    own = part * window_gain(segment) / told_unit(segment, values) * np.array(scales)[:, None, None]
+    both: Array = np.hypot(reading, own)
+    if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
+        place = segment.channels.index("torque_shaft_nm")
+        both[place] = np.hypot(both[place], _encoder_lines(segment, values))
+        x = operate(segment, segment.recorded, model, values) if state is None else state
+        both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values, x))
+    if segment.kind == "dq":
+        jumps = _jumps(segment)[:, None]
+        for place, channel in enumerate(segment.channels):
+            if channel in ("vd_v", "vq_v"):
+                both[place] = np.hypot(both[place], jumps)
+    return both
+
+
+def _jumps(segment: Segment) -> Array:
+    """Error [W] that a jump of the voltage may make, as weak samples: a quarter of it for a sample.
+
+    A log says what the voltage was at its samples, not when within a period it changed.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    voltage = segment.recorded["vd_v"] + 1j * segment.recorded["vq_v"]
+    noise = math.hypot(segment.noise["vd_v"], segment.noise["vq_v"])
+    bend = np.zeros(voltage.size)
+    # a jump bends the line twice, there and back
+    bend[1:-1] = np.abs(np.diff(voltage, 2)) / math.sqrt(2.0)
+    bend[bend < _JUMP * noise] = 0.0
+    rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
+    error: Array = _WHEN * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    return error
+
+
+def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Array:
+    """Error [W] that friction may make where the shaft rests or creeps, as weak samples of torque.
+
+    Whatever the log says of its speed, a shaft that sticks is held by anything between plus and
+    minus its friction [Armstrong-Hélouvry (1991), ch. 4]: T/√3, a rectangle's standard deviation.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros(segment.size)
+    slow = _CREEPS * model.machine.scales["speed_rad_s"]
+    creeping = np.flatnonzero(_lasting(np.abs(x.omega_rad_s) < slow, round(_REST_S / x.ts_s)))
+    if creeping.size < 2:
+        return np.zeros(weak.starts.size)
+    known = dict(values)
+    for effect in model.effects:
+        known = {**zero(effect, model), **known}
+    there = x.at(creeping)
+    onward, back = (
+        evaluate(model, replace(there, omega_rad_s=np.full(creeping.size, speed)), known).drag_nm
+        for speed in (slow, -slow)
+    )
+    grip = np.zeros(segment.size)
+    grip[creeping] = 0.5 * np.abs(onward - back) / math.sqrt(3.0)
+    out: Array = np.abs(weak.project(grip[None])[0, :, 0])
+    return out
+
+
+def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """The samples [n] that are in a run of at least so many: a reversal on the way is no rest."""
+    edges = np.flatnonzero(np.diff(which.astype(np.int8), prepend=0, append=0))
+    lasting = np.zeros(which.size, dtype=bool)
+    for first, end in edges.reshape(-1, 2).tolist():
+        lasting[first:end] = end - first >= least
+    return lasting
+
+
+def _encoder_lines(segment: Segment, values: Values) -> Array:
+    """Torque [W, M] that a line of the encoder's own error makes on an order k, as weak samples.
+
+    Rounding at steady speed is periodic in the angle, and some of its harmonics beat with the
+    sampling on to any order k. The 10th has 0.03 steps [Widrow & Kollar (2008), ch. 20], and makes
+    a torque of J (k ω)² times that.
+    """
+    weak = segment.weak
+    if weak is None:
+        return np.zeros((segment.size, 1))
+    theta = segment.recorded["theta_mech_rad"]
+    span = (weak.length - 1) * segment.ts_s
+    omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
+    step = math.sqrt(12.0) * segment.noise["theta_mech_rad"]
+    wave = window_gain(segment) / math.sqrt(2.0) * _LINE * step * values["j_kgm2"]
+    lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
+    return lines
+
+
+def channel_scale(segment: Segment, channel: str, model: Model, values: Values) -> float:
+    """The machine's own size in a channel's unit; of a bench meter its largest reading."""
+    if channel == "torque_shaft_nm":
+        return model.machine.scales["torque_nm"]
+    if channel == "omega_mech_rad_s" and segment.kind == "q":
+        return model.machine.scales["speed_rad_s"]
+    if channel == "omega_mech_rad_s":
+        return model.machine.scales["torque_nm"] / values["j_kgm2"]
+    if segment.kind in ("dq", "q", "open", "steady"):
+        return model.machine.scales["voltage_v"]
+    # an axis that stands still has the scale of the other one
+    beside = segment.channels if segment.kind == "flux_map" else (channel,)
+    return max(float(np.abs(segment.recorded[name]).max()) for name in beside)
+
+
+def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
+    """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
+    offset of each channel's sensor, mains lines and wander.
+    """
+    made = [] if segment.lines is None else [line[valid] * whiten for line in segment.lines]
+    if segment.offsets is not None:
+        own = [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
+        return own + made
+    if segment.weak is None:
+        return []
+    for place, channel in enumerate(segment.channels):
+        names = ("vab_v",) if segment.kind == "open" else (channel,)
+        prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
+        if segment.kind == "terminal":
+            prior = math.hypot(prior, _ZERO * float(np.abs(segment.recorded[channel]).max()))
+        if segment.kind == "open" or prior == 0.0:
+            continue
+        constant = np.zeros((len(segment.channels), segment.size))
+        constant[place] = prior
+        made.append(projected(segment, constant)[valid] * whiten)
+    return made
+
+
+def told_unit(segment: Segment, values: Values) -> float:
+    """The channel's own unit a unit of the residual: a free shaft's is an acceleration [rad/s²]."""
+    return values["j_kgm2"] if segment.kind == "motion" else 1.0
+
+
+def window_gain(segment: Segment) -> float:
+    """Weak sample that a constant of one makes in the plain window."""
+    weak = segment.weak
+    return 1.0 if weak is None or weak.starts.size == 0 else float(weak.functions[0, 0].sum())

@@ -1,0 +1,161 @@
+"""The ladder of one campaign: by what its equations look at, and by what its instruments do.
+
+An order that no equation looks at, or an instrument that wanders, is left over whatever is added;
+so the ladder is climbed once more where either is found, and the end that is told is the last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.discovery.unknown_structure import unknown_structure
+from pipeline.criticism.effect import Effect, Machine
+from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
+from pipeline.criticism.regression.linear_system import own_columns
+from pipeline.criticism.selection.drift import SIZE, wandering
+from pipeline.criticism.selection.order_scan import orders_left
+from pipeline.criticism.selection.requested_model import Begun, fit_of
+from pipeline.criticism.selection.stepwise import Rung, search
+from pipeline.criticism.selection.truncation import denied, explained, trusted
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.diagnosis import Remainder, UnknownStructure
+
+_WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
+_WITHIN = (
+    "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
+    "capture shows it: whatever changes as slowly looks the same; record that test once more"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Ladder:
+    """The rungs as far as they are trusted and where they began, their held-out errors, what is
+    `left` at their end, and every effect that would take some of that and was `cut`: with a note
+    where captures speak against it, with none where it would be a guess.
+    """
+
+    begun: Begun
+    rungs: tuple[Rung, ...]
+    held: list[HeldOut]
+    left: tuple[Remainder, ...]
+    cut: dict[str, str]
+
+    def explains(self, left: Sequence[Remainder]) -> bool:
+        """Whether its names explain what the captures show, but for what is `left`."""
+        return explained(self.rungs, self.held, left)
+
+    def large(self) -> tuple[Remainder, ...]:
+        """What is left and large for the machine as a whole.
+
+        What matters only beside the little voltage that there is at standstill may be an
+        instrument's wander as well as the machine: it is told where some state of the machine
+        predicts it.
+        """
+        around = self.rungs[-1].around
+        large = remainder(around, self.begun.segments, around.residual, large=True)
+        return tuple(one for one in self.left if one in large)
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """The last ladder, what it leaves that is told, the sketch of that, and notes on both."""
+
+    ladder: Ladder
+    left: tuple[Remainder, ...]
+    sketch: UnknownStructure | None
+    notes: tuple[str, ...]
+
+
+def ended(
+    campaign: Campaign,
+    model: ModelSpec,
+    machine: Machine,
+    begun: Begun,
+    library: Mapping[str, Effect],
+    name: str,
+) -> End:
+    """Climbs, once more with instruments that wander where no state of the machine predicts what is
+    left, and sketches what nothing explains as an effect of some `name`; `begun` is the fit of the
+    model to the campaign's segments.
+    """
+
+    def climb(*orders: float) -> Ladder:
+        if not orders:
+            return climbed(begun, library)
+        wider = replace(machine, load_orders=orders)
+        return climbed(fit_of(segments(campaign, wider), model_of(model, wider)), library)
+
+    ladder, sketch = _by_orders(climb, name)
+    left, notes = ladder.left, []
+    if sketch is None:
+        calm = _calmed(ladder, library)
+        if calm is not None:
+            ladder, left = calm, calm.large()
+            sketch = _sketched(ladder, left, name)
+            notes.append(_WANDER)
+    if sketch is None:
+        sketch = _sketched(ladder, left, name, in_parts=True)
+        left = left if sketch else ladder.large()
+        notes += [_WITHIN] if sketch else []
+    return End(ladder, left, sketch, tuple(notes))
+
+
+def _by_orders(climb: Callable[..., Ladder], name: str) -> tuple[Ladder, UnknownStructure | None]:
+    """The ladder, and a sketch of what it leaves, with rows for the orders a turn that a first one
+    leaves unseen.
+
+    Steps of a programme make lines of any order too, and these predict no other capture: orders
+    that are no whole numbers join where they alone give a sketch.
+    """
+    ladder = climb()
+    unlooked = orders_left(ladder.begun.segments, ladder.rungs[-1].around)
+    whole = tuple(order for order in unlooked if isinstance(order, int))
+    if whole:
+        ladder = climb(*whole)
+    sketch = _sketched(ladder, ladder.left, name)
+    if sketch is None and len(unlooked) > len(whole) and not ladder.explains(ladder.left):
+        between = climb(*unlooked)
+        sketch = _sketched(between, between.left, name)
+        ladder = between if sketch is not None else ladder
+    return ladder, sketch
+
+
+def _calmed(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
+    """The ladder of instruments that wander; None where nothing large is left, or none does."""
+    large = ladder.large()
+    if ladder.explains(large):
+        return None
+    calm = wandering(ladder.begun.segments, ladder.rungs[-1].fitted, large)
+    if calm is None:
+        return None
+    return climbed(Begun(calm, *gauss_newton(calm, ladder.begun.fitted), ladder.begun.hum), library)
+
+
+def climbed(start: Begun, library: Mapping[str, Effect]) -> Ladder:
+    """The ladder from a model fitted, as far as it is trusted."""
+    found = start.segments
+    rungs = search(found, start.fitted, library)
+    alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
+    kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
+    held = in_common([r.around for r in kept], alone[: len(kept)])
+    cut = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
+    return Ladder(start, kept, list(held), left, cut)
+
+
+def _sketched(
+    ladder: Ladder, left: Sequence[Remainder], name: str, in_parts: bool = False
+) -> UnknownStructure | None:
+    """What the structure depends on that no effect explains; None where there is none, or where
+    nothing that the machine does predicts it.
+    """
+    if ladder.explains(left):
+        return None
+    last = ladder.rungs[-1]
+    signals = list(dict.fromkeys(r.signal for r in left))
+    found = ladder.begun.segments
+    return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]

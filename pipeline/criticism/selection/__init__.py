@@ -1,0 +1,1 @@
+"""Which known effects the data ask for: score tests, stepwise search, pruning, alternatives."""

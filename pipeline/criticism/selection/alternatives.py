@@ -1,0 +1,128 @@
+"""What else it could be: each found effect swapped for another, and what would part the two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.selection.discrimination import kin, told_by_wholes
+from pipeline.criticism.selection.score_test import TIE, Candidate
+from pipeline.criticism.selection.stepwise import loss_without, shaped
+
+_NEAR, _MOST = 0.5, 6
+"""Share of what an effect explains that a refit with another in its place may lose to first order,
+and how many are refitted. By judgement: the tangent may be wrong, and each costs a fit."""
+
+
+def rivals_of(
+    name: str,
+    fitted: Fitted,
+    wide: System,
+    offered: Sequence[Candidate],
+    segments: Sequence[Segment],
+    passed_over: Sequence[Candidate] = (),
+) -> tuple[str, ...]:
+    """Effects that explain the captures as well in an effect's place (misfit within 12, and so
+    much of it that is over noise floors and priors).
+
+    Refitted in its place are those that to first order keep half of what it explains, and those
+    that were `passed_over` for it. Effects that share its closer look are rivals if that look does
+    not tell them apart.
+    """
+    effect = next(e for e in fitted.model.effects if e.name == name)
+    alike = kin(effect, {one.effect.name: one.effect for one in offered})
+    ties = [] if told_by_wholes(segments, fitted, effect) else list(alike)
+    grams = wide.grams()
+    lost = loss_without(wide, fitted, (name,), grams=grams)
+    first = len(own_columns(fitted.model))
+    near: dict[str, tuple[float, Candidate]] = {}
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        if candidate.effect.name in alike or not _meet(effect, candidate.effect):
+            continue
+        rise = loss_without(wide, fitted, (name,), places, grams)
+        other = candidate.effect.name
+        if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
+            near[other] = rise, candidate
+    for candidate in passed_over:
+        if candidate.effect.name in alike:
+            continue
+        near.setdefault(candidate.effect.name, (_NEAR * lost, candidate))
+    nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))[:_MOST]
+    for _, candidate in nearest:
+        swapped = _refitted(name, fitted, candidate, segments, wide)
+        if (
+            swapped is not None
+            and swapped.misfit < wide.misfit + TIE
+            and swapped.excess < wide.excess + TIE
+        ):
+            ties.append(candidate.effect.name)
+    return tuple(sorted(ties))
+
+
+def _refitted(
+    name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment], wide: System
+) -> System | None:
+    """The system with a candidate in an effect's place; None without a shape to speak of."""
+    model = fitted.model.without(name).with_effects(candidate.effect)
+    kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{name}.")}
+    start = replace(fitted, model=model, values={**kept, **candidate.values})
+    swapped, around = gauss_newton(segments, start, before=wide)
+    return around if shaped(swapped, candidate.effect) else None
+
+
+def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:
+    """The test or calibration that parts an effect from what it is confused with."""
+    told = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
+    return "; ".join(told) if told else effect.experiment
+
+
+def remedies(
+    effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]
+) -> dict[str, str]:
+    """What the effects themselves declare to part them from each other, by rival."""
+    return {
+        other: effect.rivals.get(other)
+        or library[other].rivals.get(effect.name)
+        or library[other].experiment
+        for other in confused
+    }
+
+
+def detectable(effect: Effect, fitted: Fitted, wide: System, offered: Sequence[Candidate]) -> float:
+    """Signal-to-noise ratio that the captures give an effect of typical size.
+
+    The typical amplitudes over their standard deviations when fitted with all else; the best
+    shape and amplitude count.
+    """
+    first = len(own_columns(fitted.model))
+    own = np.arange(first)
+    machine = fitted.model.machine
+    sizes = {
+        f"{effect.name}.{p.name}": p.typical * machine.scale(p)
+        for p in effect.parameters_of(machine)
+    }
+    best = 0.0
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        if candidate.effect.name != effect.name:
+            continue
+        covariance = wide.covariance(np.concatenate([own, places]))
+        spread = np.sqrt(np.maximum(np.diag(covariance)[own.size :], 0.0))
+        for place, one in zip(places, spread, strict=True):
+            if one > 0 and np.any(wide.matrix[:, place]):
+                best = max(best, sizes[wide.columns[place].name] / float(one))
+    return best
+
+
+def _meet(one: Effect, other: Effect) -> bool:
+    """Whether two effects can reach one signal: drops and drags cannot stand for each other."""
+    return {one.hook, other.hook} != {"drop", "torque"}

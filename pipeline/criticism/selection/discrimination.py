@@ -1,0 +1,98 @@
+"""Effects that windows hardly part, told apart by a closer look at whole drive logs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Effect, Parameter, Told, Values, Whole
+from pipeline.criticism.equations.residuals import measured
+from pipeline.criticism.equations.true_signals import operate
+from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
+from pipeline.criticism.regression.gauss_newton import clipped, gauss_newton
+from pipeline.criticism.regression.linear_system import Fitted, System
+
+
+def told_by_wholes(segments: Sequence[Segment], fitted: Fitted, effect: Effect) -> Told | None:
+    """What the closer look of an effect in the model says; None where it has none, or no logs."""
+    if effect.closer is None:
+        return None
+    model, values = fitted.model.without(effect.name), fitted.values
+    wholes = [_whole(s, model, fitted) for s in segments if s.whole is not None]
+    return effect.closer(wholes, values_of(effect, model.machine, values))
+
+
+def _whole(segment: Segment, model: Model, fitted: Fitted) -> Whole:
+    """One log at full rate, as a model without the effect sees it."""
+    signals = dict(segment.whole or {})
+    good = signals.pop("good") > 0
+    values = fitted.values
+    full = replace(segment, recorded=signals, weak=None)
+    x = operate(full, signals, model, values)
+    drag = evaluate(model, x, values).drag_nm
+    shaft = _undone(measured(full, signals, model, values)[-1], model, values)
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+    noise = segment.noise
+    u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
+    return Whole(x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap)
+
+
+def _undone(recorded: Array, model: Model, values: Values) -> Array:
+    """True shaft torque [n] behind a recorded one: gain and offset of the transducer taken out."""
+    torque = recorded / (1.0 + values["gain_torque"])
+    for effect in reversed(model.effects):
+        if effect.shaft is not None:
+            q = values_of(effect, model.machine, values)
+            rest, one = effect.shaft(np.array([0.0, 1.0]), q)
+            torque = (torque - rest) / (one - rest)
+    return torque
+
+
+def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
+    """The other effects that share an effect's closer look."""
+    if effect.closer is None:
+        return ()
+    return tuple(n for n, e in library.items() if e.closer is effect.closer and n != effect.name)
+
+
+def settled(effect: Effect, told: Told) -> Effect:
+    """The effect with the shapes that whole logs tell: they are known, and no fit moves them."""
+    return replace(effect, parameters=tuple(_known(p, told) for p in effect.parameters))
+
+
+def _known(p: Parameter, told: Told) -> Parameter:
+    if p.name not in told.values or p.amplitude:
+        return p
+    return replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1])
+
+
+def renamed(
+    segments: Sequence[Segment],
+    chosen: tuple[Fitted, System],
+    name: str,
+    library: Mapping[str, Effect],
+) -> tuple[Fitted, System]:
+    """The fit with the effect `name` exchanged for the one that whole logs tell, of those that
+    share its closer look, and with the numbers that these logs tell.
+    """
+    fitted, around = chosen
+    effect = next(e for e in fitted.model.effects if e.name == name)
+    told = told_by_wholes(segments, fitted, effect)
+    if told is None or told.name not in (name, *kin(effect, library)):
+        return chosen
+    truth = settled(library[told.name], told)
+    effects = tuple(truth if e.name == name else e for e in fitted.model.effects)
+    model = replace(fitted.model, effects=effects)
+    own = f"{name}."
+    values = {key: v for key, v in fitted.values.items() if not key.startswith(own)}
+    values |= zero(truth, model)
+    for p in truth.parameters_of(model.machine):
+        if own + p.name in fitted.values:
+            values[f"{truth.name}.{p.name}"] = fitted.values[own + p.name]
+    values |= {f"{truth.name}.{key}": value for key, (value, _) in told.values.items()}
+    start = replace(fitted, model=model, values=clipped(model, values))
+    return gauss_newton(segments, start, before=around)

@@ -1,0 +1,81 @@
+"""Slow wander of the instruments in time: taken as noise where it explains all that is left.
+
+A random walk of a voltage, current or torque is a sum of sines of independent size, of which the
+slowest few hold nearly all. What repeats with the machine's state, at every step of a torque map or
+at every turn, is no such sum.
+
+Reference: Papoulis & Pillai, Probability, Random Variables and Stochastic Processes, 4th ed.
+(2002), section 11.2, the Karhunen-Loève expansion of a Wiener process.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment, clock
+from pipeline.criticism.effect import Array, Values
+from pipeline.criticism.equations.residuals import disturbed
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.goodness import remainder
+from pipeline.criticism.regression.linear_system import Fitted
+from pipeline.criticism.regression.parallel import on_each
+from pipeline.records.diagnosis import Remainder
+
+SIZE = 4.0
+"""Standard deviation at a capture's end, in standard deviations of the sensor's noise."""
+
+_TERMS = 8
+"""Sines that are kept: they hold 97 % of a random walk's power."""
+_TESTS = 2
+"""Tests in whose captures wander must show: a machine that warms up does so in its own alone."""
+_WANDERS = ("v", "i", "torque")
+"""Beginnings of the names of signals that wander: voltages, currents and torque."""
+
+
+def wandering(
+    segments: Sequence[Segment], fitted: Fitted, left: Sequence[Remainder]
+) -> tuple[Segment, ...] | None:
+    """The segments, knowing the wander that their instruments may have.
+
+    None if a fit with that wander leaves anything over the floor. None as well if what is `left` is
+    in captures of one test alone: instruments wander in every test, while a machine that warms up
+    changes slowly in one.
+    """
+    captures = {one.capture for one in left}
+    if len({segment.test for segment in segments if segment.capture in captures}) < _TESTS:
+        return None
+    told = with_wander(segments, fitted.model, fitted.values)
+    _, around = gauss_newton(told, fitted)
+    return None if remainder(around, told, around.residual, large=True) else told
+
+
+def with_wander(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Segment, ...]:
+    """The segments, each knowing what a wander of its sensors does to its residuals."""
+    return on_each(wanders, segments, [(model, values)] * len(segments))
+
+
+def wanders(segment: Segment, model: Model, values: Values) -> Segment:
+    """A segment with the slowest sines of a random walk of each of its sensors."""
+    if segment.weak is None:
+        return segment
+    sines = SIZE * slowest(clock(segment))
+    made = [] if segment.lines is None else [segment.lines]
+    made += [
+        disturbed(segment, segment.weak, model, values, name, sigma * sines)
+        for name, sigma in segment.noise.items()
+        if sigma > 0.0 and name.startswith(_WANDERS)
+    ]
+    return replace(segment, lines=np.concatenate(made)) if made else segment
+
+
+def slowest(time_s: Array) -> Array:
+    """The slowest sines [8, n] of a random walk that ends at a standard deviation of one."""
+    time = (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), 1e-300)
+    rates = (np.arange(_TERMS)[:, None] + 0.5) * math.pi
+    sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates
+    return sines

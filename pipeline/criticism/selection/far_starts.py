@@ -1,0 +1,136 @@
+"""Amplitudes that are tried far from zero: a delay of many samples is no tangent's matter.
+
+The deviance at a trial delay, all else refitted to first order, is a cross-correlation of what is
+recorded with what the model predicts, over all signals, captures and orders at once, each by its
+noise. Reference: Knapp & Carter, IEEE Trans. ASSP 24 (1976), the maximum-likelihood delay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Parameter, Values
+from pipeline.criticism.equations.observability import hears
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linearise import linearise
+from pipeline.criticism.regression.normal_equations import Descent
+from pipeline.criticism.regression.parallel import on_each
+from pipeline.criticism.selection.score_test import (
+    THOROUGH,
+    Candidate,
+    Score,
+    Standing,
+    clears,
+    paid_for,
+    quiet_fall,
+    searched,
+    share_of,
+)
+
+_NEARER = (0.5**0.5, 0.5**0.25, 2.0**0.25, 2.0**0.5)
+"""Multiples of the best start that are tried after it: starts are an octave apart."""
+
+
+def with_starts(
+    segments: Sequence[Segment],
+    wide: System,
+    fitted: Fitted,
+    offered: Sequence[Candidate],
+    scores: Sequence[Score],
+    told: NDArray[np.bool_],
+) -> tuple[Score, ...]:
+    """The scores, those of effects with `starts` from the best of them if that beats the tangent.
+
+    Nothing is tried where nothing is `told` [G] as a remainder: a delay of many samples shows.
+    """
+    if not told.any():
+        return tuple(scores)
+    best = {score.candidate.effect.name: score for score in scores}
+    own = wide.along(range(len(own_columns(fitted.model))))
+    before = Standing.of(own, np.arange(len(own.columns)), own.grams().best(*THOROUGH))
+    price = searched(offered)
+    for candidate in offered:
+        for parameter in candidate.effect.parameters_of(fitted.model.machine):
+            for score in _tried(segments, own, fitted, candidate, parameter, before, told):
+                known = best.get(candidate.effect.name)
+                if known is None or score.fall > known.fall:
+                    best[candidate.effect.name] = replace(score, price=score.price + price)
+    return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
+
+
+def _tried(
+    segments: Sequence[Segment],
+    own: System,
+    fitted: Fitted,
+    candidate: Candidate,
+    parameter: Parameter,
+    before: Standing,
+    told: NDArray[np.bool_],
+) -> tuple[Score, ...]:
+    """The score of the best start of a parameter, none where it has no starts."""
+    if not parameter.starts:
+        return ()
+    name = f"{candidate.effect.name}.{parameter.name}"
+    scale = fitted.model.machine.scale(parameter)
+
+    def at(start: float) -> tuple[float, float, System, Descent]:
+        moved = _moved(segments, own, fitted, candidate, {name: start * scale})
+        end = moved.grams().best(*THOROUGH)
+        return end.misfit, start, moved, end
+
+    nearest = min((at(start) for start in parameter.starts), key=lambda one: one[:2])
+    around = [at(factor * nearest[1]) for factor in _NEARER]
+    _, start, moved, end = min([nearest, *around], key=lambda one: one[:2])
+    places = np.arange(len(own.columns))
+    after = Standing.of(moved, places, end)
+    found = Score(
+        candidate,
+        before.misfit - after.misfit,
+        0.0,
+        {name: start * scale},
+        dict(zip((c.name for c in own.columns), end.step.tolist(), strict=True)),
+        share_of(own, candidate.effect, before, after),
+        abs(start) / parameter.negligible,
+        quiet_fall(own, before.spreads, after.spreads),
+        clears(own.counts, told, before.spreads, after.spreads),
+    )
+    dof = paid_for(candidate.effect, fitted.model.machine, found)
+    search = 2.0 * math.log(len(parameter.starts) + len(_NEARER))
+    return (replace(found, price=dof * math.log(own.size) + search),)
+
+
+def _moved(
+    segments: Sequence[Segment],
+    own: System,
+    fitted: Fitted,
+    candidate: Candidate,
+    start: Values,
+) -> System:
+    """The system with its residual where the candidate's amplitude is at a start, and the columns
+    of where it is not.
+    """
+    effect, model = candidate.effect, fitted.model.with_effects(candidate.effect)
+    values = {**fitted.values, **candidate.values, **start}
+    none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
+    floors = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
+    heard = [number for number, segment in enumerate(segments) if hears(segment, effect)]
+    each = [(model, values, *floors[number], fitted.near) for number in heard]
+    rows = on_each(_residual, [segments[number] for number in heard], each)
+    residual = own.residual.copy()
+    segment = np.array([number for number, _, _ in own.labels])[own.group]
+    for number, row in zip(heard, rows, strict=True):
+        residual[segment == number] = row
+    return replace(own, residual=residual)
+
+
+def _residual(
+    segment: Segment, model: Model, values: Values, sigma: Array, tolerance: Array, near: Values
+) -> Array:
+    return linearise(segment, model, values, (), sigma, tolerance, near).residual

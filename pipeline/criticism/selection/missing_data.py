@@ -1,0 +1,73 @@
+"""What a campaign's captures lack: equations that use them, temperatures, tests of an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segments import TESTS
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.selection.alternatives import detectable
+from pipeline.criticism.selection.score_test import Candidate
+from pipeline.criticism.selection.stepwise import Rung
+from pipeline.records.capture import Campaign
+from pipeline.records.diagnosis import Unexcited
+
+_SEEN = 3.0
+"""Standard deviations of a typical size from which on captures would show an effect."""
+_WARMED = {"drop": ("dq", "q"), "flux": ("dq", "q", "open")}
+"""Equations in which what an effect of a hook does grows with a temperature while it changes."""
+
+
+def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
+    """A note of the captures that no equation could use, none where all are used."""
+    used = {segment.capture for segment in found}
+    idle = [c.path for c in campaign.captures if c.path not in used and c.meta.test in TESTS]
+    words = "without the signals of their test's equation, or an even stretch of samples"
+    return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
+
+
+def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
+    """Notes of the captures in which a temperature that the model asks for is not recorded."""
+    notes = []
+    for effect in model.effects:
+        for name in (signal for signal in effect.signals if signal.startswith("temp_")):
+            kinds = _WARMED.get(effect.hook, ())
+            cold = {s.capture for s in found if s.kind in kinds and name not in s.recorded}
+            if cold:
+                where = ", ".join(sorted(cold))
+                notes.append(f"no {name}, taken to be at ambient temperature: {where}")
+    return tuple(dict.fromkeys(notes))
+
+
+def unexcited(
+    campaign: Campaign, library: Mapping[str, Effect], last: Rung, offered: Sequence[Candidate]
+) -> tuple[Unexcited, ...]:
+    """Effects that no capture here would show at typical size, for want of their first test or of
+    a signal in it; each with the tests that are not there.
+    """
+    inside = {effect.name for effect in last.fitted.model.effects}
+    found = []
+    for name, effect in library.items():
+        lacking = tuple(test for test in effect.tests if not _holds(campaign, effect, test))
+        if name in inside or not lacking or lacking[0] != effect.tests[0]:
+            continue
+        if detectable(effect, last.fitted, last.around, offered) < _SEEN:
+            signals = _missing(campaign, effect, lacking)
+            found.append(Unexcited(name, lacking, effect.experiment, signals))
+    return tuple(found)
+
+
+def _holds(campaign: Campaign, effect: Effect, test: str) -> bool:
+    """Whether some capture is of a test and has every signal that shows an effect."""
+    captures = campaign.of(test)
+    return any(all(capture.has(name) for name in effect.signals) for capture in captures)
+
+
+def _missing(campaign: Campaign, effect: Effect, tests: Sequence[str]) -> tuple[str, ...]:
+    """Signals of an effect that no capture of these tests has, none where there is no capture."""
+    captures = campaign.of(*tests)
+    if not captures:
+        return ()
+    return tuple(n for n in effect.signals if not any(capture.has(n) for capture in captures))

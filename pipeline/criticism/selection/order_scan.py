@@ -1,0 +1,259 @@
+"""Orders a turn that a fit leaves in logs under load, whether its equations look at them or not.
+
+The weak form looks at the orders that a machine's design gives: what turns with any other averages
+out of every window, and would be left over unseen.
+
+What the machine itself does comes back after a turn, so that its orders are whole; a bearing, a
+gear or a belt has others.
+
+Reference: Lomb, Astrophys. Space Sci. 39 (1976), the spectrum of samples that are not even, here
+even in time and not in angle; Högbom, Astron. Astrophys. Suppl. 15 (1974), the strongest line taken
+out before the next is looked for; Randall & Antoni, Mech. Syst. Signal Process. 25 (2011), orders
+of bearings.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Complex
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.regression.goodness import material_size
+from pipeline.criticism.regression.linear_system import System
+from pipeline.numerics.orders import TURN_RAD
+from pipeline.numerics.projection import Projection, bump
+
+_LOWEST, _HIGHEST, _STEP = 1.5, 128.0, 0.25
+"""Orders looked at, up to beyond any tooth count times two of the machines here, and how densely:
+a part of four turns tells no finer ones apart. Below the lowest is what a drag leaves of itself."""
+_TURNS, _LEAST_TURNS = 4.0, 3.0
+"""Turns of a part of a log; and the fewest that tell orders apart."""
+_SAMPLES = 5.0
+"""Samples a cycle that an order must have at the mean speed of a part of a log."""
+_BESIDE = 12
+_STANDS_OUT = 20.0
+"""Power over the median of what is beside: of noise averaged over eight parts one in a million has
+four."""
+_CAPTURES = 2
+"""Captures that must have an order: what only one has predicts no other."""
+_MOST = 4
+"""Orders of one log: each is another fit of the machine, and its harmonics follow the first."""
+_AS_GOOD = 0.9
+"""Power of the best order near a whole one that the whole one must have to be it."""
+_APART = 0.1
+"""How far apart two captures may find one order."""
+_TRIED = 25
+"""Orders tried on either side of a line within a step: every hundredth."""
+_OVERSAMPLED = 8.0
+"""Orders tried for every one that the angles of several logs together tell apart."""
+
+
+def orders_left(segments: Sequence[Segment], around: System) -> tuple[float, ...]:
+    """Orders that two captures have over what is beside them and in a size that matters, of those
+    that no equation looks at; one that is no whole number as close as their angles tell it.
+    """
+    lines = [
+        (order, log)
+        for segment in segments
+        for log in _logs(segment, around)
+        for order in _lines(log)
+        if order not in log.looked_at
+    ]
+    lines.sort(key=lambda line: line[0])
+    found = []
+    for near in _clustered(lines):
+        logs = [log for _, log in near]
+        if len({log.capture for log in logs}) >= _CAPTURES:
+            order = _common(float(np.median([order for order, _ in near])), logs)
+            found.append(int(order) if order.is_integer() else order)
+    return tuple(dict.fromkeys(found))
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Part of a log [n]: what is left of a signal, the shaft's angle, the weight of each sample,
+    and the current that waves of the angle may grow with.
+    """
+
+    left: Array
+    theta_rad: Array
+    weight: Array
+    current: Array
+
+    @property
+    def carriers(self) -> tuple[Array, Array]:
+        """What is looked at for waves [n]: the plain weight, and the weight times the current."""
+        return self.weight, self.weight * self.current
+
+    @property
+    def scales(self) -> Array:
+        """What the square of a sum over one carrier is in mean squares of the signal [2]."""
+        own = np.array([self.weight.sum(), (self.weight * self.current) @ self.current])
+        scales: Array = 2.0 / np.maximum(own * self.weight.sum(), 1e-300)
+        return scales
+
+    def power(self, orders: Array) -> Array:
+        """Mean square [2, K] of some orders with each carrier."""
+        power: Array = self.scales[:, None] * np.abs(self.waves(orders)) ** 2
+        return power
+
+    def waves(self, orders: Array) -> Complex:
+        """The sums [2, K] of what is left times a wave of the angle and a carrier."""
+        carried = np.stack(self.carriers) * self.left
+        sums = [carried @ np.exp(-1j * order * self.theta_rad) for order in orders.tolist()]
+        return np.array(sums).T
+
+    def spectrum(self, count: int) -> Array:
+        """Mean square [2, K] of every order of the grid from its first step, as `power`."""
+        turn = np.exp(-1j * _STEP * self.theta_rad)
+        carried = np.stack(self.carriers) * self.left + 0j
+        sums = np.empty((2, count), dtype=np.complex128)
+        for place in range(count):
+            carried *= turn
+            sums[:, place] = carried.sum(axis=1)
+        power: Array = self.scales[:, None] * np.abs(sums) ** 2
+        return power
+
+    def without(self, order: float) -> Part:
+        """The part less its best waves of an order: of one size, and as current and load go."""
+        turn = np.exp(1j * order * self.theta_rad)
+        sizes = np.stack([np.ones(turn.size), self.current, np.abs(self.current)])
+        waves = np.concatenate([sizes * turn.real, sizes * turn.imag])
+        weighted = self.weight * waves
+        best = np.linalg.lstsq(weighted @ waves.T, weighted @ self.left, rcond=1e-9)[0]
+        return replace(self, left=self.left - best @ waves)
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """What is left of one signal of a capture: whole, and in parts of a few turns. `least` [its
+    unit] is an rms that matters, `looked_at` the orders that the signal's equations see.
+    """
+
+    capture: str
+    channel: str
+    whole: Part
+    parts: tuple[Part, ...]
+    least: float
+    looked_at: frozenset[float]
+
+
+def _logs(segment: Segment, around: System) -> Iterator[Log]:
+    weak, theta = segment.weak, segment.recorded.get("theta_mech_rad")
+    if segment.kind != "dq" or weak is None or theta is None or not (weak.orders > 0).any():
+        return
+    weight = _weight(weak, segment.size)
+    rows = list(_parts(theta, weight))
+    if not rows:
+        return
+    fitted, current = around.around, segment.recorded["iq_a"]
+    left = residual(segment, fitted.model, fitted.values)
+    looked_at = frozenset(weak.orders.tolist())
+    for channel, one in zip(segment.channels, left, strict=True):
+        parts = tuple(Part(one[r], theta[r], weight[r], current[r]) for r in rows)
+        whole = Part(one, theta, weight, current)
+        least = material_size(segment, channel, around)
+        yield Log(segment.capture, channel, whole, parts, least, looked_at)
+
+
+def _weight(weak: Projection, size: int) -> Array:
+    """Weight [n] of the samples: the sum of the windows they are in, nothing beside a gap."""
+    weight = np.zeros(size)
+    shape = bump(weak.length)
+    for start in weak.starts.tolist():
+        weight[start : start + weak.length] += shape
+    return weight
+
+
+def _parts(theta: Array, weight: Array) -> Iterator[NDArray[np.int64]]:
+    """Rows of each part of a log, of some four turns."""
+    rows = np.flatnonzero(weight > 0.0)
+    if not rows.size:
+        return
+    step = np.abs(np.diff(theta[rows], prepend=theta[rows[:1]]))
+    # a gap between windows is no turn that anything was seen of
+    turned = np.cumsum(np.where(np.diff(rows, prepend=rows[:1] - 1) == 1, step, 0.0))
+    turns = float(turned[-1]) / TURN_RAD
+    count = max(round(turns / _TURNS), int(turns >= _LEAST_TURNS))
+    edges = np.searchsorted(turned, np.linspace(0.0, turned[-1], count + 1)) if count else ()
+    for first, last in pairwise(edges):
+        yield rows[first:last]
+
+
+def _lines(log: Log) -> list[float]:
+    """Orders that stand out of the twelve steps at either side by 20 in power and have an rms that
+    matters; the clearest is taken out before the next is looked for.
+    """
+    parts = log.parts
+    count = int(min(_HIGHEST, *(_seen_to(part.theta_rad) for part in parts)) / _STEP)
+    grid = _STEP * np.arange(1, count + 1)
+    found: list[float] = []
+    while len(found) < _MOST and count > 2 * _BESIDE:
+        power = np.mean([part.spectrum(count) for part in parts], axis=0)
+        beside = median_filter(power, (1, 2 * _BESIDE + 1), mode="nearest")
+        clear = power / np.maximum(beside, 1e-300)
+        clear = np.where((power > log.least**2) & (grid >= _LOWEST), clear, 0.0).max(axis=0)
+        best = int(np.argmax(clear))
+        if clear[best] <= _STANDS_OUT:
+            break
+        found.append(_peak(parts, float(grid[best])))
+        parts = tuple(part.without(found[-1]) for part in parts)
+    return found
+
+
+def _peak(parts: Sequence[Part], near: float) -> float:
+    """The order within a step that has the most power; a whole one that has about as much."""
+    whole = float(round(near))
+    tried = np.append(near + _STEP * np.linspace(-1.0, 1.0, 2 * _TRIED + 1), whole)
+    power = np.sum([part.power(tried) for part in parts], axis=0).max(axis=0)
+    best = int(np.argmax(power))
+    return whole if power[-1] >= _AS_GOOD * power[best] else float(tried[best])
+
+
+def _clustered(lines: Sequence[tuple[float, Log]]) -> Iterator[list[tuple[float, Log]]]:
+    """Lines in order, cut where two that follow each other are apart."""
+    number, before = 0, -math.inf
+    numbers = []
+    for order, _ in lines:
+        number += order - before > _APART
+        before = order
+        numbers.append(number)
+    for _, mine in groupby(zip(numbers, lines, strict=True), key=lambda one: one[0]):
+        yield [line for _, line in mine]
+
+
+def _common(near: float, logs: Sequence[Log]) -> float:
+    """The order that several logs have: whole, or where waves of one phase fit all of them best.
+
+    Angles go on from turn to turn, so that a wave of any order is one function of them.
+    """
+    order = _peak([part for log in logs for part in log.parts], near)
+    if order.is_integer():
+        return order
+    channels = dict.fromkeys(log.channel for log in logs)
+    turned = np.ptp(np.concatenate([log.whole.theta_rad for log in logs])) / TURN_RAD
+    count = int(_OVERSAMPLED * _APART * turned) + 1
+    tried = order + _APART * np.linspace(-1.0, 1.0, 2 * count + 1)
+    each = [_in_phase([g.whole for g in logs if g.channel == name], tried) for name in channels]
+    return round(float(tried[int(np.argmax(np.sum(each, axis=0).max(axis=0)))]), 4)
+
+
+def _in_phase(logs: Sequence[Part], orders: Array) -> Array:
+    """Power [2, K] of waves that have one size and phase in all logs, with each carrier."""
+    total = np.sum([log.waves(orders) for log in logs], axis=0)
+    weight = np.sum([[log.weight.sum(), log.carriers[1] @ log.current] for log in logs], axis=0)
+    power: Array = np.abs(total) ** 2 / np.maximum(weight, 1e-300)[:, None]
+    return power
+
+
+def _seen_to(theta: Array) -> float:
+    """Highest order that has samples enough a cycle."""
+    return TURN_RAD / (_SAMPLES * float(np.median(np.abs(np.diff(theta)))) + 1e-12)

@@ -1,0 +1,61 @@
+"""The fit of a model that a user asks for, effects with shapes and choices included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_fit
+from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.regression.mains_hum import Hum, hum_of, with_hum
+from pipeline.criticism.selection.choices import reconsidered
+from pipeline.criticism.selection.discrimination import renamed
+from pipeline.criticism.selection.score_test import candidates, score_all, widened
+from pipeline.criticism.selection.stepwise import begun
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """A model fitted to segments, which know the mains lines in them; the system around it."""
+
+    segments: tuple[Segment, ...]
+    fitted: Fitted
+    around: System
+    hum: tuple[Hum, ...]
+
+
+def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
+    """Fits a model from orders of magnitude.
+
+    Effects that have a shape or a choice come in one by one, the most helpful first. Each begins at
+    the best of its trial values: from another one, a bump of friction may move its speed the wrong
+    way.
+    """
+    shaped = {
+        effect.name: effect
+        for effect in model.effects
+        if not all(p.amplitude for p in effect.parameters_of(model.machine))
+    }
+    near = rough_fit(segments, model.without(*shaped))
+    hum = hum_of(segments, near.model, near.values)
+    heard = with_hum(segments, hum, near.model, near.values)
+    fitted, around = first_fit(heard, near)
+    if not shaped:
+        return Begun(heard, fitted, around, hum)
+    while shaped:
+        offered = candidates(shaped, fitted)
+        wide = widened(heard, fitted, offered, around)
+        scores = score_all(wide, fitted, offered)
+        if not scores:
+            break
+        del shaped[scores[0].candidate.effect.name]
+        fitted, around = gauss_newton(heard, begun(fitted, scores[0]), before=wide)
+    for effect in fitted.model.effects:
+        fitted, around = renamed(heard, (fitted, around), effect.name, {effect.name: effect})
+    settled = {effect.name: effect for effect in fitted.model.effects}
+    model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
+    unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
+    whole = replace(fitted, model=model, values={**fitted.values, **unheard})
+    return Begun(heard, *reconsidered(heard, *gauss_newton(heard, whole)), hum)

@@ -1,0 +1,365 @@
+"""What candidates would do for a fit, to first order.
+
+References: [1] Rao, Math. Proc. Camb. Phil. Soc. 44 (1948), score test; [2] Schwarz, Ann. Stat.
+6 (1978), the price of a parameter; [3] Benjamini & Foster, Biometrika 109 (2022), price of a
+search over candidates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Effect, Machine, Parameter
+from pipeline.criticism.machine.model import zero
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linearise import Column, effect_columns
+from pipeline.criticism.regression.normal_equations import Descent, Grams, misfit_of
+
+TIE = 12.0
+"""Difference of −2 log L below which captures do not part two explanations: 3.5 deviations."""
+LEAST_SHARE = 0.1
+"""Of what is over the floor, what an effect must take to be named for it."""
+WORTH, _CLEAR = 30.0, 0.5
+"""An excess that counts, as −2 log L; or a sample, where there are few."""
+_MOST_OF = 0.5
+"""Of what would be told as a remainder, what makes an effect matter at any size."""
+_GLANCE, THOROUGH = ((1.0,), 3), ((1.0, 0.0), 20)
+"""Exponents of the weights that a descent begins with, and its steps."""
+_PROMISING = 0.3
+"""Prices that a glance must see for a thorough look."""
+_BELOW = 1.5
+"""Prices that evidence below the floor must be worth: noise that is not white is down there too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An effect that is not in the model, its shape parameters at one of their trial values."""
+
+    effect: Effect
+    columns: tuple[Column, ...]
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a candidate would do, to first order.
+
+    `fall` is the fall of misfit, `price` what its parameters and the search cost, `step` its own
+    parameters, `moves` how the model's own move with it, `share` the part of the removable excess
+    of the channel it helps most, `size` the largest of its amplitudes over its negligible size,
+    `quiet` the part of the fall in signals that have nothing over their floor to take a share of.
+    `clears`: it takes most of what would be told as a remainder without it, and so matters at any
+    size; no coupling, which noise of an encoder in a speed loop looks like. `shadow` names an
+    effect that explains the same better, but is too small to matter.
+    """
+
+    candidate: Candidate
+    fall: float
+    price: float
+    step: Mapping[str, float]
+    moves: Mapping[str, float]
+    share: float
+    size: float
+    quiet: float = 0.0
+    clears: bool = False
+    shadow: str | None = None
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is as large as anybody would act on, or what would be left without it is."""
+        return self.size >= 1.0 or self.clears
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is worth its price, large enough to matter and helps enough.
+
+        Below the floor only what the machine itself does is named. A sensor's error is a common
+        factor of which any form that is a little wrong elsewhere asks for some; and an effect of a
+        closer look is not told from noise of the angle's sensor, which runs through a drive's speed
+        loop and so is in torque and angle alike.
+        """
+        effect = self.candidate.effect
+        below = self._below_floor and effect.hook != "sensor" and effect.closer is None
+        helps = self.share >= LEAST_SHARE or below
+        return self.fall > self.price and self.matters and helps and self.shadow is None
+
+    @property
+    def _below_floor(self) -> bool:
+        return self.quiet > _BELOW * self.price
+
+    @property
+    def shortfall(self) -> str:
+        """What it lacks to be named; of one that passes, that a refit did not bear it out."""
+        if self.fall <= self.price:
+            return "not worth its parameters"
+        if not self.matters:
+            return f"seen, at {self.size:.2g} of the least size that matters"
+        if self.shadow is not None:
+            return f"{self.shadow} explains it better, and is too small to matter"
+        if self.passes:
+            return "refitted, it does not hold on captures held out, or may be zero"
+        if self._below_floor:
+            return "what it would explain lies below the noise floor"
+        return "takes too small a share of what is over the noise floor"
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How well a fit stands: misfit, χ²/n [G] of every group, cost of the priors."""
+
+    misfit: float
+    spreads: Array
+    prior_cost: float
+
+    @classmethod
+    def of(cls, around: System, places: NDArray[np.int64], end: Descent) -> Standing:
+        """Where a descent along `places` left the system."""
+        cost = float(around.prior_costs(places, end.step).sum())
+        return cls(end.misfit, end.spreads, cost)
+
+
+def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate, ...]:
+    """Every effect that is not in the model, once for each combination of trial shapes."""
+    model = fitted.model
+    inside = {effect.name for effect in model.effects}
+    found = []
+    for effect in library.values():
+        if effect.name in inside:
+            continue
+        shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
+        grids = [[(p.name, v * model.machine.scale(p)) for v in p.scan] for p in shapes]
+        for at in product(*grids):
+            columns = tuple(effect_columns(effect, model, at))
+            start = zero(effect, model)
+            start.update({f"{effect.name}.{name}": value for name, value in at})
+            found.append(Candidate(effect, columns, start))
+    return tuple(found)
+
+
+def widened(
+    segments: Sequence[Segment],
+    fitted: Fitted,
+    offered: Sequence[Candidate],
+    before: System | None = None,
+) -> System:
+    """The system around a fit with the candidates' columns behind its own, in order.
+
+    The candidates' may stay as they were in `before`. Its own are made anew: what the station's
+    priors alone hold apart, such as a gain and the effect of that name, columns that are made in
+    two places would seem to tell apart.
+    """
+    columns = [c for candidate in offered for c in candidate.columns]
+    if before is not None:
+        own = {column.key for column in own_columns(fitted.model)}
+        before = before.along([n for n, c in enumerate(before.columns) if c.key not in own])
+    return system(segments, fitted, columns, before)
+
+
+def score_all(
+    around: System,
+    fitted: Fitted,
+    offered: Sequence[Candidate],
+    told: NDArray[np.bool_] | None = None,
+) -> tuple[Score, ...]:
+    """Every candidate's score, the best fall first; of one effect the best shape only.
+
+    `told` [G] are groups that would be told as a remainder if nothing were added.
+    """
+    by = _Scoring.of(around, fitted, told)
+    price = math.log(float(around.size))
+    search_price = searched(offered)
+    best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
+    first = by.own.size
+    for candidate in offered:
+        places = np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
+        score = by.score(candidate, places, _GLANCE)
+        cost = paid_for(candidate.effect, fitted.model.machine, score) * price + search_price
+        if score is not None and score.fall > _PROMISING * cost:
+            score = by.score(candidate, places, THOROUGH)
+        known = best.get(candidate.effect.name)
+        if score is not None and (known is None or score.fall > known[0].fall):
+            best[candidate.effect.name] = replace(score, price=cost), places
+    found = [replace(one, shadow=by.shadow(one, best)) for one, _ in best.values()]
+    return tuple(sorted(found, key=lambda s: (-s.fall, s.candidate.effect.name)))
+
+
+def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
+    """How many parameters a score costs: of optional terms those that the step makes use of."""
+    used = {} if score is None else score.step
+    return sum(
+        not p.optional or bool(used.get(f"{effect.name}.{p.name}"))
+        for p in effect.parameters_of(machine)
+        if not p.choice
+    )
+
+
+def searched(offered: Sequence[Candidate]) -> float:
+    """What the search over candidates costs a score [3]."""
+    return 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
+
+
+@dataclass(frozen=True, slots=True)
+class _Scoring:
+    """What every candidate is held against: a system, the model's own columns in it and how these
+    alone fit, groups [G] that are then told as a remainder.
+    """
+
+    around: System
+    grams: Grams
+    fitted: Fitted
+    own: NDArray[np.int64]
+    before: Standing
+    told: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, around: System, fitted: Fitted, told: NDArray[np.bool_] | None) -> _Scoring:
+        own, grams = np.arange(len(own_columns(fitted.model))), around.grams()
+        before = Standing.of(around, own, grams.along(own).best())
+        left = np.zeros(len(around.labels), dtype=bool) if told is None else told
+        return cls(around, grams, fitted, own, before, left)
+
+    def score(
+        self,
+        candidate: Candidate,
+        places: NDArray[np.int64],
+        effort: tuple[tuple[float, ...], int],
+    ) -> Score | None:
+        """Score of one candidate with parameters on the wrong side of a bound left at zero."""
+        around, machine = self.around, self.fitted.model.machine
+        known = {
+            f"{candidate.effect.name}.{p.name}": (p, machine.scale(p))
+            for p in candidate.effect.parameters_of(machine)
+        }
+        live = places
+        while live.size:
+            end = self.grams.along(np.concatenate([self.own, live])).best(*effort)
+            steps = end.step[self.own.size :].tolist()
+            mine = dict(zip((around.columns[n].name for n in live), steps, strict=True))
+            wrong = [
+                n
+                for n in live
+                if _outside(mine[around.columns[n].name], known[around.columns[n].name][0])
+            ]
+            if not wrong:
+                break
+            live = np.array([n for n in live if n not in wrong], dtype=int)
+        if live.size == 0:
+            return None
+        sizes = [
+            abs(value) / (known[name][0].negligible * known[name][1])
+            for name, value in mine.items()
+            if known[name][0].negligible > 0
+        ]
+        after = Standing.of(around, np.concatenate([self.own, live]), end)
+        names = (around.columns[n].name for n in self.own)
+        return Score(
+            candidate,
+            self.before.misfit - after.misfit,
+            0.0,
+            mine,
+            dict(zip(names, end.step[: self.own.size].tolist(), strict=True)),
+            share_of(around, candidate.effect, self.before, after),
+            max(sizes, default=math.inf),
+            quiet_fall(around, self.before.spreads, after.spreads),
+            candidate.effect.closer is None
+            and clears(around.counts, self.told, self.before.spreads, after.spreads),
+        )
+
+    def shadow(
+        self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
+    ) -> str | None:
+        """The clearest effect that explains what a candidate does better, at a size too small to
+        matter, and beside which the candidate is not worth its price.
+
+        A loss that is too small to be told must not be told under a wrong name.
+        """
+        if not score.passes:
+            return None
+        small = [
+            (other, places)
+            for other, places in best.values()
+            if not other.matters
+            and other.fall > other.price
+            and other.fall > score.fall + TIE
+            and other.candidate.effect.closer is None
+        ]
+        if not small:
+            return None
+        clearest, beside = max(small, key=lambda pair: pair[0].fall)
+        _, mine = best[score.candidate.effect.name]
+        without = self.grams.along(np.concatenate([self.own, beside])).best(*THOROUGH)
+        both = self.grams.along(np.concatenate([self.own, beside, mine])).best(*THOROUGH)
+        worth = without.misfit - both.misfit > score.price
+        return None if worth else clearest.candidate.effect.name
+
+
+def clears(counts: Array, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
+    """Whether most of the power over the floor goes, between two sets of χ²/n [G], of the groups
+    that are `told` [G] as a remainder.
+    """
+    over, left = (counts * np.maximum(spreads - 1.0, 0.0) for spreads in (before, after))
+    return bool(told.any()) and float(left[told].sum()) < _MOST_OF * float(over[told].sum())
+
+
+def _outside(value: float, parameter: Parameter) -> bool:
+    return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
+
+
+def share_of(around: System, effect: Effect, before: Standing, after: Standing) -> float:
+    """Largest share of the removable misfit that went away: of one recorded signal, of the
+    captures of the tests that excite the effect, or of what the priors of the station cost; but of
+    a signal's error no more than the share of its power, at one order, that went with it.
+
+    An excess counts from 30 on, or from half a nat a sample where there are few. Instruments that
+    wander and effects of nobody's library are misfit that many an effect can nibble at.
+    """
+    excess = around.counts * np.log(np.maximum(before.spreads, 1.0))
+    left = around.counts * np.log(np.maximum(after.spreads, 1.0))
+    channel = np.array([name for _, name, _ in around.labels])
+    places = [channel == name for name in dict.fromkeys(channel.tolist())]
+    places.append(np.array([around.tests[n] in effect.tests for n, _, _ in around.labels]))
+    shares = [0.0]
+    for place in places:
+        had = float(excess[place].sum())
+        if had > min(WORTH, _CLEAR * float(around.counts[place].sum())):
+            shares.append(1.0 - float(left[place].sum()) / had)
+    error = min(max(shares), power_share(around, before.spreads, after.spreads))
+    cost = before.prior_cost
+    return max(error, 1.0 - after.prior_cost / cost if cost > WORTH else 0.0)
+
+
+def quiet_fall(around: System, before: Array, after: Array) -> float:
+    """Fall of misfit between two sets of χ²/n [G], in signals without an excess that counts."""
+    fall = 0.0
+    channel = np.array([name for _, name, _ in around.labels])
+    for name in dict.fromkeys(channel.tolist()):
+        mine = channel == name
+        counts = around.counts[mine]
+        excess = float(counts @ np.log(np.maximum(before[mine], 1.0)))
+        if excess <= min(WORTH, _CLEAR * float(counts.sum())):
+            fall += misfit_of(counts, before[mine]) - misfit_of(counts, after[mine])
+    return fall
+
+
+def power_share(around: System, before: Array, after: Array) -> float:
+    """Largest share of the power over the noise floor, of one signal at one order, that went away
+    between two sets of χ²/n [G].
+    """
+    numbers: dict[tuple[str, int], int] = {}
+    pool = [numbers.setdefault((name, k), len(numbers)) for _, name, k in around.labels]
+    count = np.bincount(pool, around.counts)
+    nats = np.bincount(pool, around.counts * np.log(np.maximum(before, 1.0)))
+    had, has = (
+        np.bincount(pool, around.counts * np.maximum(spreads - 1.0, 0.0))
+        for spreads in (before, after)
+    )
+    worth = nats > np.minimum(WORTH, _CLEAR * count)
+    return float((1.0 - has[worth] / had[worth]).max(initial=0.0))

@@ -1,0 +1,116 @@
+"""How far a ladder is trusted: which of its last rungs are guesses beside what nothing explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.machine.model import values_of
+from pipeline.criticism.regression.goodness import HeldOut, remainder, told_groups
+from pipeline.criticism.regression.linear_system import System, own_columns
+from pipeline.criticism.selection.score_test import LEAST_SHARE
+from pipeline.criticism.selection.stepwise import Rung
+from pipeline.records.diagnosis import Remainder
+
+_EXPLAINED = 0.5
+"""Share of the misfit, and of held-out power over the floor, that effects found may leave, and
+still explain what is left."""
+_NO_GUESS = 0.2
+"""Share of the held-out error that an effect must take to be named beside an unknown: a tenth of
+heat in a winding looked like skin effect."""
+_COMES_TO = 0.5
+"""Share of the amplitude it should come to that another one must have, or captures deny both."""
+_NOTHING = 0.01
+"""Share of the held-out error that a further effect must take while anything is left."""
+
+
+def trusted(
+    found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
+) -> tuple[tuple[Rung, ...], tuple[Remainder, ...]]:
+    """The ladder, and what is left over the floor at its end.
+
+    Where structure is left that nothing here explains, the last rungs go that took less than a
+    fifth of the held-out error: beside an unknown, their names would be guesses. A rung stays that
+    cleared a signal of all waves of the angle; one goes that some captures speak against. A further
+    effect also goes if it lowers the held-out error by less than 1 % while anything is left.
+    """
+    for count in range(len(rungs), 0, -1):
+        kept, around = tuple(rungs[:count]), rungs[count - 1].around
+        left = remainder(around, found, around.residual)
+        worse = count > 2 and held[count - 1].total > (1.0 - _NOTHING) * held[count - 2].total
+        if count == 1 or not left or (explained(kept, held, left) and not worse):
+            break
+        if denied(rungs[count - 1]):
+            continue
+        if held[count - 1].total < (1.0 - _NO_GUESS) * held[count - 2].total:
+            break
+        if not worse and _clears_orders(found, rungs[count - 2].around, around):
+            break
+    return kept, left
+
+
+def denied(rung: Rung) -> str:
+    """What captures say against the effect that a rung added, nothing where they don't: that an
+    amplitude of it that they know is not half of the one that it should come to
+    (`Parameter.at_least`).
+    """
+    around, model = rung.around, rung.fitted.model
+    for effect in model.effects:
+        if effect.name not in rung.added[-1:]:
+            continue
+        values = values_of(effect, model.machine, rung.fitted.values)
+        for p in effect.parameters_of(model.machine):
+            known = np.any(around.matrix[:, around.place([f"{effect.name}.{p.name}"])])
+            if p.at_least and known and values[p.name] < _COMES_TO * values[p.at_least]:
+                other = f"{p.at_least} of {values[p.at_least]:.2g}"
+                return (
+                    f"{effect.name} would take much of what is left, but captures speak against "
+                    f"it: its {other} goes with a {p.name} of {values[p.name]:.2g}"
+                )
+    return ""
+
+
+def _clears_orders(found: Sequence[Segment], before: System, after: System) -> bool:
+    """Whether some signal had waves of the angle over its floor before a rung, and none after it.
+
+    Cogging is no guess where it takes every wave there was in a torque, however much a drag of
+    nobody's library leaves at order nought, or another capture in a voltage.
+    """
+    return bool(_waved(found, before) - _waved(found, after))
+
+
+def _waved(found: Sequence[Segment], around: System) -> set[str]:
+    """Signals with waves of the angle that are told."""
+    told = told_groups(around, found)
+    return {c for (_, c, order), over in zip(around.labels, told, strict=True) if over and order}
+
+
+def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Remainder]) -> bool:
+    """Whether the effects found took most of the misfit of the signals that still miss, a tenth at
+    least of each one's own, and most of the power that held-out errors have over the floor.
+
+    An offset of the angle that takes all the torque's error explains nothing of a shaft that coasts
+    too short. Signals that had less than a tenth of the misfit do not count alone. Misfit is
+    logarithmic: of an equation that is given up at a million floors it takes half to come to a
+    thousand.
+    """
+    first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(rungs) - 1))
+    if last > _EXPLAINED * first:
+        return not left
+    signals = sorted({r.signal for r in left})
+    before, after = (
+        np.array([_excess(rung, {name}) for name in signals]) for rung in (rungs[0], rungs[-1])
+    )
+    large = before > LEAST_SHARE * before.sum()
+    taken = bool((after[large] <= (1.0 - LEAST_SHARE) * before[large]).all())
+    return not left or (taken and float(after.sum()) < _EXPLAINED * float(before.sum()))
+
+
+def _excess(rung: Rung, channels: set[str]) -> float:
+    around = rung.around
+    own = np.arange(len(own_columns(rung.fitted.model)))
+    spreads = around.grams(own).best().spreads
+    inside = np.array([channel in channels for _, channel, _ in around.labels])
+    return float((around.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())

@@ -1,0 +1,302 @@
+"""Where a model's error lives: its mean over speed and current, angle, temperature and time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment, slow_orders, told_signal
+from pipeline.criticism.effect import Array
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.numerics.cell_means import cell_means, visits_of
+from pipeline.physics.glossary import suffix_of
+from pipeline.physics.units import SUFFIX_UNITS
+from pipeline.records.error_map import Bins, ErrorMap, Histogram
+
+_SPEED_CELLS, _CURRENT_CELLS, _CURVE_CELLS = 16, 12, 12
+_ANGLE_CELLS, _MOST_ANGLE_CELLS = 36, 512
+_HISTOGRAM_REACH, _HISTOGRAM_CELLS = 8.0, 64
+"""Cells of maps and curves, of an electrical turn (10° each) and at the most of a mechanical one;
+reach of a histogram [noise floors] and its cells. By judgement, for people to look at: more cells
+hold fewer visits each, and fewer blur where an error is."""
+CURVES = (
+    "omega_mech_rad_s",
+    "iq_a",
+    "id_a",
+    "i_pair_a",
+    "temp_winding_degc",
+    "temp_magnet_degc",
+    "t_s",
+)
+"""Variables over which an error is drawn as a curve."""
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """A signal's errors as window means [n, its unit], with their noise and where they were made.
+
+    `segment` [n] numbers the captures, `window` [n] their windows, `at` holds window means [n] of
+    what an error may depend on, NaN where a capture does not tell.
+    """
+
+    signal: str
+    error: Array
+    sigma: Array
+    segment: NDArray[np.int64]
+    window: NDArray[np.int64]
+    at: Mapping[str, Array]
+
+
+def unit_of(signal: str) -> str:
+    """The unit that a signal's name ends in."""
+    return SUFFIX_UNITS.get(suffix_of(signal), "1")
+
+
+def window_errors(found: Sequence[Segment], around: System, whitened: Array) -> tuple[Errors, ...]:
+    """Every signal's errors in the plain windows of all captures, from whitened residuals [R]."""
+    parts: dict[str, list[tuple[int, NDArray[np.bool_]]]] = {}
+    for place, (number, channel, order) in enumerate(around.labels):
+        mine = around.group == place
+        if order == 0 and found[number].weak is not None and mine.any():
+            parts.setdefault(told_signal(found[number], channel), []).append((number, mine))
+    told = [window_variables(segment) for segment in found]
+    return tuple(
+        _errors_of(signal, groups, found, told, around, whitened)
+        for signal, groups in sorted(parts.items())
+    )
+
+
+def _errors_of(
+    signal: str,
+    groups: Sequence[tuple[int, NDArray[np.bool_]]],
+    found: Sequence[Segment],
+    told: Sequence[Mapping[str, Array]],
+    around: System,
+    whitened: Array,
+) -> Errors:
+    unit = np.concatenate([around.unit[mine] for _, mine in groups])
+    soft = np.concatenate([around.soft[mine] for _, mine in groups])
+
+    def variable(name: str, number: int, mine: NDArray[np.bool_]) -> Array:
+        values = told[number].get(name, np.full(found[number].size, np.nan))
+        chosen: Array = values[around.window[mine]]
+        return chosen
+
+    names = sorted({name for number, _ in groups for name in told[number]})
+    return Errors(
+        signal,
+        np.concatenate([whitened[mine] for _, mine in groups]) * unit,
+        unit * soft,
+        np.concatenate([np.full(int(mine.sum()), number) for number, mine in groups]),
+        np.concatenate([around.window[mine] for _, mine in groups]),
+        {name: np.concatenate([variable(name, *group) for group in groups]) for name in names},
+    )
+
+
+def window_variables(segment: Segment) -> dict[str, Array]:
+    """Window means [W] of what an error may depend on; the speed from the angle's ends."""
+    weak = segment.weak
+    if weak is None:
+        return {}
+    signals = dict(segment.recorded)
+    values = {}
+    theta = signals.get("theta_mech_rad")
+    if theta is not None and np.ptp(theta) > 0:
+        turned = theta[weak.starts + weak.length - 1] - theta[weak.starts]
+        values["omega_mech_rad_s"] = turned / ((weak.length - 1) * segment.ts_s)
+    for name in CURVES[1:]:
+        if name in signals:
+            values[name] = weak.means(signals[name][None])[0]
+    if "t_s" not in values:
+        values["t_s"] = weak.starts.astype(np.float64) * segment.ts_s
+    return values
+
+
+def speed_current_map(errors: Errors) -> ErrorMap | None:
+    """Mean error over cells of speed and q current; None where a capture tells only one."""
+    if "iq_a" not in errors.at or "omega_mech_rad_s" not in errors.at:
+        return None
+    speed, current = errors.at["omega_mech_rad_s"], errors.at["iq_a"]
+    inside = np.isfinite(speed) & np.isfinite(current)
+    if inside.sum() < 2:
+        return None
+    x = Bins("omega_mech_rad_s", _even(speed[inside], _SPEED_CELLS))
+    y = Bins("iq_a", _even(current[inside], _CURRENT_CELLS))
+    cell = _place(current[inside], y) * x.count + _place(speed[inside], x)
+    return _window_map(errors, inside, cell, x, y)
+
+
+def curve(errors: Errors, variable: str) -> ErrorMap | None:
+    """Mean error over twelve ranges of one variable that hold equal shares of the windows."""
+    value = errors.at.get(variable)
+    if value is None:
+        return None
+    inside = np.isfinite(value)
+    if inside.sum() < 2 or np.ptp(value[inside]) <= 1e-9 * np.abs(value[inside]).max():
+        return None
+    edges = np.unique(np.quantile(value[inside], np.linspace(0.0, 1.0, _CURVE_CELLS + 1)))
+    x = Bins(variable, tuple(float(edge) for edge in edges))
+    return _window_map(errors, inside, _place(value[inside], x), x, None)
+
+
+def direction(errors: Errors) -> ErrorMap | None:
+    """Mean error by sense of rotation: cells of negative and positive sign of the speed."""
+    value = errors.at.get("omega_mech_rad_s")
+    if value is None:
+        return None
+    inside = np.isfinite(value) & (value != 0.0)
+    sense = np.sign(value[inside])
+    if np.unique(sense).size < 2:
+        return None
+    x = Bins("direction", (-1.0, 0.0, 1.0))
+    return _window_map(errors, inside, (sense > 0).astype(np.int64), x, None)
+
+
+def _window_map(
+    errors: Errors, inside: NDArray[np.bool_], cell: NDArray[np.int64], x: Bins, y: Bins | None
+) -> ErrorMap:
+    visit = visits_of(cell, errors.segment[inside])
+    return _map(errors.signal, errors.error[inside], errors.sigma[inside], cell, visit, x, y)
+
+
+def _map(
+    signal: str,
+    error: Array,
+    sigma: Array,
+    cell: NDArray[np.int64],
+    visit: NDArray[np.int64],
+    x: Bins,
+    y: Bins | None,
+) -> ErrorMap:
+    shape = (x.count,) if y is None else (y.count, x.count)
+    found = cell_means(error, sigma, cell, visit, math.prod(shape))
+    return ErrorMap(
+        signal,
+        unit_of(signal),
+        x,
+        y,
+        found.count.reshape(shape),
+        found.mean.reshape(shape),
+        found.p_value.reshape(shape),
+        found.explained,
+        found.p_all,
+    )
+
+
+def _even(value: Array, cells: int) -> tuple[float, ...]:
+    low, high = float(value.min()), float(value.max())
+    if high <= low:
+        low, high = low - 0.5, high + 0.5
+    return tuple(float(edge) for edge in np.linspace(low, high, cells + 1))
+
+
+def _place(value: Array, bins: Bins) -> NDArray[np.int64]:
+    inner = np.array(bins.edges[1:-1])
+    return np.searchsorted(inner, value, side="right").astype(np.int64)
+
+
+def angle_maps(found: Sequence[Segment], fitted: Fitted) -> tuple[ErrorMap, ...]:
+    """Mean error over the electrical and the mechanical angle of a turn, sample by sample.
+
+    Each window's mean is taken off first: what is left is what turns with the shaft. A window is
+    one visit of every cell that it crosses.
+    """
+    parts: dict[tuple[str, str], list[tuple[Array, Array, Array, Array]]] = {}
+    cells = {
+        "theta_elec_rad": _ANGLE_CELLS,
+        "theta_mech_rad": _mechanical_cells(fitted.model),
+    }
+    first = 0
+    for segment in found:
+        if segment.weak is None or not _turns(segment):
+            continue
+        for signal, variable, part in _by_angle(segment, fitted, cells, first):
+            parts.setdefault((signal, variable), []).append(part)
+        first += segment.weak.starts.size
+    made = []
+    for (signal, variable), pieces in sorted(parts.items()):
+        error, sigma, cell, window = (np.concatenate(one) for one in zip(*pieces, strict=True))
+        x = Bins(variable, tuple(np.linspace(0.0, 2 * math.pi, cells[variable] + 1).tolist()))
+        cell = cell.astype(np.int64)
+        visit = window.astype(np.int64) * x.count + cell
+        made.append(_map(signal, error, sigma, cell, visit, x, None))
+    return tuple(made)
+
+
+def _turns(segment: Segment) -> bool:
+    theta = segment.recorded.get("theta_mech_rad")
+    turning = segment.kind in ("dq", "open", "shaft")
+    return theta is not None and turning and float(np.ptp(theta)) > 0.1
+
+
+def _mechanical_cells(model: Model) -> int:
+    """Four cells a wave of the highest order that a slow turn is looked at in."""
+    highest = math.ceil(max(slow_orders(model.machine), default=1))
+    return min(max(4 * highest, 72), _MOST_ANGLE_CELLS)
+
+
+def _by_angle(
+    segment: Segment, fitted: Fitted, cells: Mapping[str, int], first: int
+) -> Iterator[tuple[str, str, tuple[Array, Array, Array, Array]]]:
+    weak = segment.weak
+    if weak is None:
+        return
+    left = residual(segment, fitted.model, fitted.values)
+    theta = segment.recorded["theta_mech_rad"]
+    starts = disjoint(weak.starts, weak.length)
+    rows = starts[:, None] + np.arange(2, weak.length - 2)[None, :]
+    window = np.broadcast_to(first + np.arange(starts.size)[:, None], rows.shape).ravel()
+    # the bench's encoder has a zero of its own, which is known as an electrical angle alone
+    zero_rad = fitted.values["bench_angle_rad"] if segment.kind == "open" else 0.0
+    turned = {
+        "theta_elec_rad": fitted.model.machine.pole_pairs * theta - zero_rad,
+        "theta_mech_rad": theta,
+    }
+    for place, channel in enumerate(segment.channels):
+        inside = left[place][rows]
+        inside = inside - inside.mean(axis=1, keepdims=True)
+        noise = float(np.sqrt((inside**2).mean())) or 1.0
+        for variable, angle in turned.items():
+            share = np.mod(angle[rows].ravel() / (2 * math.pi), 1.0)
+            cell = np.minimum((share * cells[variable]).astype(np.int64), cells[variable] - 1)
+            error = inside.ravel()
+            part = (error, np.full(error.size, noise), cell.astype(float), window.astype(float))
+            yield told_signal(segment, channel), variable, part
+
+
+def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:
+    """Those of rising window starts [W] whose windows of `length` samples share none."""
+    kept: list[int] = []
+    for start in starts.tolist():
+        if not kept or start >= kept[-1] + length:
+            kept.append(start)
+    return np.array(kept, dtype=np.int64)
+
+
+def histograms(errors: Sequence[Errors]) -> tuple[Histogram, ...]:
+    """How each signal's window errors, over their noise floor, are spread."""
+    edges = np.linspace(-_HISTOGRAM_REACH, _HISTOGRAM_REACH, _HISTOGRAM_CELLS + 1)
+    made = []
+    for one in errors:
+        inside = np.clip(one.error / one.sigma, edges[0], np.nextafter(edges[-1], 0.0))
+        count, _ = np.histogram(inside, edges)
+        made.append(Histogram(one.signal, tuple(edges.tolist()), tuple(count.tolist())))
+    return tuple(made)
+
+
+def all_maps(
+    found: Sequence[Segment], around: System, residual_over_floor: Array, fitted: Fitted
+) -> tuple[ErrorMap, ...]:
+    """Every map of every signal: speed and current, angles, and one curve a variable."""
+    made: list[ErrorMap | None] = []
+    for errors in window_errors(found, around, residual_over_floor):
+        made.append(speed_current_map(errors))
+        made.extend(curve(errors, variable) for variable in CURVES)
+        made.append(direction(errors))
+    return (*(one for one in made if one is not None), *angle_maps(found, fitted))

@@ -1,0 +1,188 @@
+"""Free-running simulation: currents and speed that the model makes of recorded voltages and load.
+
+Every window starts from the measured state and is then left to the model's own equations,
+
+    dψ/dt = v − R i − drops − jω_e ψ,      J dω/dt = T(ψ, i) − drags − T_load,
+
+with every effect and sensor of the model in place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Complex, Values
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.validation.trajectories import (
+    ROUNDS,
+    Batch,
+    Jacobian,
+    batch_of,
+    jacobian_of,
+    settle,
+)
+from pipeline.numerics.projection import bump
+
+ELECTRICAL = ("torque_map", "drive")
+MECHANICAL = ("spin_down",)
+SPEED = "omega_mech_rad_s"
+_REPLICATES, _POOLED = 2, 96
+"""Times that noise is added at the least, and window means that are then pooled: a floor is known
+to 7 %, the root of 1/(2·96)."""
+_OFFSET = 0.5
+"""Prior of a sensor's offset in standard deviations of its noise, as in `floors`."""
+_OFFSETS = ("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
+"""Signals whose sensors may have an offset."""
+_SEED = 20261121
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Simulated beside recorded signals [W, N] of one capture's windows, on `t_s` [W, N].
+
+    `signals` are `id_a` and `iq_a` of a capture under current and, where load and angle are
+    recorded or the shaft coasts, `omega_mech_rad_s`. `floor` is the noise floor of each one's
+    window means, `drift` [K, W] how they move with each sensor's offset, of its prior size.
+    """
+
+    capture: str
+    t_s: Array
+    recorded: Mapping[str, Array]
+    simulated: Mapping[str, Array]
+    floor: Mapping[str, float]
+    drift: Mapping[str, Array]
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What was simulated."""
+        return tuple(self.simulated)
+
+    def errors(self, signal: str) -> Array:
+        """Recorded less simulated as means [W] under a smooth window.
+
+        Offsets of the capture's sensors are taken out as far as their priors allow: the means are
+        whitened by 1 + Σ d dᵀ over the drifts d, as the equations' residuals are.
+        """
+        floor = max(self.floor[signal], 1e-300)
+        error = _means(self.recorded[signal] - self.simulated[signal]) / floor
+        if not self.drift[signal].size:
+            return error * floor
+        axes, size, _ = np.linalg.svd((self.drift[signal] / floor).T, full_matrices=False)
+        taken = axes @ ((1.0 - 1.0 / np.sqrt(1.0 + size**2)) * (axes.T @ error))
+        left: Array = (error - taken) * floor
+        return left
+
+
+def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
+    """The model on its own over the windows of one capture.
+
+    None if the test is neither `ELECTRICAL` nor `MECHANICAL`, if the sample period is longer than
+    the electrical time constant, or if fewer than half of the trajectories settle.
+    """
+    if segment.test not in (ELECTRICAL if segment.kind == "dq" else MECHANICAL):
+        return None
+    still = segment.ts_s * values["r_ohm"] > min(values["ld_h"], values["lq_h"])
+    batch = None if still and segment.kind == "dq" else batch_of(segment, model, values)
+    if batch is None:
+        return None
+    recorded = batch.segment.recorded
+    jacobian = jacobian_of(batch, model, values)
+    found, settled = settle(batch, recorded, recorded, model, values, jacobian, ROUNDS)
+    if 2 * settled.sum() < batch.windows:
+        return None
+    names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
+    told = {name: _signal(batch, recorded, name)[settled] for name in names}
+    made = {name: _signal(batch, found, name)[settled] for name in names}
+    moved = _Response(batch, found, model, values, jacobian, settled, names)
+    time = recorded.get("t_s", segment.ts_s * np.arange(batch.segment.size, dtype=np.float64))
+    floor, drift = _floor(moved), _drift(moved)
+    return Run(segment.capture, batch.inside(time)[settled], told, made, floor, drift)
+
+
+def _signal(batch: Batch, signals: Mapping[str, Array], name: str) -> Array:
+    """A signal inside the windows [W, N]; the speed from the angle."""
+    if name != SPEED:
+        return batch.inside(signals[name])
+    theta = batch.folded(signals["theta_mech_rad"])
+    slope = np.gradient(theta, batch.segment.ts_s, axis=1)
+    return batch.inside(slope.ravel())
+
+
+def _means(error: Array) -> Array:
+    window = bump(error.shape[1])
+    mean: Array = error @ window / window.sum()
+    return mean
+
+
+@dataclass(frozen=True, slots=True)
+class _Response:
+    """How window means of recorded less simulated move with the recording, to first order."""
+
+    batch: Batch
+    found: Mapping[str, Array]
+    model: Model
+    values: Values
+    jacobian: Jacobian
+    settled: NDArray[np.bool_]
+    names: tuple[str, ...]
+
+    def to(
+        self, added: Mapping[str, Any], extra: tuple[Complex, Array] | None = None
+    ) -> dict[str, Array]:
+        """Changes [W] by what is added to recorded signals, and to each window's equations."""
+        batch, recorded = self.batch, self.batch.segment.recorded
+        other = {name: column + added.get(name, 0.0) for name, column in recorded.items()}
+        moved, _ = settle(
+            batch, self.found, other, self.model, self.values, self.jacobian, 1, extra
+        )
+        changes = {}
+        for name in self.names:
+            after = _signal(batch, other, name) - _signal(batch, moved, name)
+            before = _signal(batch, recorded, name) - _signal(batch, self.found, name)
+            changes[name] = _means((after - before)[self.settled])
+        return changes
+
+
+def _floor(response: _Response) -> dict[str, float]:
+    """Noise of the window means that the sensors alone make.
+
+    Noise of each sensor's level is added to the recording, and the reading error that equations are
+    allowed is added to the equations.
+    """
+    batch = response.batch
+    noise = batch.segment.noise
+    total: dict[str, list[Array]] = {name: [] for name in response.names}
+    for replicate in range(max(_REPLICATES, -(-_POOLED // int(response.settled.sum())))):
+        rng = np.random.default_rng([_SEED, replicate])
+        added = {
+            name: rng.normal(0.0, sigma, batch.segment.size)
+            for name, sigma in sorted(noise.items())
+            if sigma > 0.0 and name in batch.segment.recorded
+        }
+        for name, change in response.to(added, _missed(batch, rng, response.values)).items():
+            total[name].append(change**2)
+    return {name: math.sqrt(float(np.mean(squares))) for name, squares in total.items()}
+
+
+def _drift(response: _Response) -> dict[str, Array]:
+    """Moves [K, W] of the window means with an offset of each sensor, of half its noise."""
+    noise = response.batch.segment.noise
+    offsets = [name for name in _OFFSETS if noise.get(name, 0.0) > 0.0]
+    moves = [response.to({name: _OFFSET * noise[name]}) for name in offsets]
+    return {name: np.array([move[name] for move in moves]) for name in response.names}
+
+
+def _missed(batch: Batch, rng: np.random.Generator, values: Values) -> tuple[Complex, Array]:
+    """A draw of what the equations may miss by in each window [W]: voltage [V], torque [N·m]."""
+    drawn = batch.allowed * rng.normal(size=batch.allowed.shape)
+    if not batch.currents:
+        return np.zeros(batch.windows, dtype=complex), values["j_kgm2"] * drawn[0]
+    torque = drawn[2] if batch.shaft else np.zeros(batch.windows)
+    return drawn[0] + 1j * drawn[1], torque

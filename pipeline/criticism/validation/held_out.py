@@ -1,0 +1,146 @@
+"""Captures predicted by a model that was fitted without them: simulated, and traced for looking."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.traces import smoothed
+from pipeline.criticism.effect import Array
+from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.regression.gauss_newton import clipped
+from pipeline.criticism.regression.goodness import HeldOut
+from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.validation.error_maps import disjoint, unit_of
+from pipeline.criticism.validation.free_run import Run, free_run
+from pipeline.records.comparison import SignalError, Trace
+
+Split = Literal["fit", "held_out"]
+_LOOK_S = 0.001
+"""Length of the means that pictures show [s]: shorter, and noise covers the torque; longer, and
+the currents' steps are rounded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """One capture's free run, and whether its parameters were fitted without that capture."""
+
+    number: int
+    split: Split
+    values: Mapping[str, float]
+    run: Run
+
+
+def values_without(
+    number: int, fitted: Fitted, around: System, held: HeldOut
+) -> tuple[dict[str, float], Split]:
+    """Parameters fitted without a capture; those of the full fit where it alone carries one."""
+    step = held.steps.get(number)
+    values = dict(fitted.values)
+    if step is None:
+        return values, "fit"
+    for column, change in zip(around.columns[: step.size], step.tolist(), strict=True):
+        values[column.name] += change
+    return clipped(fitted.model, values), "held_out"
+
+
+def simulate(
+    found: Sequence[Segment], fitted: Fitted, around: System, held: HeldOut
+) -> tuple[Simulated, ...]:
+    """Free runs of every capture that allows one."""
+    made = []
+    for number, segment in enumerate(found):
+        values, split = values_without(number, fitted, around, held)
+        run = free_run(segment, fitted.model, values)
+        if run is not None:
+            made.append(Simulated(number, split, values, run))
+    return tuple(made)
+
+
+def run_errors(simulated: Sequence[Simulated]) -> Iterator[SignalError]:
+    """Errors of the simulated signals as window means beside their noise floor."""
+    for one in simulated:
+        for signal in one.run.signals:
+            error = one.run.errors(signal)
+            yield SignalError(
+                signal,
+                one.run.capture,
+                one.split,
+                math.sqrt(float((error**2).mean())),
+                one.run.floor[signal],
+                int(error.size),
+                effective(error),
+                unit_of(signal),
+                "free_run",
+            )
+
+
+def effective(residual: Array) -> float:
+    """Independent samples in autocorrelated ones: n (1 − r)/(1 + r) with lag-one r ≥ 0."""
+    n = residual.size
+    if n < 4:
+        return float(n)
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    r = float(centred[1:] @ centred[:-1]) / power if power > 0 else 0.0
+    return n * (1.0 - max(r, 0.0)) / (1.0 + max(r, 0.0))
+
+
+def traces(
+    found: Sequence[Segment], fitted: Fitted, simulated: Sequence[Simulated]
+) -> Iterator[Trace]:
+    """Recorded and predicted signals of the simulated captures, window by window."""
+    for one in simulated:
+        segment, run = found[one.number], one.run
+        if segment.kind == "dq":
+            yield from _equations(segment, fitted, one)
+        for signal in run.signals:
+            told, made = run.recorded[signal], run.simulated[signal]
+            yield _trace(segment, signal, "free_run", one.split, run.t_s, told, made)
+
+
+def _equations(segment: Segment, fitted: Fitted, one: Simulated) -> Iterator[Trace]:
+    """What the equations predict from the recorded state, averaged over a millisecond.
+
+    Without the mean, the noise of the angle's second difference would cover the torque.
+    """
+    weak = segment.weak
+    if weak is None:
+        return
+    left = residual(segment, fitted.model, one.values)
+    width = max(2 * round(_LOOK_S / segment.ts_s / 2) + 1, 1)
+    starts = disjoint(weak.starts, weak.length)
+    rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
+    for place, channel in enumerate(segment.channels):
+        told = smoothed(segment.recorded[channel], width)[rows]
+        model = told - smoothed(left[place], width)[rows]
+        time = segment.recorded["t_s"][rows]
+        yield _trace(segment, channel, "equation", one.split, time, told, model)
+
+
+def _trace(
+    segment: Segment,
+    signal: str,
+    kind: Literal["equation", "free_run"],
+    split: Split,
+    time: Array,
+    told: Array,
+    model: Array,
+) -> Trace:
+    """Windows [W, N] one after the other with a gap behind each [W (N + 1)]."""
+    gap = np.full((time.shape[0], 1), np.nan)
+    after = np.hstack([time, time[:, -1:] + segment.ts_s])
+    return Trace(
+        segment.capture,
+        signal,
+        kind,
+        split,
+        after.ravel(),
+        np.hstack([told, gap]).ravel(),
+        np.hstack([model, gap]).ravel(),
+    )

@@ -1,0 +1,69 @@
+"""Effects that the captures at hand cannot tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.effect import Told
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.selection.alternatives import rivals_of
+from pipeline.criticism.selection.score_test import candidates, widened
+from pipeline.criticism.selection.stepwise import search
+from tests.unit.criticism.machines import LIBRARY, asking_for, curved, fitted, with_drag
+
+
+def test_a_rival_is_told_where_the_captures_cannot_part_them():
+    """Two names of one formula are one class; friction of another shape is not in it."""
+    twin = replace(effects()["windage"], name="brake")
+    library = {**LIBRARY, "brake": twin}
+
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    last = search(segments, fitted(segments), library)[-1]
+    assert last.added in {("windage",), ("brake",)}
+    offered = candidates(library, last.fitted)
+    rivals = rivals_of(last.added[0], last.fitted, last.around, offered, segments)
+    assert set(rivals) == {"windage", "brake"} - set(last.added)
+
+
+def test_a_rival_is_told_whatever_size_it_comes_out_at():
+    """That it would be too small to matter does not part it from what it is confused with."""
+    twin = replace(asking_for(0.1)["windage"], name="brake")
+    segments = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
+    fit = search(segments, fitted(segments), LIBRARY)[-1].fitted
+    assert [effect.name for effect in fit.model.effects] == ["windage"]
+    offered = candidates({**LIBRARY, "brake": twin}, fit)
+    around = widened(segments, fit, offered)
+    assert rivals_of("windage", fit, around, offered, segments) == ("brake",)
+
+
+@pytest.mark.parametrize("told", ["brake", "windage", None])
+def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
+    """Two forms that are one: the look's word counts, and without it each is the other's rival."""
+
+    def look(wholes, q):
+        assert set(q) == {"drag_nm"}
+        return None if told is None else Told(told, {"drag_nm": (0.029, 0.001)})
+
+    windage = replace(LIBRARY["windage"], closer=look)
+    library = {**LIBRARY, "windage": windage, "brake": replace(windage, name="brake")}
+
+    def drag(omega, _):
+        return 0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    last = search(segments, fitted(segments), library)[-1]
+    assert len(last.added) == 1
+    name = last.added[0]
+    offered = candidates(library, last.fitted)
+    rivals = rivals_of(name, last.fitted, last.around, offered, segments)
+    if told is None:
+        assert set(rivals) == {"windage", "brake"} - {name}
+        return
+    assert (name, rivals) == (told, ())
+    assert last.fitted.values[f"{told}.drag_nm"] == pytest.approx(0.03, rel=0.05)

@@ -1,0 +1,57 @@
+"""An unknown curve in words: what it does where its variable is largest, and where that is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.discovery.description import _run
+from pipeline.criticism.discovery.dictionary import Term
+from pipeline.criticism.discovery.matching_pursuit import Expression
+from pipeline.criticism.discovery.residual_inputs import ports
+from pipeline.records.diagnosis import CurvePoint
+from tests.unit.criticism.machines import machine
+
+
+def words(variable: str, low: float, high: float, *terms: tuple[float, Term]) -> str:
+    """What is said of a drag on one variable that is visited from low to high."""
+    port = next(
+        p
+        for p in ports(machine(), ("torque",))
+        if p.variable.name == variable and not p.carriers[0].words
+    )
+    amplitudes = np.array([size for size, _ in terms])
+    nothing = np.zeros(0)
+    found = Expression(
+        tuple(term for _, term in terms), amplitudes, (), np.eye(0), 1.0, nothing, nothing
+    )
+    curve = tuple(CurvePoint(float(at), 0.0, 0.0, 0.0) for at in np.linspace(low, high, 17))
+    return _run(port, curve, found, 0)
+
+
+SPEED = "omega_mech_rad_s"
+GROWING = "still growing at the end of the range,"
+LEVEL = "level towards the end of the range,"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "term", "told"),
+    [
+        (-200.0, 200.0, Term("step", parity="odd"), f"odd, {LEVEL} 0.02 N·m at 200 rad/s"),
+        (-200.0, 150.0, Term("step", parity="odd"), f"odd, {LEVEL} 0.02 N·m at 200 rad/s"),
+        (-200.0, 200.0, Term("tanh", parity="odd", scale=20.0), f"odd, {LEVEL} 0.02 N·m"),
+        (-200.0, 200.0, Term("line", parity="odd", scale=200.0), f"odd, {GROWING} 0.02 N·m"),
+        (-200.0, 200.0, Term("tanh", parity="odd", scale=150.0), f"odd, {GROWING}"),
+        (-200.0, 200.0, Term("square", parity="even", scale=200.0), f"even, {GROWING} 0.02"),
+        (-250.0, 200.0, Term("cube", parity="odd", scale=200.0), f"odd, {GROWING} 0.0391"),
+        (-200.0, 200.0, Term("peak", parity="odd", scale=70.0), "odd, with its maximum 0.02 N·m"),
+        (5.0, 200.0, Term("decay", parity="even", scale=50.0), "largest, 0.0181 N·m at 5 rad/s"),
+    ],
+)
+def test_a_curve_grows_at_its_end_only_where_it_still_rises(low, high, term, told):
+    assert words(SPEED, low, high, (0.02, term)).startswith(told)
+
+
+def test_a_drag_below_the_freezing_point_is_told_below_it():
+    told = words("temp_winding_degc", -40.0, 10.0, (0.02, Term("line", parity="even", scale=40.0)))
+    assert told == "largest, 0.02 N·m at -15 degC"

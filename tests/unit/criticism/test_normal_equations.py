@@ -1,0 +1,72 @@
+"""Fits from normal matrices by group against least squares on the rows themselves."""
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.regression.normal_equations import Grams
+
+GROUP = np.repeat([0, 1, 2], [40, 60, 30])
+NOTHING = np.zeros(4)
+
+
+def rows(bad=1.0):
+    """Four columns in three groups, the last of which is off by a constant."""
+    random = np.random.default_rng(5)
+    matrix = random.normal(size=(GROUP.size, 4))
+    residual = matrix @ [1.0, -2.0, 0.5, 0.0] + 0.5 * random.normal(size=GROUP.size)
+    return matrix, residual + np.where(GROUP == 2, bad, 0.0)
+
+
+def grams(matrix, residual, penalty=NOTHING, pull=NOTHING):
+    return Grams.of(matrix, residual, GROUP, 3, penalty, pull, 0.0)
+
+
+def test_groups_at_their_floor_make_an_ordinary_least_squares_fit():
+    matrix, residual = rows(bad=0.0)
+    end = grams(matrix, residual).best()
+    expected = np.linalg.lstsq(matrix, -residual, rcond=None)[0]
+    assert end.step == pytest.approx(expected, rel=1e-9)
+    left = (residual + matrix @ expected) ** 2
+    assert end.spreads == pytest.approx(
+        [left[place].mean() for place in (n == GROUP for n in range(3))], rel=1e-9
+    )
+
+
+def test_a_group_that_misses_its_floor_counts_less():
+    """Its weight is one over its own mean square, so that the others keep their answer."""
+    matrix, residual = rows(bad=1000.0)
+    end = grams(matrix, residual).best()
+    sound = GROUP != 2
+    alone = np.linalg.lstsq(matrix[sound], -residual[sound], rcond=None)[0]
+    everything = np.linalg.lstsq(matrix, -residual, rcond=None)[0]
+    assert np.abs(end.step - alone).max() < 0.05
+    assert np.abs(everything - alone).max() > 10.0
+
+
+def test_a_prior_holds_what_the_rows_do_not_know():
+    matrix, residual = rows(bad=0.0)
+    matrix[:, 3] = 0.0
+    penalty, pull = np.array([0.0, 0.0, 0.0, 4.0]), np.array([0.0, 0.0, 0.0, 2.0])
+    end = grams(matrix, residual, penalty, pull).best()
+    # a nuisance of standard uncertainty 0.5 that stands at 0.5 goes back to its centre
+    assert end.step[3] == pytest.approx(-0.5)
+
+
+def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
+    matrix, residual = rows()
+    there = grams(matrix, residual).moved(np.array([1, 3]), np.array([0.7, -0.2]))
+    direct = grams(matrix, residual + matrix[:, [1, 3]] @ [0.7, -0.2])
+    assert there.power == pytest.approx(direct.power)
+    assert there.slope == pytest.approx(direct.slope)
+    some = there.along(np.array([0, 2])).best()
+    again = Grams.of(
+        matrix[:, [0, 2]],
+        residual + matrix[:, [1, 3]] @ [0.7, -0.2],
+        GROUP,
+        3,
+        np.zeros(2),
+        np.zeros(2),
+        0.0,
+    ).best()
+    assert some.step == pytest.approx(again.step)
+    assert some.misfit == pytest.approx(again.misfit)

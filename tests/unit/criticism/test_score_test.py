@@ -1,0 +1,147 @@
+"""What candidates promise, and what is said of one that is not named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.library.registry import effects
+from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linearise import effect_columns
+from pipeline.criticism.selection.score_test import Candidate, Score, candidates, score_all, widened
+from pipeline.criticism.selection.stepwise import _floored_anew
+from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, machine, with_drag
+
+
+@pytest.mark.parametrize(
+    ("what", "told"),
+    [
+        ({"fall": 10.0}, "not worth its parameters"),
+        ({"size": 0.25, "share": 0.5}, "seen, at 0.25 of the least size that matters"),
+        (
+            {"size": 0.25, "share": 0.5, "clears": True},
+            "refitted, it does not hold on captures held out, or may be zero",
+        ),
+        ({"share": 0.05}, "takes too small a share of what is over the noise floor"),
+        ({"share": 0.5}, "refitted, it does not hold on captures held out, or may be zero"),
+        ({"quiet": 40.0}, "refitted, it does not hold on captures held out, or may be zero"),
+        (
+            {"quiet": 40.0, "effect": "sample_delay"},
+            "what it would explain lies below the noise floor",
+        ),
+        (
+            {"quiet": 40.0, "effect": "compliance"},
+            "what it would explain lies below the noise floor",
+        ),
+    ],
+)
+def test_what_an_effect_lacks_is_said(what, told):
+    effect = effects()[what.pop("effect", "windage")]
+    known = {"fall": 60.0, "share": 0.0, "size": 2.0, "quiet": 0.0, **what}
+    score = Score(Candidate(effect, ()), price=15.0, step={}, moves={}, **known)
+    assert score.shortfall == told
+    assert score.passes == (
+        told == "refitted, it does not hold on captures held out, or may be zero"
+    )
+
+
+def test_a_fits_own_columns_are_made_where_it_stands():
+    """Those of candidates may stay from the rung before, 3 % of ψ away."""
+    segments = (log(noise=1.0),)
+    here = fitted(segments)
+    away = replace(here, values={**here.values, "psi_wb": 1.03 * here.values["psi_wb"]})
+    offered = candidates(LIBRARY, here)
+    before = widened(segments, away, offered)
+    around, fresh = widened(segments, here, offered, before), widened(segments, here, offered)
+    own = len(own_columns(here.model))
+    # how many columns are projected at a time is a matter of rounding on some processors
+    off = np.abs(around.matrix[:, :own] - fresh.matrix[:, :own]).max(axis=0)
+    assert (off <= 1e-13 * np.abs(fresh.matrix[:, :own]).max(axis=0)).all()
+    assert not np.allclose(around.matrix[:, :own], before.matrix[:, :own], rtol=1e-3, atol=0.0)
+    kept, made = (s.matrix[:, own:] / s.whiten[:, None] for s in (around, before))
+    assert kept == pytest.approx(made, rel=1e-9, abs=1e-12 * np.abs(made).max())
+
+
+def test_a_drag_of_the_wrong_sign_is_no_friction():
+    """Windage that pushes is not offered: physics has no such effect."""
+
+    def drag(omega, _):
+        return -0.03 * omega * np.abs(omega) / 250.0**2
+
+    segments = (with_drag(drag), with_drag(drag, 6))
+    start = fitted(segments)
+    offered = candidates(LIBRARY, start)
+    scores = score_all(widened(segments, start, offered), start, offered)
+    assert "windage" not in {s.candidate.effect.name for s in scores if s.passes}
+
+
+@pytest.mark.parametrize(("size_nm", "told"), [(-0.03, True), (0.03, False)])
+def test_an_amplitude_that_may_not_be_above_zero_is_not_offered_above_it(size_nm, told):
+    """Windage with its bounds exchanged: what pushes is told, and what brakes is not."""
+    windage = LIBRARY["windage"]
+    (braking,) = windage.parameters
+    pushing = replace(windage, parameters=(replace(braking, low=-1.0, high=0.0),))
+    segments = (with_drag(curved(size_nm)), with_drag(curved(size_nm), 6))
+    start = fitted(segments)
+    offered = candidates({"windage": pushing}, start)
+    scores = score_all(widened(segments, start, offered), start, offered)
+    assert [s.candidate.effect.name for s in scores] == ["windage"] * told
+
+
+def test_zero_of_an_effect_takes_the_trial_shape():
+    model = Model(machine(), ())
+    values = zero(effects()["stribeck"], model)
+    assert values["stribeck.excess_nm"] == 0.0
+    assert values["stribeck.speed_rad_s"] == pytest.approx(0.004 * 250.0)
+
+
+@pytest.mark.parametrize(("other", "expected"), [(1.0, 1.0), (1000.0, 0.002)])
+def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
+    """One capture of two comes to its floor from χ²/n = 3, the other stays where it is.
+
+    By logarithms, that would be an eighth of all misfit beside a capture at 1000.
+    """
+    effect, model = effects()["windage"], Model(machine(), ())
+    (column,) = effect_columns(effect, model)
+    random = np.random.default_rng(4)
+    shape = np.concatenate([np.sqrt(2.0) * random.choice([-1.0, 1.0], 100), np.zeros(100)])
+    noise = random.choice([-1.0, 1.0], 200)
+    around = System(
+        columns=(*own_columns(model), column),
+        residual=noise * np.repeat([1.0, np.sqrt(other)], 100) - shape,
+        matrix=np.column_stack([np.zeros((200, len(own_columns(model)))), shape / 0.1]),
+        group=np.repeat([0, 1], 100),
+        window=np.tile(np.arange(100), 2),
+        unit=np.ones(200),
+        soft=np.ones(200),
+        whiten=np.ones(200),
+        labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
+        penalty=np.zeros(1 + len(own_columns(model))),
+        pull=np.zeros(1 + len(own_columns(model))),
+        around=Fitted(model, dict(BASE), (), BASE),
+        tests=("drive", "drive"),
+        made_at={},
+    )
+    (score,) = score_all(around, around.around, [Candidate(effect, (column,))])
+    assert score.fall > score.price
+    assert score.share == pytest.approx(expected, abs=0.2 * expected)
+
+
+NO_STAMP = {"torque_lag.late": 0.0, "torque_lag.stamped": 0.0}
+
+
+@pytest.mark.parametrize(("lag_s", "anew"), [(2e-3, True), (1e-6, False)])
+def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
+    segments = (log(noise=1.0), log(noise=1.0, seed=6))
+    before = fitted(segments)
+    lagging = replace(
+        before,
+        model=before.model.with_effects(effects()["torque_lag"]),
+        values={**before.values, "torque_lag.lag_s": lag_s} | NO_STAMP,
+    )
+    after = _floored_anew(segments, lagging)
+    assert (after.sigma is not before.sigma) is anew
+    assert bool(after.sigma[0][-1] > 2.0 * before.sigma[0][-1]) is anew

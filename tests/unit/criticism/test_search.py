@@ -1,0 +1,95 @@
+"""How often the ladder is climbed, and which climb is believed."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from pipeline.criticism import search
+from pipeline.criticism.search import ended
+from pipeline.records.comparison import ModelSpec
+from tests.unit.criticism.machines import machine
+
+
+@pytest.fixture
+def climbs(monkeypatch):
+    """Ladders that are no more than the orders their equations look at; `sketched` says which of
+    them leave something that a state of the machine predicts, `wanders` gives a calmer one.
+    """
+    made = SimpleNamespace(orders=[], seen=(), sketched=set(), explained=False, wanders=False)
+
+    class Ladder(SimpleNamespace):
+        def explains(self, _):
+            return made.explained
+
+        def large(self):
+            return ("large", *self.left)
+
+    def climbed(begun, _):
+        looked = begun if isinstance(begun, tuple) else "calm"
+        made.orders.append(looked)
+        rung = SimpleNamespace(around=None, fitted=None)
+        inside = SimpleNamespace(segments=(), fitted=None, hum=())
+        return Ladder(looked=looked, left=(looked,), rungs=(rung,), begun=inside)
+
+    def sketched(ladder, left, name, in_parts=False):
+        return (ladder.looked, in_parts) if (ladder.looked, in_parts) in made.sketched else None
+
+    monkeypatch.setattr(search, "climbed", climbed)
+    monkeypatch.setattr(search, "_sketched", sketched)
+    monkeypatch.setattr(search, "segments", lambda _, of: of.load_orders)
+    monkeypatch.setattr(search, "fit_of", lambda found, _: tuple(found))
+    monkeypatch.setattr(search, "model_of", lambda *_: None)
+    monkeypatch.setattr(search, "orders_left", lambda *_: made.seen)
+    monkeypatch.setattr(search, "wandering", lambda *_: () if made.wanders else None)
+    monkeypatch.setattr(search, "gauss_newton", lambda *_: (None, None))
+    return made
+
+
+def end():
+    return ended(SimpleNamespace(), ModelSpec("standard"), machine(), (), {}, "m_unknown")
+
+
+def test_orders_that_are_whole_join_at_once(climbs):
+    climbs.seen, climbs.explained = (16, 37), True
+    assert end().ladder.looked == (16, 37)
+    assert climbs.orders == [(), (16, 37)]
+
+
+@pytest.mark.parametrize(("sketched", "looked"), [(True, (16, 4.83)), (False, (16,))])
+def test_others_join_where_they_alone_give_a_sketch(climbs, sketched, looked):
+    climbs.seen = (16, 4.83)
+    climbs.sketched = {((16, 4.83), False)} if sketched else set()
+    found = end()
+    assert found.ladder.looked == looked
+    assert climbs.orders == [(), (16,), (16, 4.83)]
+    assert (found.sketch is not None) is sketched
+
+
+def test_others_are_not_tried_where_a_sketch_is_there_or_nothing_is_left(climbs):
+    climbs.seen, climbs.sketched = (4.83,), {((), False)}
+    assert end().sketch is not None
+    climbs.sketched, climbs.explained = set(), True
+    assert end().sketch is None
+    assert climbs.orders == [(), ()]
+
+
+def test_wander_is_looked_for_where_nothing_predicts_what_is_left(climbs):
+    climbs.wanders = True
+    found = end()
+    assert found.ladder.looked == "calm"
+    assert found.left == ("large", "calm")
+    assert "wander" in found.notes[0]
+    climbs.sketched = {((), False)}
+    assert end().notes == ()
+
+
+def test_a_sketch_held_out_in_parts_is_said_to_be_so(climbs):
+    """What is left stays as it was told then, also where it is large only beside little voltage."""
+    climbs.sketched = {((), True)}
+    found = end()
+    assert found.sketch is not None
+    assert (found.left, len(found.notes)) == (((),), 1)
+    climbs.sketched = set()
+    assert (end().left, end().notes) == (("large", ()), ())

@@ -1,0 +1,110 @@
+"""How coarse a recording is, and what that makes of a noise floor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.data.sensor_noise import (
+    coarse_step,
+    is_rounded,
+    resolution,
+    rounding_step,
+    sensor_noise,
+)
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import Fitted, floors, floors_grown, system
+from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.selection.stepwise import _shrunk
+from tests.unit.criticism.machines import BASE, coasting, log, machine
+
+
+def rounded(step, sigma, seed=3, n=6000):
+    """A slow signal with noise, in whole steps."""
+    t = np.linspace(0.0, 1.0, n)
+    signal = 5.0 + 0.4 * np.sin(7.0 * t) + np.random.default_rng(seed).normal(0.0, sigma, n)
+    return np.round(signal / step) * step
+
+
+@pytest.mark.parametrize("step", [2.0**-7, 0.01, 1.0 / 3.0])
+def test_the_resolution_of_a_signal_is_the_step_of_its_values(step):
+    assert resolution(rounded(step, 0.3)) == pytest.approx(step, rel=1e-6)
+
+
+def test_numbers_of_no_step_have_no_resolution():
+    random = np.random.default_rng(1)
+    assert resolution(np.full(100, 3.0)) == 0.0
+    assert resolution(random.choice([0.0, 1.0, np.pi, np.e * 3, 7.3], 200)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("share", "coarse"), [(0.0, True), (0.2, True), (0.8, False), (3.0, False)]
+)
+def test_a_signal_is_coarse_where_its_noise_does_not_dither_it(share, coarse):
+    signal = rounded(0.02, 0.02 * share)
+    assert coarse_step(signal, sensor_noise(signal)) == pytest.approx(0.02 if coarse else 0.0)
+
+
+@pytest.mark.parametrize("file_step", [0.0, 2.0**-18])
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+@pytest.mark.parametrize("counts", [2000, 2400, 4000, 4096, 5000, 8000, 10_000, 2**14, 2**17])
+def test_an_encoder_s_counts_a_turn_are_told_whether_powers_of_two_or_not(counts, noise, file_step):
+    """Line encoders are within 0.05 bit of 2^n, and a step 0.1 % off is out of step in a turn."""
+    step, random = 2.0 * np.pi / counts, np.random.default_rng(1)
+    t = np.arange(20_000) * 1e-4
+    moved = 48.0 * np.sin(2.5 * t) + noise * step * random.normal(size=t.size)
+    theta = np.round(moved / step) * step
+    theta = np.round(theta / file_step) * file_step if file_step else theta
+    told = rounding_step(theta)
+    assert 2.0 * np.pi / told == pytest.approx(counts, rel=1e-9)
+    assert is_rounded(theta, told)
+
+
+def test_a_noisy_angle_has_no_step():
+    theta = np.linspace(0.0, 9.0, 8000) + np.random.default_rng(2).normal(0.0, 1e-3, 8000)
+    assert rounding_step(theta) == 0.0
+
+
+def test_the_floor_holds_what_coarse_rounding_really_does():
+    """A voltage in steps of 50 mV: of white noise a window would leave a fifteenth of q/√12."""
+    step, segment = 0.05, log()
+    fine = segment.recorded["vd_v"]
+    model, orders = Model(machine(), ()), segment.weak.orders
+    errors, told_floors = [], []
+    for shift in (0.1, 0.3, 0.7):
+        coarse = np.round(fine / step + shift) * step - shift * step
+        error = segment.weak.project((coarse - fine)[None])[0][:, orders == 0]
+        told = replace(
+            segment,
+            recorded={**segment.recorded, "vd_v": coarse},
+            noise={**segment.noise, "vd_v": step / np.sqrt(12.0)},
+            steps={"vd_v": step},
+        )
+        white = replace(told, steps={})
+        errors.append(float(np.sqrt((error**2).mean())))
+        told_floors.append([float(noise_floor(s, model, BASE, 1)[0]) for s in (told, white)])
+    rounding, by_white = np.array(told_floors).T
+    assert (rounding > 0.7 * np.array(errors)).all()
+    assert (rounding < 4.0 * np.array(errors)).all()
+    assert (by_white < 0.8 * np.array(errors)).all()
+
+
+def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
+    """Halved R and L halve what a current's noise does to a voltage: that is no better fit."""
+    noise = {**log().noise, "vd_v": 1e-6, "vq_v": 1e-6, "id_a": 0.2, "iq_a": 0.2}
+    segments = (replace(log(), noise=noise), coasting())
+    model = Model(machine(), ())
+    halved = {**BASE, **{name: 0.5 * BASE[name] for name in ("r_ohm", "ld_h", "lq_h")}}
+    fit = Fitted(model, halved, floors(segments, model, BASE), BASE)
+    grown, free = floors_grown(segments, fit)
+    groups = row_index(segments[0])[3]
+    volts = [n for n, (channel, _) in enumerate(groups) if channel != "torque_shaft_nm"]
+    assert grown[volts] == pytest.approx(0.5, abs=0.05)
+    assert np.array_equal(free, np.ones(free.size))
+    around = system(segments, fit)
+    factors = _shrunk(segments, around)
+    assert factors.min() >= 1.0 - 1e-9
+    assert 1.2 < factors[volts].max() <= 4.0 + 1e-9
