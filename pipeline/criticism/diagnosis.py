@@ -14,6 +14,7 @@ from pipeline.criticism.data.segments import segments
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.ladder import parameters_of, rung_record
+from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -30,12 +31,14 @@ from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unu
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.score_test import TIE, Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import Rung, loss_without
+from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import KnownCombination, ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import (
     Diagnosis,
+    LadderRung,
     RankedEffect,
     Remainder,
     ToldParameter,
@@ -86,7 +89,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         verdict,
         last.added,
         ranking,
-        tuple(rung_record(found, r, h) for r, h in zip(ladder.rungs, ladder.held, strict=True)),
+        _records(found, ladder.rungs, ladder.held),
         end.sketch if verdict == "unknown" else None,
         _as_told(found, last.around, end.left),
         (
@@ -102,6 +105,20 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         unseen,
         model.effects,
         together,
+    )
+
+
+def _records(
+    found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
+) -> tuple[LadderRung, ...]:
+    """The rungs for people, each with the signature of what came with it."""
+    told = [rung_record(found, rung, one) for rung, one in zip(rungs, held, strict=True)]
+    signatures = [
+        signature(found, (rungs[n - 1], rungs[n]), (told[n - 1], told[n]))
+        for n in range(1, len(told))
+    ]
+    return tuple(
+        replace(one, signature=shown) for one, shown in zip(told, [None, *signatures], strict=True)
     )
 
 
@@ -188,6 +205,7 @@ def _ranking(
         confused = rivals_of(name, last.fitted, last.around, offered, captured, over)
         dof = effect.dof(last.fitted.model.machine)
         loss = _loss(captured, last, effect, dof)
+        told = _parameters(last, effect, held[-1])
         found.append(
             RankedEffect(
                 name,
@@ -197,7 +215,7 @@ def _ranking(
                 confused,
                 f"{effect.words}; {effect.signature}",
                 experiment_for(effect, confused, library),
-                _parameters(last, effect, held[-1]),
+                told,
                 separations(
                     effect,
                     confused,
@@ -207,6 +225,7 @@ def _ranking(
                     captured,
                     remedies(effect, confused, library),
                 ),
+                headline=headline(effect, told),
             )
         )
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]

@@ -354,6 +354,8 @@ class Effect:
     capture columns without which the effect cannot be seen, `tests` those that excite it, the
     best first. `rivals`: other effects and the test or calibration that parts them from this.
     `left_out`: the numbers of the optional terms that this copy of the effect does without.
+    `headline`: what a person says of it, with sizes in braces (`criticism.library.headline`); its
+    name and its parameters where it has none.
     """
 
     name: str
@@ -378,6 +380,7 @@ class Effect:
     clock: ClockHook | None = None
     closer: CloserHook | None = None
     left_out: tuple[int, ...] = ()
+    headline: str = ""
 
     @property
     def hook(self) -> str:

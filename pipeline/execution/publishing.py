@@ -20,8 +20,8 @@ from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import COLUMNS, nothing_usable, summary
-from pipeline.report.words import KEY_CONSTANTS
 from pipeline.settings import RunSettings
+from pipeline.views.constants import KEY_CONSTANTS
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"

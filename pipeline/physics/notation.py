@@ -128,7 +128,9 @@ def plain(value: float, digits: int = 6) -> str:
 
 
 def _takes_prefix(shown: str) -> bool:
-    return any(shown == unit or shown.startswith((unit + "/", unit + "·")) for unit in _PREFIXABLE)
+    return shown == "rad" or any(
+        shown == unit or shown.startswith((unit + "/", unit + "·")) for unit in _PREFIXABLE
+    )
 
 
 def _rounded_magnitude(value: float, digits: int = 4) -> float:

@@ -37,6 +37,7 @@ class RankedEffect:
     `held_out_drop`: share of the removable held-out error that goes with it. `parameters`: value
     and standard uncertainty by name, where it was fitted. Of an effect that is not called for,
     `size` is its largest amplitude over the least that matters, `shortfall` why it is not named.
+    `headline` is what a person says of a found one, with its size.
     """
 
     effect: str
@@ -50,6 +51,7 @@ class RankedEffect:
     separation: tuple[Separation, ...] = ()
     size: float | None = None
     shortfall: str = ""
+    headline: str = ""
 
     @property
     def slight(self) -> bool:
@@ -73,6 +75,7 @@ class RankedEffect:
             "separation": [one.document() for one in self.separation],
             "size": self.size,
             "shortfall": self.shortfall,
+            "headline": self.headline,
         }
 
 
@@ -90,12 +93,40 @@ class RungError:
 
 
 @dataclass(frozen=True, slots=True)
+class Signature:
+    """What came with a rung, as people look at it: mean errors of a signal [unit] without it and
+    with it, [n] each, `at` values of a variable, a glossary name [its unit]. `capture` is None
+    where it is of all captures together.
+    """
+
+    signal: str
+    unit: str
+    variable: str
+    capture: str | None
+    at: tuple[float, ...]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: an extension of `contract/outputs.md`."""
+        return {
+            "signal": self.signal,
+            "unit": self.unit,
+            "variable": self.variable,
+            "capture": self.capture,
+            "at": list(self.at),
+            "before": list(self.before),
+            "after": list(self.after),
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class LadderRung:
     """A model's held-out error, 1 at the noise floor, and rms error of each signal [its unit].
 
     For looking: `errors` are those of `signals` beside their noise floors, `parameters` those of
     the effects on this rung (value, standard uncertainty, unit), `maps` where the error lives,
-    `histograms` how it is spread.
+    `histograms` how it is spread, `signature` what gives away that which came with the rung.
     """
 
     effects: tuple[str, ...]
@@ -105,6 +136,7 @@ class LadderRung:
     parameters: Mapping[str, ToldParameter] = field(default_factory=dict)
     maps: tuple[ErrorMap, ...] = field(default=())
     histograms: tuple[Histogram, ...] = field(default=())
+    signature: Signature | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""
@@ -119,6 +151,7 @@ class LadderRung:
             },
             "maps": [one.document() for one in self.maps],
             "histograms": [one.document() for one in self.histograms],
+            "signature": None if self.signature is None else self.signature.document(),
         }
 
     def map_of(self, signal: str, *variables: str) -> ErrorMap | None:

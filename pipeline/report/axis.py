@@ -8,21 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.physics.glossary import suffix_of
 from pipeline.physics.notation import MINUS, Scale, scale_for
-from pipeline.physics.units import SUFFIX_UNITS
+from pipeline.views.names import quantity_words, unit_of
 
 Array = NDArray[np.float64]
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _ANGLE_STEPS = (5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0)
-_SPOKEN = {
-    "t": "time",
-    "theta": "angle",
-    "omega": "speed",
-    "alpha": "acceleration",
-    "temp": "temperature",
-}
-_AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc", "vca", "vdc"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,21 +70,6 @@ def padded(low: float, high: float, share: float = 0.05) -> tuple[float, float]:
     """The range with a share of its width added on both sides."""
     air = share * (high - low)
     return low - air, high + air
-
-
-def unit_of(name: str) -> str:
-    """The unit that the suffix of a name stands for; `1` where it has none."""
-    return SUFFIX_UNITS.get(suffix_of(name), "1")
-
-
-def quantity_words(name: str) -> str:
-    """A glossary name without its unit, in words: `temp_winding_degc` is temperature winding."""
-    suffix = suffix_of(name)
-    stem = name[: -len(suffix) - 1] if suffix else name
-    first, *rest = stem.split("_")
-    if first in _AXES and not rest:
-        return f"{first[0]}_{first[1:]}"
-    return " ".join([_SPOKEN.get(first, first), *rest])
 
 
 def _bracket(scale: Scale) -> str:

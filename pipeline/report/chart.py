@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from pipeline.numerics.thinning import cloud_points, line_points
 from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
-from pipeline.report.axis import Axis, axis_for, padded, symmetric_axis, unit_of
+from pipeline.report.axis import Axis, axis_for, padded, symmetric_axis
 from pipeline.report.residual import ResidualScale, residual_of, residual_scale
+from pipeline.views.names import unit_of
 
 Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0

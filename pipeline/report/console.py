@@ -10,8 +10,8 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
-from pipeline.report.model_words import model_words
 from pipeline.report.status_text import status_lines
+from pipeline.views.model_words import model_words
 
 COLUMNS: tuple[tuple[str, str, float], ...] = (
     ("p", "pole_pairs", 1.0),

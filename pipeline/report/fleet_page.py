@@ -14,11 +14,11 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-from pipeline.report.model_words import ModelWords, model_words
 from pipeline.report.page import render
 from pipeline.report.status_text import status_lines
 from pipeline.report.strip import Dot, strip_plot
-from pipeline.report.words import KEY_CONSTANTS, constant_words, symbol
+from pipeline.views.constants import KEY_CONSTANTS, constant_words, symbol
+from pipeline.views.model_words import ModelWords, model_words
 
 STATUS_ORDER = ("refused", "revoked", "provisional", "released")
 NO_LOT = "no lot"

@@ -10,8 +10,9 @@ import numpy as np
 
 from pipeline.physics.notation import quantity
 from pipeline.records.error_map import ErrorMap
-from pipeline.report.axis import Axis, axis_for, quantity_words, symmetric_axis
+from pipeline.report.axis import Axis, axis_for, symmetric_axis
 from pipeline.report.chart import Panel
+from pipeline.views.names import quantity_words
 
 WIDTH, LEFT, TOP, HEIGHT, BOTTOM = 400.0, 52.0, 20.0, 180.0, 38.0
 BAR, BAR_GAP, BAR_LABELS = 12.0, 12.0, 70.0

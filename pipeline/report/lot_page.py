@@ -11,7 +11,7 @@ from pipeline.records.lot_regression import EffectChange, LotRegression, OrderLe
 from pipeline.report.lot_chart import cogging_chart, lot_chart
 from pipeline.report.lot_text import mean_of
 from pipeline.report.page import render
-from pipeline.report.words import constant_words, symbol
+from pipeline.views.constants import constant_words, symbol
 
 NONE = "–"
 RANK = {"fail": 0, "CONFOUNDED": 1, "INSUFFICIENT_HISTORY": 2, "undecided": 3, "marginal": 4}

@@ -16,11 +16,11 @@ from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.uncertainty import covariance
 from pipeline.report.chart import chart
-from pipeline.report.conditions import conditions
-from pipeline.report.model_words import model_words
 from pipeline.report.page import render
 from pipeline.report.status_block import status_block
-from pipeline.report.words import GROUPS, KEY_CONSTANTS, constant_words, grouped, symbol
+from pipeline.views.conditions import conditions
+from pipeline.views.constants import GROUPS, KEY_CONSTANTS, constant_words, grouped, symbol
+from pipeline.views.model_words import model_words
 
 NEGLIGIBLE = 1e-3
 CHECK_ORDER = ("fail", "marginal", "not_evaluated", "pass")

@@ -12,7 +12,7 @@ from pipeline.records.difference import Change
 from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Event, Version
 from pipeline.records.naming import counted
-from pipeline.report.model_words import model_words
+from pipeline.views.model_words import model_words
 
 NONE = "-"
 SHOWN_DIGITS = 12

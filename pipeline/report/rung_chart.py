@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 
-from pipeline.report.axis import quantity_words
+from pipeline.views.names import quantity_words
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 760.0, 250.0, 56.0, 130.0, 22.0, 44.0
 LABEL_PITCH, COLOURS = 14.0, 6

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pipeline.records.current_status import CurrentStatus
 from pipeline.records.datasheet import Datasheet
+from pipeline.report.link_block import replaced
 from pipeline.report.page import render
 from pipeline.report.status_text import status_lines, status_words
 
@@ -31,8 +32,4 @@ def with_status(page: str, sheet: Datasheet, current: CurrentStatus) -> str:
 
     No text of a capture can hold a mark: `<` is escaped in all of it.
     """
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        return page
-    return f"{before}{status_block(sheet, current)}{after}"
+    return replaced(page, (BEGIN, END), status_block(sheet, current))

@@ -29,7 +29,19 @@ class Judged:
     undecided: bool
 
 
-Judge = Callable[[Campaign, ModelSpec, Constants, Path, Stopwatch], Judged]
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One motor to judge: its captures of `folder`, the model, where to write, whose seconds."""
+
+    campaign: Campaign
+    spec: ModelSpec
+    start: Constants
+    folder: str
+    output: Path
+    watch: Stopwatch
+
+
+Judge = Callable[[Task], Judged]
 
 
 def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
@@ -54,7 +66,9 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
         results = []
         for campaign in found.campaigns:
             with worker.campaign():
-                results.append(judge(campaign, spec, start_constants(campaign), output, watch))
+                start = start_constants(campaign)
+                task = Task(campaign, spec, start, settings.input, output, watch)
+                results.append(judge(task))
     undecided = not results or any(result.undecided for result in results)
     outcome = outcome_of(
         settings.input, found, [result.text for result in results], undecided=undecided

@@ -10,6 +10,7 @@ from pipeline.records.diagnosis import (
     RankedEffect,
     Remainder,
     RungError,
+    Signature,
     Unexcited,
     UnknownStructure,
 )
@@ -39,6 +40,12 @@ def make_turn(scale: float) -> ErrorMap:
     )
 
 
+def make_signature() -> Signature:
+    at = tuple(np.linspace(-15.0, 15.0, 11).tolist())
+    before = tuple((0.18 * np.sign(np.array(at))).tolist())
+    return Signature("vq_v", "V", "iq_a", "drive_0.mcap", at, before, (0.001,) * 11)
+
+
 def make_rung(effects: tuple[str, ...], scale: float) -> LadderRung:
     parameters = {"coulomb_friction.torque_nm": (0.004, 1e-5, "N·m")}
     if effects:
@@ -53,6 +60,7 @@ def make_rung(effects: tuple[str, ...], scale: float) -> LadderRung:
         parameters,
         (make_map(scale), make_turn(scale)),
         (Histogram("vq_v", edges, (0, 1, 5, 20, 18, 6, 0, 2)),),
+        make_signature() if effects else None,
     )
 
 
@@ -66,6 +74,7 @@ def make_diagnosis(motor_id: str = "joint-P1", *, unknown: bool = False) -> Diag
         "each phase loses V; offset at small current",
         "low-speed current steps",
         {"loss_v": (0.1799, 1.2e-4, "V")},
+        headline="voltage lost in the inverter, 179.90 ± 0.24 mV a phase",
     )
     other = RankedEffect("windage", -12.0, 0.0, 0.3, (), "c ω|ω|", "a spin-down", {})
     sketch = UnknownStructure("vq_v", ("iq_a",), "odd in iq_a", (("at iq_a = 4", 0.12, "V"),))

@@ -24,6 +24,7 @@ EFFECT = Effect(
     signature="no torque at the shaft while the gap is crossed, a jump of the angle at reversals",
     tests=("drive", "torque_map"),
     experiment="reversals of torque with the angle recorded on the load side as well",
+    headline="play of {gap_rad} between rotor and load",
     reference="Nordin & Gutman, Automatica 38 (2002), controlling systems with backlash",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),

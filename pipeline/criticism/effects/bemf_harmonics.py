@@ -39,6 +39,7 @@ EFFECT = Effect(
     signature="orders 6ε and 12ε: proportional to speed in voltage, to current in torque",
     tests=("open_circuit", "torque_map"),
     experiment="an open-circuit spin",
+    headline="back-EMF that is no pure sine, {q6_cos & q6_sin %} of the flux in its sixth wave",
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 4",
     parameters=(
         *(

@@ -20,6 +20,7 @@ EFFECT = Effect(
     tests=("torque_map", "open_circuit", "spin_down", "drive"),
     experiment="a speed known from another clock (a stroboscope, the mains), or the same test on a "
     "second recorder",
+    headline="a recorder's clock off by {gain %}",
     reference="Allan, Ashby & Hodge, The Science of Timekeeping (1997), HP AN 1289: offset of a "
     "crystal's rate",
     parameters=(

@@ -61,6 +61,7 @@ EFFECT = Effect(
     signature="zero-current torque against angle, orders LCM(slots, 2p) and multiples of p, slots",
     tests=("cogging", "holding_current"),
     experiment="a slow turn without current, in both senses",
+    headline="cogging torque of {largest}",
     reference="Zhu & Howe, IEEE Trans. Energy Convers. 15 (2000), cogging torque",
     expand=_expand,
     signals=("theta_mech_rad",),

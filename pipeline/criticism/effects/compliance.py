@@ -21,6 +21,7 @@ EFFECT = Effect(
     signature="a resonance after torque steps",
     tests=("drive", "torque_map"),
     experiment="torque steps with the angle recorded on the load side as well",
+    headline="a shaft or coupling that twists, {share %} of the inertia beyond it",
     reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
     parameters=(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),

@@ -16,6 +16,7 @@ EFFECT = Effect(
     signature="voltage error proportional to current times winding temperature over 25 °C",
     tests=("heat_run",),
     experiment="a heat run: current on a locked rotor until the winding is 40 K warmer",
+    headline="a winding whose resistance changes by {alpha_1_k %} a kelvin",
     reference="IEC 60228; conventions: 1/259.5 per kelvin at 25 °C for copper",
     # Copper and aluminium are within a few per cent of each other; alloys of heaters are not.
     parameters=(

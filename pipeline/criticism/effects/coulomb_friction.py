@@ -18,6 +18,7 @@ EFFECT = Effect(
     signature="a step of drag against the sense of rotation",
     tests=("spin_down", "cogging", "holding_current", "drive"),
     experiment="a spin-down, or a slow turn in both senses",
+    headline="dry friction of {torque_nm}",
     reference="Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994)",
     parameters=(Parameter("torque_nm", "N·m", 0.01, 0.0005, "torque_nm", low=0.0, high=1.0),),
     rivals={

@@ -22,6 +22,7 @@ EFFECT = Effect(
     signature="flux of one axis bends with the other axis' current; both bends are one function",
     tests=("torque_map", "flux_map"),
     experiment="a torque map with d and q current together",
+    headline="inductance of one axis that falls with the current of the other",
     reference="Armando et al., IEEE Trans. Ind. Appl. 49 (2013), flux maps at constant speed",
     parameters=(
         Parameter("odd", "1", 0.05, 0.004, low=-20.0, high=20.0, optional=1),

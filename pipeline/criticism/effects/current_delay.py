@@ -26,6 +26,7 @@ EFFECT = Effect(
     signature="error proportional to di/dt and to ω_e i",
     tests=("torque_map", "drive"),
     experiment="current steps at standstill and at the highest speed",
+    headline="recorded currents late by {delay_s}",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
         Parameter(

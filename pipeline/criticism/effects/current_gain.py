@@ -30,6 +30,7 @@ EFFECT = Effect(
     signature="second electrical order in current, voltage and torque, proportional to current",
     tests=("torque_map",),
     experiment="a torque map at two speeds",
+    headline="phase current sensors that differ, by {cosine & sine %} of the current",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
         Parameter("cosine", "1", 0.01, 0.001, low=-0.3, high=0.3),

@@ -21,6 +21,7 @@ EFFECT = Effect(
     signature="first electrical order in dq currents, voltages and torque, at any current",
     tests=("torque_map", "drive"),
     experiment="a log with the current loop off: the sensors should read zero",
+    headline="phase current sensors off zero by {alpha_a & beta_a}",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
         Parameter("alpha_a", "A", 0.01, 0.0005, "current_a", low=-0.3, high=0.3),

@@ -15,6 +15,7 @@ EFFECT = Effect(
     signature="every current of one instrument off by one factor",
     tests=("torque_map", "resistance"),
     experiment="the current reading against a second, calibrated meter",
+    headline="recorded currents off by {gain %}",
     reference="Chung & Sul, IEEE Trans. Ind. Appl. 34 (1998), current measurement errors",
     parameters=(
         Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),

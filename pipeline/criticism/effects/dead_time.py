@@ -28,6 +28,7 @@ EFFECT = Effect(
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
+    headline="voltage lost in the inverter, {loss_v} a phase",
     reference="Jeong & Park, IEEE Trans. Ind. Electron. 38 (1991), dead-time effect in PWM; Mohan, "
     "Undeland & Robbins, Power Electronics, 3rd ed. (2003), ch. 2, drop of a switch that is on",
     parameters=(

@@ -46,6 +46,7 @@ EFFECT = Effect(
     signature="orders 6ε proportional to current in voltage and to its square in torque",
     tests=("torque_map",),
     experiment="a torque map, or a slow turn under current",
+    headline="inductance that changes with the rotor's angle, {q6_cos & q6_sin %} on the q axis",
     reference="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed. (2006), ch. 5",
     parameters=(
         *(

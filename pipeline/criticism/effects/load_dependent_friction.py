@@ -18,6 +18,7 @@ EFFECT = Effect(
     signature="drag that grows with torque, in motoring and in braking",
     tests=("torque_map",),
     experiment="a torque map in both senses of torque and of speed",
+    headline="friction of {share %} of the torque",
     reference="Duclusaud et al. (2024), extended friction models M1-M6 for servo actuators",
     parameters=(Parameter("share", "1", 0.02, 0.001, low=0.0, high=0.5),),
     signals=("torque_shaft_nm",),

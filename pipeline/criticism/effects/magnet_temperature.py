@@ -17,6 +17,7 @@ EFFECT = Effect(
     signature="voltage error proportional to speed, torque error to i_q, times magnet warmth",
     tests=("open_circuit", "drive"),
     experiment="an open-circuit spin with the rotor 30 K warmer",
+    headline="a magnet whose flux changes by {alpha_1_k %} a kelvin",
     reference="IEC 60404-8-1: reversible coefficients of magnet materials",
     # Sintered NdFeB loses 0.09 to 0.12 % a kelvin, SmCo less than half of that, ferrite 0.2 %.
     parameters=(

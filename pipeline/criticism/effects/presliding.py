@@ -36,6 +36,7 @@ EFFECT = Effect(
     signature="hysteresis of torque against angle within a small angle of a reversal",
     tests=("drive",),
     experiment="slow reversals under load",
+    headline="friction of {torque_nm} that gives like a spring over {travel_rad} after a reversal",
     reference="Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995), friction model",
     parameters=(
         Parameter("torque_nm", "N·m", 0.01, 0.001, "torque_nm", low=0.0, high=1.0),

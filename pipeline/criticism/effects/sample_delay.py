@@ -30,6 +30,7 @@ EFFECT = Effect(
     signature="v_d error proportional to ω_e v_q, hence even in speed",
     tests=("torque_map", "drive"),
     experiment="constant speeds in both senses, at two speeds at least",
+    headline="recorded voltages off in time by {delay_s}",
     reference="Bae & Sul, IEEE Trans. Ind. Appl. 39 (2003), time delay of digital control",
     parameters=(Parameter("delay_s", "s", 0.5, 0.02, "period_s", low=-5.0, high=5.0),),
     signals=("vd_v", "vq_v"),

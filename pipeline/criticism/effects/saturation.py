@@ -36,6 +36,7 @@ EFFECT = Effect(
     signature="flux bends with the current of its own axis",
     tests=("torque_map", "flux_map", "current_step"),
     experiment="a torque map, or current steps, up to rated current",
+    headline="iron that saturates: inductance falls with current",
     reference="Armando et al., IEEE Trans. Ind. Appl. 49 (2013), flux maps at constant speed; "
     "Fröhlich's rational magnetisation curve in Bozorth, Ferromagnetism (1951), ch. 11",
     parameters=(

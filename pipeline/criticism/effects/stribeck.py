@@ -24,6 +24,7 @@ EFFECT = Effect(
     signature="a bump of drag at low speed",
     tests=("spin_down", "cogging", "drive"),
     experiment="a spin-down to standstill, and slow reversals",
+    headline="extra friction of {excess_nm} below {speed_rad_s}",
     reference="Armstrong-Hélouvry, Dupont & Canudas de Wit, Automatica 30 (1994); with a tail: "
     "Hess & Soom, J. Tribology 112 (1990)",
     parameters=(

@@ -30,6 +30,7 @@ EFFECT = Effect(
     signature="torque behind current after steps",
     tests=("torque_map",),
     experiment="steps of torque at constant speed",
+    headline="recorded torque late by {lag_s}",
     reference="Wegener & Andrae, Measurement 40 (2007), dynamic torque measurement",
     parameters=(
         Parameter("lag_s", "s", 10.0, 0.5, "period_s", low=0.0, high=400.0, starts=_STARTS),

@@ -15,6 +15,7 @@ EFFECT = Effect(
     signature="constant torque whatever current, speed and sense",
     tests=("torque_map", "cogging"),
     experiment="a slow turn in both senses, or the transducer read unloaded",
+    headline="torque transducer off zero by {offset_nm}",
     reference="IEEE 1812-2014, 5: dynamometer tests of permanent magnet machines",
     parameters=(Parameter("offset_nm", "N·m", 0.01, 0.0005, "torque_nm", low=-0.5, high=0.5),),
     signals=("torque_shaft_nm",),

@@ -15,6 +15,7 @@ EFFECT = Effect(
     signature="Kt from the dynamometer against 1.5 p ψ from the back-EMF",
     tests=("torque_map",),
     experiment="a calibrated weight on a lever arm",
+    headline="recorded torque off by {gain %}",
     reference="IEEE 1812-2014, 5: dynamometer tests of permanent magnet machines",
     parameters=(Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),),
     signals=("torque_shaft_nm",),

@@ -18,6 +18,7 @@ EFFECT = Effect(
     signature="torque once a turn, whatever the current",
     tests=("cogging",),
     experiment="a slow turn without current",
+    headline="unbalance, a torque of {sin_nm & cos_nm} once a turn",
     reference="ISO 21940-11:2016, rotor balancing",
     parameters=(
         Parameter("sin_nm", "N·m", 0.01, 0.0002, "torque_nm", low=-1.0, high=1.0),

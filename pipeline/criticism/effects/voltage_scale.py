@@ -15,6 +15,7 @@ EFFECT = Effect(
     signature="every voltage of one instrument off by one factor",
     tests=("open_circuit", "torque_map"),
     experiment="the voltage reading against a second, calibrated meter",
+    headline="recorded voltages off by {gain %}",
     reference="JCGM 100:2008, 4.3 (a gain is common to all samples)",
     parameters=(
         Parameter("gain", "1", 0.02, 0.006, low=-0.5, high=0.5),

@@ -19,6 +19,7 @@ EFFECT = Effect(
     signature="drag that curves upwards with speed",
     tests=("spin_down", "drive"),
     experiment="a spin-down from the highest speed",
+    headline="air drag of {drag_nm} at the highest speed",
     reference="Vrancik, NASA TN D-4849 (1968), windage power loss in alternators",
     parameters=(Parameter("drag_nm", "N·m", 0.01, 0.0005, "torque_nm", low=0.0, high=1.0),),
     rivals={"iron_eddy": "a wider speed range"},

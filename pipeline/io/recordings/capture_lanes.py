@@ -138,10 +138,10 @@ def _finding(one: Finding) -> str:
 
 
 def _residual(capture: Capture, one: Evidence) -> list[Line]:
-    from pipeline.io.recordings.views import stem_of, unit_of
+    from pipeline.views.names import quantity_words, unit_words
 
     lines: list[Line] = []
-    unit = unit_of(one.y_name)
+    unit = unit_words(one.y_name)
     for series in one.series:
         left = series.measured - series.fitted if series.fitted.size else np.zeros(0)
         finite = np.isfinite(left)
@@ -150,8 +150,8 @@ def _residual(capture: Capture, one: Evidence) -> list[Line]:
         worst = int(np.nanargmax(np.abs(left)))
         rms = float(np.sqrt(np.mean(left[finite] ** 2)))
         words = (
-            f"{one.title}: {stem_of(one.y_name)} residual rms {quantity(rms, unit, 3)}, largest "
-            f"{quantity(float(abs(left[worst])), unit, 3)} at {series.x[worst]:.4g} s"
+            f"{one.title}: {quantity_words(one.y_name)} residual rms {quantity(rms, unit, 3)}, "
+            f"largest {quantity(float(abs(left[worst])), unit, 3)} at {series.x[worst]:.4g} s"
         )
         lines.append(("INFO", words, _row_at(capture, float(series.x[worst]))))
     return lines

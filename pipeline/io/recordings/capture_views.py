@@ -26,15 +26,13 @@ from pipeline.io.recordings.views import (
     ViewPlan,
     bar_view,
     findings_view,
-    named,
     page_view,
     stacked,
-    stem_of,
     time_view,
-    unit_of,
     workspace,
 )
 from pipeline.physics.notation import quantity, scale_for
+from pipeline.views.names import quantity_words, unit_words, with_unit
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
@@ -103,7 +101,7 @@ def loupe_views(fits: Sequence[FitTrace]) -> tuple[ViewPlan, ...]:
     ]
     residual = _residual_view(first, own)
     return (
-        ViewPlan(f"{words}: {named(first)}", tuple(both), 1.5, None, around_s),
+        ViewPlan(f"{words}: {with_unit(first)}", tuple(both), 1.5, None, around_s),
         ViewPlan(f"{words}: {residual.name}", residual.lines, 1.0, residual.reach, around_s),
     )
 
@@ -138,7 +136,7 @@ def _fit_view(
     models = [Line(f.trace.entity, "fitted", f"model{_after(f, fits)}", MODEL) for f in fits]
     shown = [(f.trace.frame, column) for f in fits for column in ("measured", "fitted")]
     span = _span(shown if home is None else [(home.frame, y_name), *shown])
-    return ViewPlan(f"{title}: {named(y_name)}", (*measured, *models), 3.0, span=span)
+    return ViewPlan(f"{title}: {with_unit(y_name)}", (*measured, *models), 3.0, span=span)
 
 
 def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
@@ -148,8 +146,8 @@ def _residual_view(y_name: str, fits: Sequence[FitTrace]) -> ViewPlan:
         Line(f.trace.entity, "residual", f"measured − model{_after(f, fits)}", RESIDUAL)
         for f in fits
     ]
-    around = quantity(reach, unit_of(y_name), 2)
-    return ViewPlan(f"{named(y_name)}, measured − model (±{around})", tuple(lines), 1.8, reach)
+    around = quantity(reach, unit_words(y_name), 2)
+    return ViewPlan(f"{with_unit(y_name)}, measured − model (±{around})", tuple(lines), 1.8, reach)
 
 
 def _after(fit: FitTrace, fits: Sequence[FitTrace]) -> str:
@@ -162,7 +160,7 @@ def _group_view(unit: str, columns: Sequence[tuple[str, str]], traces: Sequence[
         Line(
             entity,
             column,
-            stem_of(column),
+            quantity_words(column),
             PALETTE[place % len(PALETTE)],
             packed=entity in packed,
         )
@@ -204,7 +202,7 @@ def _by_unit(traces: Sequence[Trace], fitted: set[str]) -> dict[str, list[tuple[
     for trace in traces:
         for column in trace.columns:
             if column not in fitted:
-                groups.setdefault(unit_of(column), []).append((trace.entity, column))
+                groups.setdefault(unit_words(column), []).append((trace.entity, column))
     return {unit: columns for unit, columns in groups.items() if columns}
 
 
@@ -244,10 +242,10 @@ def _maps_tab(maps: Sequence[ResidualMaps]) -> Any:
         colour = f"full colour ±{scale.shown(one.reach):.3g} {scale.unit}"
         views: list[Any] = []
         if one.flat is not None:
-            name = f"{stem_of(one.signal)} residual over speed and current, {colour}"
+            name = f"{quantity_words(one.signal)} residual over speed and current, {colour}"
             values = rrb.TensorView(
                 origin=f"/maps/{one.signal}/values",
-                name=f"values [{unit_of(one.signal)}]",
+                name=f"values [{unit_words(one.signal)}]",
             )
             picture = map_view(f"/maps/{one.signal}", one.flat, name)
             views.append(rrb.Tabs(picture, values, active_tab=0))

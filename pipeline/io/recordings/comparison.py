@@ -34,7 +34,6 @@ from pipeline.io.recordings.views import (
     WIDE,
     Line,
     ViewPlan,
-    named,
     page_view,
     stacked,
     workspace,
@@ -43,6 +42,7 @@ from pipeline.io.storage.publish import canonical_json
 from pipeline.numerics.thinning import line_points
 from pipeline.physics.notation import quantity, significant
 from pipeline.records.comparison import Comparison, Trace
+from pipeline.views.names import with_unit
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
@@ -101,7 +101,7 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         if trace.capture != capture:
             continue
         entity = entity_of(trace)
-        words = f"{named(trace.signal)}, model {_KINDS[trace.kind]}"
+        words = f"{with_unit(trace.signal)}, model {_KINDS[trace.kind]}"
         lines = (
             Line(entity, "measured", "measured", MEASURED, WIDE),
             Line(entity, "model", "model", MODEL),
@@ -110,7 +110,7 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         left = np.abs(trace.measured - trace.model)
         reach = AIR * float(np.nanmax(left)) if np.isfinite(left).any() else 1.0
         line = Line(entity, "residual", "measured − model", RESIDUAL)
-        plans.append(ViewPlan(f"{named(trace.signal)}, left over", (line,), 1.0, reach or 1.0))
+        plans.append(ViewPlan(f"{with_unit(trace.signal)}, left over", (line,), 1.0, reach or 1.0))
     return tuple(plans)
 
 

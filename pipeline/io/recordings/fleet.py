@@ -19,10 +19,10 @@ from pipeline.io.recordings.views import (
     findings_view,
     page_view,
     rows_axis,
-    stem_of,
     time_view,
     workspace,
 )
+from pipeline.views.names import quantity_words
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
@@ -38,7 +38,7 @@ def motor_layout(signals: Sequence[str], captures: int) -> Blueprint:
 
     colours = (RESIDUAL, *PALETTE[1:], MODEL, MEASURED)
     lines = tuple(
-        Line(f"/overview/{name}", "percent", stem_of(name), colours[place % len(colours)])
+        Line(f"/overview/{name}", "percent", quantity_words(name), colours[place % len(colours)])
         for place, name in enumerate(signals)
     )
     words = f"residuals of all captures [% of the signal's reach, ±{PREVIEW_REACH:g}]"

@@ -23,15 +23,11 @@ from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.ladder_page import rung_markdown
 from pipeline.io.recordings.ladder_scales import (
-    CURRENT,
     RUNG,
-    SPEED,
-    angle_of,
     angle_reach,
     angle_scale,
-    common_reach,
     error_scale,
-    shown_signals,
+    map_reach,
 )
 from pipeline.io.recordings.ladder_views import ladder_layout
 from pipeline.io.recordings.seal import write_sealed
@@ -39,6 +35,7 @@ from pipeline.io.recordings.stream import recording, send_axis_ends, send_bars, 
 from pipeline.io.recordings.views import MEASURED, MODEL, RESIDUAL
 from pipeline.io.storage.publish import canonical_json
 from pipeline.records.diagnosis import Diagnosis
+from pipeline.views.ladder import CURRENT, SPEED, angle_of, mapped_signals
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -57,7 +54,7 @@ def ladder_bytes(result: Diagnosis) -> bytes:
     name = f"{result.motor_id} ladder"
     with recording(name, (identity,), ladder_layout(result)) as made:
         _send_sheets(made.stream, result)
-        for signal in shown_signals(result):
+        for signal in mapped_signals(result):
             _send_errors(made.stream, result, signal)
             _send_maps(made.stream, result, signal)
             _send_angle_ends(made.stream, result, signal)
@@ -103,7 +100,7 @@ def _send_errors(stream: RecordingStream, result: Diagnosis, signal: str) -> Non
 
 
 def _send_maps(stream: RecordingStream, result: Diagnosis, signal: str) -> None:
-    reach = common_reach(result.ladder, signal)
+    reach = map_reach(result, signal)
     for place, rung in enumerate(result.ladder):
         flat = rung.map_of(signal, SPEED, CURRENT)
         if flat is not None:

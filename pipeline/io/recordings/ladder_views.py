@@ -5,20 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pipeline.io.recordings.error_map import map_view
-from pipeline.io.recordings.ladder_scales import (
-    CURRENT,
-    RUNG,
-    SPEED,
-    angle_of,
-    angle_scale,
-    common_reach,
-    error_scale,
-    shown_signals,
-)
+from pipeline.io.recordings.ladder_scales import RUNG, angle_scale, error_scale, map_reach
 from pipeline.io.recordings.views import PALETTE, bar_view, page_view, workspace
-from pipeline.physics.glossary import suffix_of
 from pipeline.physics.notation import quantity
 from pipeline.records.diagnosis import Diagnosis
+from pipeline.views.ladder import CURRENT, SPEED, angle_of, mapped_signals
+from pipeline.views.names import quantity_words
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
@@ -26,7 +18,7 @@ if TYPE_CHECKING:
 
 def ladder_layout(result: Diagnosis) -> Blueprint:
     """A tab a signal: page and map above, bars below; a last tab with all rungs as lines."""
-    signals = shown_signals(result)
+    signals = mapped_signals(result)
     tabs = [_workspace(result, signal) for signal in signals]
     tabs = [*tabs, _overview(signals)] if tabs else [_page()]
     return workspace(*tabs, timeline=RUNG, panel="expanded")
@@ -39,12 +31,12 @@ def _page() -> Any:
 def _workspace(result: Diagnosis, signal: str) -> Any:
     import rerun.blueprint as rrb
 
-    named = signal_words(signal)
+    named = quantity_words(signal)
     unit, over = error_scale(result, signal).unit, angle_scale(result, signal).unit
     flat = result.ladder[0].map_of(signal, SPEED, CURRENT)
     upper = [_page()]
     if flat is not None:
-        reach = common_reach(result.ladder, signal)
+        reach = map_reach(result, signal)
         colour = f"full colour ±{quantity(reach, flat.unit, 2)} on every rung"
         upper.append(map_view(f"/map/{signal}", flat, f"{named}: mean error, {colour}"))
     angle = angle_of(signal)
@@ -81,7 +73,7 @@ def _overview(signals: tuple[str, ...]) -> Any:
 
     lines: dict[Any, Any] = {
         f"/over/{signal}": rr.SeriesLines(
-            names=signal_words(signal), colors=PALETTE[place % len(PALETTE)], widths=2.5
+            names=quantity_words(signal), colors=PALETTE[place % len(PALETTE)], widths=2.5
         )
         for place, signal in enumerate(signals)
     }
@@ -97,10 +89,3 @@ def _overview(signals: tuple[str, ...]) -> Any:
         column_shares=[1.6, 1.0],
         name="All rungs",
     )
-
-
-def signal_words(signal: str) -> str:
-    """A signal without its unit: `torque_shaft_nm` is torque shaft."""
-    suffix = suffix_of(signal)
-    stem = signal[: -len(suffix) - 1] if suffix else signal
-    return stem.replace("_", " ").replace("alpha", "acceleration")

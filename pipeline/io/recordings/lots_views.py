@@ -25,12 +25,12 @@ from pipeline.io.recordings.views import (
     ViewPlan,
     bar_view,
     page_view,
-    stem_of,
     time_view,
     workspace,
 )
 from pipeline.records.lot_constant import ConstantResult
 from pipeline.records.lot_regression import LotRegression
+from pipeline.views.names import quantity_words
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
@@ -58,7 +58,8 @@ def lots_layout(result: LotRegression) -> Blueprint:
 
 def histogram_view(one: ConstantResult) -> Any:
     """Motors per bin, both sides over each other."""
-    name = f"{stem_of(one.name)} [{constant_scale(one).unit or '1'}], motors per bin: {one.verdict}"
+    unit = constant_scale(one).unit or "1"
+    name = f"{quantity_words(one.name)} [{unit}], motors per bin: {one.verdict}"
     return bar_view(name, *(f"/hist/{one.name}/{side}" for side in SIDES), legend=True)
 
 
@@ -74,7 +75,7 @@ def drift_plan(one: ConstantResult) -> ViewPlan:
         Line(entity, "ewma_low", "limit", (*RESIDUAL, 160)),
         Line(entity, "ewma_high", "limit", (*RESIDUAL, 160)),
     )
-    words = f"{stem_of(one.name)}: change from the baseline [%] by lot number"
+    words = f"{quantity_words(one.name)}: change from the baseline [%] by lot number"
     return ViewPlan(words, lines, 1.0, rows=len(one.lots))
 
 

@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.io.recordings.font import drawable
 from pipeline.io.recordings.stream import PACK, TIME, Colour, Tinted
-from pipeline.physics.glossary import suffix_of
-from pipeline.physics.notation import unit_text
-from pipeline.physics.units import SUFFIX_UNITS
 
 if TYPE_CHECKING:
     from rerun.blueprint import BarChartView, Blueprint, TextDocumentView, TimeSeriesView
@@ -186,19 +183,3 @@ def stacked(plans: Sequence[ViewPlan], **more: Any) -> Any:
     import rerun.blueprint as rrb
 
     return rrb.Vertical(*map(time_view, plans), row_shares=[p.share for p in plans] or None, **more)
-
-
-def unit_of(name: str) -> str:
-    """The unit that a name ends in, as people write it; 1 where it has none."""
-    return unit_text(SUFFIX_UNITS.get(suffix_of(name), "1")) or "1"
-
-
-def stem_of(name: str) -> str:
-    """A column in words, without its unit."""
-    suffix = suffix_of(name)
-    return (name[: -len(suffix) - 1] if suffix else name).replace("_", " ")
-
-
-def named(name: str) -> str:
-    """A column in words with its unit."""
-    return f"{stem_of(name)} [{unit_of(name)}]"

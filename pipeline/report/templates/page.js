@@ -50,3 +50,12 @@ for (const button of document.querySelectorAll("th button")) button.addEventList
   const rows = [...body.rows].sort(head.dataset.numeric ? numeric : (a, b) => down ? compare(b, a) : compare(a, b));
   body.append(...rows);
 });
+// Copy a command; without the clipboard (a page from a file) it is selected instead.
+for (const button of document.querySelectorAll("button.copy")) button.addEventListener("click", async () => {
+  const code = button.previousElementSibling;
+  try { await navigator.clipboard.writeText(code.textContent); button.textContent = "Copied"; }
+  catch { const range = document.createRange(); range.selectNodeContents(code); getSelection().removeAllRanges(); getSelection().addRange(range); }
+});
+// A link to something folded opens it.
+const unfold = () => { const place = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1))); for (let fold = place; fold; fold = fold.parentElement) if (fold.tagName === "DETAILS") fold.open = true; if (place) place.scrollIntoView(); };
+addEventListener("hashchange", unfold); unfold();

@@ -294,6 +294,7 @@ def test_datasheets_hang_on_every_plug_in_and_on_nothing_that_shows_them() -> No
     assert {"records", "physics", "numerics"} <= packages
     assert not packages & {
         "report",
+        "views",
         "lots",
         "export",
         "simulator",

@@ -234,7 +234,7 @@ def test_value_axes_reach_over_all_values_and_do_not_magnify_the_noise_of_a_held
     traces = list(capture_traces(capture))
     fits = list(fit_traces(own_evidence(capture, make_evidence(capture))))
     spans = {plan.name: plan.span for plan in main_views(traces, fits)}
-    current, held = spans["Step: ia [A]"], spans["vab [V]"]
+    current, held = spans["Step: i_a [A]"], spans["v_ab [V]"]
     assert current is not None
     assert held is not None
     shown = [traces[0].frame["ia_a"].to_numpy(), fits[0].trace.frame["fitted"].to_numpy()]

@@ -19,9 +19,10 @@ from pipeline.io.recordings.comparison import (
 )
 from pipeline.io.recordings.error_map import CELL, diverging, map_labels, map_picture
 from pipeline.io.recordings.ladder import write_ladder_recording
-from pipeline.io.recordings.ladder_page import added, rung_markdown
-from pipeline.io.recordings.ladder_scales import common_reach, error_scale, shown_signals
+from pipeline.io.recordings.ladder_page import rung_markdown
+from pipeline.io.recordings.ladder_scales import error_scale, map_reach
 from pipeline.records.comparison import Comparison, SignalError, Trace
+from pipeline.views.ladder import ladder_view, mapped_signals
 from tests.unit.ladders import make_diagnosis, make_map
 
 
@@ -89,7 +90,7 @@ def test_the_picture_shows_the_map_upside_up_with_its_gap_hatched(ladder: Path) 
 
 def test_colours_of_all_rungs_share_one_scale() -> None:
     result = make_diagnosis()
-    assert common_reach(result.ladder, "vq_v") == pytest.approx(0.21)
+    assert map_reach(result, "vq_v") == pytest.approx(0.21)
     quiet = map_picture(make_map(0.02), 0.21)
     assert (np.abs(quiet[: CELL // 2, : CELL // 2].astype(int) - 247) < 8).all()
     labels = map_labels(make_map(1.0), 0.21, ("speed [rad/s]", "iq [A]"))
@@ -98,8 +99,9 @@ def test_colours_of_all_rungs_share_one_scale() -> None:
 
 def test_the_page_of_a_rung_says_what_came_and_every_error_so_far(ladder: Path) -> None:
     result = make_diagnosis(unknown=True)
-    assert added(result, 0) == ()
-    assert added(result, 1) == ("dead_time",)
+    view = ladder_view(result)
+    assert view.rungs[0].came == ()
+    assert view.rungs[1].came == ("dead_time",)
     text = rung_markdown(result, 1).replace("\\", "")
     for words in ("+ dead_time", "179.90 ± 0.24 mV", "130 mV", "2.60 mV", "(−98 %)", "noise floor"):
         assert words in text
@@ -111,8 +113,8 @@ def test_the_page_of_a_rung_says_what_came_and_every_error_so_far(ladder: Path) 
 
 
 def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last() -> None:
-    assert shown_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
-    assert shown_signals(replace(make_diagnosis(), ladder=())) == ()
+    assert mapped_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
+    assert mapped_signals(replace(make_diagnosis(), ladder=())) == ()
 
 
 def test_equal_work_has_equal_content_and_no_wall_clock(ladder: Path, tmp_path: Path) -> None:

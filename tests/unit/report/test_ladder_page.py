@@ -16,8 +16,8 @@ from pipeline.report.comparison_text import comparison_text
 from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, colour, heatmap
 from pipeline.report.ladder_page import render_ladder
-from pipeline.report.notes import told_and_folded
 from pipeline.report.rung_chart import rung_chart
+from pipeline.views.notes import told_and_folded
 from tests.unit.ladders import make_diagnosis, make_map, make_turn
 
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>'
@@ -45,6 +45,25 @@ def test_every_number_of_the_ladder_is_on_the_page() -> None:
     assert "low-speed current steps" in html
     assert "no test here excites compliance" in html
     assert html.count('<svg class="heat"') == 4
+
+
+def test_the_page_leads_with_words_the_command_and_what_shows_it() -> None:
+    html = render_ladder(make_diagnosis(), "captures")
+    places = [
+        html.index(words)
+        for words in (
+            "Voltage lost in the inverter, 179.90 ± 0.24 mV a phase. With it, the error falls",
+            "motor-datasheets compare input=captures motor=joint-P1 model.effects=[dead_time]",
+            "could as well be <b>phase_imbalance</b>",
+            "v_q over i_q, drive_0.mcap",
+            "<summary>Formula</summary><p>each phase loses V; offset at small current",
+            'id="ladder"',
+        )
+    ]
+    assert places == sorted(places)
+    figure = html.split('id="shown"')[1].split("</section>")[0]
+    assert figure.count("<svg") == 1
+    assert 'class="fitted"' in figure and 'class="residual' in figure
 
 
 UNEXCITED = (

@@ -16,10 +16,10 @@ from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-from pipeline.report.conditions import conditions
 from pipeline.report.fleet_page import page_of, render_fleet
 from pipeline.report.motor_page import render_motor
-from pipeline.report.words import GROUPS, KEY_CONSTANTS, grouped
+from pipeline.views.conditions import conditions
+from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
 
 VOID = {"meta", "br", "input", "path", "rect", "circle"}
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>\u202e'

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pipeline.physics.notation import number_text, quantity
 from pipeline.records.model_verdict import ModelVerdict, number
-from pipeline.report.words import sentence
+from pipeline.views.constants import sentence
 
 TONES = {
     "adequate": "pass",

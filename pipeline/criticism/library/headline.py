@@ -1,0 +1,75 @@
+"""What a person says of an effect, with its size: `encoder disc off-centre by 9.0 ± 0.1 mrad`."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from pipeline.criticism.effect import Effect
+from pipeline.physics.notation import number_text
+from pipeline.records.diagnosis import ToldParameter
+
+UNKNOWN_SIZE = "unknown size"
+_SIZE = re.compile(r"\{([^{}]+)\}")
+_WAVE = re.compile(r"(?:sin|cos)_(\d+)_\w+")
+
+
+def headline(effect: Effect, parameters: Mapping[str, ToldParameter]) -> str:
+    """The effect in words, each size in braces filled in.
+
+    Parameters
+    ----------
+    effect : Effect
+        `headline` may name in braces a parameter `{a}`, the length of a vector `{a & b}`, a share
+        in percent `{a %}`, or `{largest}`, the wave of the largest amplitude.
+    parameters : mapping of str to (value, u, unit)
+        What was fitted, by name.
+
+    Returns
+    -------
+    str
+        `name (parameter value ± U, ...)` for an effect without words of its own.
+
+    """
+    if not effect.headline:
+        sizes = ", ".join(f"{name} {number_text(*one)}" for name, one in parameters.items())
+        return f"{effect.name} ({sizes})" if sizes else effect.name
+    return _SIZE.sub(lambda found: _size(found[1], parameters), effect.headline)
+
+
+def _size(wanted: str, parameters: Mapping[str, ToldParameter]) -> str:
+    if wanted == "largest":
+        return _largest(parameters)
+    names, percent = wanted.removesuffix("%"), wanted.endswith("%")
+    told = [parameters.get(name.strip(), (None, None, "1")) for name in names.split("&")]
+    value, u, unit = amplitude(told)
+    if value is None or u is None:
+        return UNKNOWN_SIZE
+    return number_text(100.0 * value, 100.0 * u, "%") if percent else number_text(value, u, unit)
+
+
+def amplitude(told: Sequence[ToldParameter]) -> ToldParameter:
+    """Length of a vector of parameters, and its u to first order; one alone keeps its sign."""
+    values = [(value, u or 0.0) for value, u, _ in told if value is not None]
+    if len(values) < len(told):
+        return None, None, told[0][2]
+    if len(told) == 1:
+        return told[0]
+    length = math.hypot(*(value for value, _ in values))
+    spread = math.hypot(*(value * u for value, u in values))
+    return length, spread / length if length > 0 else 0.0, told[0][2]
+
+
+def _largest(parameters: Mapping[str, ToldParameter]) -> str:
+    """The largest of the waves `sin_ORDER_nm` and `cos_ORDER_nm`, with its order."""
+    waves: dict[str, list[ToldParameter]] = {}
+    for name, one in parameters.items():
+        if found := _WAVE.fullmatch(name):
+            waves.setdefault(found[1], []).append(one)
+    sizes = {order: amplitude(told) for order, told in waves.items()}
+    known = {order: one for order, one in sizes.items() if one[0] is not None}
+    if not known:
+        return UNKNOWN_SIZE
+    order = max(known, key=lambda name: known[name][0] or 0.0)
+    return f"{number_text(*known[order])}, {order} a turn"

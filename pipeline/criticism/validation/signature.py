@@ -1,0 +1,206 @@
+"""What an effect shows: a signal's error over the variable that orders it best, without and with.
+
+A Stribeck bump is an error of torque over speed, an encoder off its centre one of voltage over the
+angle of the shaft. Which signal and which variable is not said by the effect: the pair is drawn in
+which the change of the error is largest beside what is left of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array
+from pipeline.criticism.selection.stepwise import Rung
+from pipeline.criticism.validation.error_maps import Errors, unit_of, window_errors
+from pipeline.records.diagnosis import LadderRung, Signature
+from pipeline.records.error_map import ErrorMap
+
+_CELLS, _FEWEST = 48, 6
+"""Cells of a curve, and the fewest that make one. By judgement, for people to look at."""
+_TURN = 2.0 * math.pi
+_VARIABLES = (
+    "omega_mech_rad_s",
+    "iq_a",
+    "id_a",
+    "i_pair_a",
+    "temp_winding_degc",
+    "temp_magnet_degc",
+)
+_ACCELERATION, _TORQUE = "alpha_mech_rad_s2", "torque_nm"
+
+
+@dataclass(frozen=True, slots=True)
+class _Curve:
+    """Mean errors over cells without and with the effect, and the noise of such a mean [C]."""
+
+    signal: str
+    variable: str
+    capture: str | None
+    at: Array
+    before: Array
+    after: Array
+    count: Array
+    noise: Array
+
+    @property
+    def contrast(self) -> float:
+        """Rms change of the error over what is left and what noise makes of the means."""
+        change = self.before - self.after
+        left = self.after**2 + self.noise**2
+        return math.sqrt(float(self.count @ change**2) / max(float(self.count @ left), 1e-300))
+
+
+def signature(
+    found: Sequence[Segment],
+    rungs: tuple[Rung, Rung],
+    records: tuple[LadderRung, LadderRung],
+) -> Signature | None:
+    """The curve in which two neighbouring rungs differ most clearly; None where none has cells.
+
+    Parameters
+    ----------
+    found : sequence of Segment
+        What the rungs were fitted to.
+    rungs : pair of Rung
+        Without and with what came.
+    records : pair of LadderRung
+        The same rungs as records, whose maps over the angle of a turn are candidates too.
+
+    Returns
+    -------
+    Signature
+        An error of acceleration is told as torque, by the inertia that was fitted.
+
+    """
+    curves = [*_window_curves(found, rungs), *_turn_curves(records)]
+    if not curves:
+        return None
+    best = max(curves, key=lambda one: one.contrast)
+    scale, signal = 1.0, best.signal
+    if signal == _ACCELERATION:
+        scale, signal = rungs[1].fitted.values["j_kgm2"], _TORQUE
+    return Signature(
+        signal,
+        unit_of(signal),
+        best.variable,
+        best.capture,
+        tuple(best.at.tolist()),
+        tuple((scale * best.before).tolist()),
+        tuple((scale * best.after).tolist()),
+    )
+
+
+def _window_curves(found: Sequence[Segment], rungs: tuple[Rung, Rung]) -> Iterator[_Curve]:
+    """Window errors of every signal of every capture over every variable that was recorded."""
+    told = [
+        {one.signal: one for one in window_errors(found, rung.around, rung.around.residual)}
+        for rung in rungs
+    ]
+    for signal, before in told[0].items():
+        after = told[1].get(signal)
+        if after is None or after.error.size != before.error.size:
+            continue
+        for number in np.unique(before.segment).tolist():
+            mine = before.segment == number
+            yield from _of_capture(found[number], before, after, mine)
+
+
+def _of_capture(
+    segment: Segment, before: Errors, after: Errors, mine: NDArray[np.bool_]
+) -> Iterator[_Curve]:
+    sigma = before.sigma[mine]
+    for variable, value in _values(segment, before, mine).items():
+        cell, at = _cells(variable, value)
+        inside = cell >= 0
+        count = np.bincount(cell[inside], minlength=at.size).astype(float)
+        seen = count > 0
+        if seen.sum() < _FEWEST:
+            continue
+
+        def mean(
+            error: Array,
+            cell: NDArray[np.int64] = cell[inside],
+            inside: NDArray[np.bool_] = inside,
+            count: Array = count,
+            seen: NDArray[np.bool_] = seen,
+        ) -> Array:
+            summed: Array = np.bincount(cell, error[inside], count.size)[seen] / count[seen]
+            return summed
+
+        yield _Curve(
+            before.signal,
+            variable,
+            segment.capture,
+            at[seen],
+            mean(before.error[mine]),
+            mean(after.error[mine]),
+            count[seen],
+            np.sqrt(mean(sigma**2) / count[seen]),
+        )
+
+
+def _values(segment: Segment, errors: Errors, mine: NDArray[np.bool_]) -> Mapping[str, Array]:
+    """What a window's error may depend on [n]: means, and the angles at the window's middle."""
+    values = {name: errors.at[name][mine] for name in _VARIABLES if name in errors.at}
+    theta = segment.recorded.get("theta_mech_rad")
+    if theta is not None and segment.weak is not None and float(np.ptp(theta)) > _TURN:
+        middle = segment.weak.starts + segment.weak.length // 2
+        values["theta_mech_rad"] = np.mod(theta[middle][errors.window[mine]], _TURN)
+    return values
+
+
+def _cells(variable: str, value: Array) -> tuple[NDArray[np.int64], Array]:
+    """Cell of each value [n], -1 where there is none, and the middle of each cell [C].
+
+    Cells of an angle are equally wide. Edges of others lie halfway between those of equal widths
+    and those of equal shares of the values: a test that dwells somewhere shows the rest as well.
+    """
+    fine = np.isfinite(value)
+    if variable == "theta_mech_rad":
+        edges = np.linspace(0.0, _TURN, _CELLS + 1)
+    elif fine.sum() < _FEWEST:
+        return np.full(value.size, -1), np.empty(0)
+    else:
+        shares = np.linspace(0.0, 1.0, _CELLS + 1)
+        low, high = float(value[fine].min()), float(value[fine].max())
+        even = low + (high - low) * shares
+        edges = np.unique((np.quantile(value[fine], shares) + even) / 2.0)
+    if edges.size < 2:
+        return np.full(value.size, -1), np.empty(0)
+    cell = np.searchsorted(edges[1:-1], np.where(fine, value, edges[0]), side="right")
+    return np.where(fine, cell, -1).astype(np.int64), (edges[1:] + edges[:-1]) / 2.0
+
+
+def _turn_curves(records: tuple[LadderRung, LadderRung]) -> Iterator[_Curve]:
+    """The maps over the angle of a turn, sample by sample, of all captures together."""
+    after = {_key(one): one for one in records[1].maps if one.y is None}
+    for one in records[0].maps:
+        other = after.get(_key(one))
+        if one.y is not None or other is None or one.x != other.x:
+            continue
+        seen = np.isfinite(one.mean) & np.isfinite(other.mean)
+        if seen.sum() < _FEWEST:
+            continue
+        edges = np.array(one.x.edges)
+        at = (edges[1:] + edges[:-1]) / 2.0
+        none = np.zeros(int(seen.sum()))
+        yield _Curve(
+            one.signal,
+            one.x.variable,
+            None,
+            at[seen],
+            one.mean[seen],
+            other.mean[seen],
+            one.count[seen].astype(float),
+            none,
+        )
+
+
+def _key(one: ErrorMap) -> tuple[str, str]:
+    return one.signal, one.x.variable

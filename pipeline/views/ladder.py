@@ -1,0 +1,231 @@
+"""A diagnosis for people: what is missing in words with sizes, and the ladder rung by rung."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pipeline.physics.notation import MINUS, number_text, quantity, significant
+from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
+from pipeline.records.model_verdict import number
+from pipeline.views.constants import sentence
+from pipeline.views.names import quantity_words, unit_of
+
+TONES = {"adequate": "pass", "missing": "marginal", "unknown": "fail"}
+SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
+_WITH = {1: "With it", 2: "With both"}
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorCell:
+    """One signal's error on one rung, its floor, their ratio, the change from the rung below."""
+
+    signal: str
+    rmse: str
+    floor: str
+    ratio: str
+    change: str
+
+
+@dataclass(frozen=True, slots=True)
+class RungView:
+    """One rung, every text ready to be shown.
+
+    `came` are the effects that it adds, `parameters` theirs as (name, value ± U), `others` those of
+    effects that were there before. `errors` have one cell a signal of the ladder.
+    """
+
+    number: int
+    title: str
+    came: tuple[str, ...]
+    headlines: tuple[str, ...]
+    explanations: tuple[str, ...]
+    held_out: str
+    change: str
+    parameters: tuple[tuple[str, str], ...]
+    others: tuple[tuple[str, str], ...]
+    errors: tuple[ErrorCell | None, ...]
+    signature: Signature | None
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """An effect that was found, what else it could be, and the tests that would tell, with the
+    power that they are predicted to have.
+    """
+
+    effect: str
+    rivals: str
+    tests: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LadderView:
+    """A diagnosis: `headline` in a few sentences; the commands to go on with; the rungs.
+
+    `signals` are those told on every rung, the one farthest over its floor on the first rung first,
+    those of which no floor is told last.
+    """
+
+    tone: str
+    headline: str
+    compare: str
+    add: str
+    doubts: tuple[Doubt, ...]
+    slight: tuple[str, ...]
+    signals: tuple[str, ...]
+    rungs: tuple[RungView, ...]
+
+
+def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
+    """The view of one diagnosis of the captures in a `folder`."""
+    signals = told_signals(result)
+    told = {one.effect: one for one in result.ranking}
+    words = f"input={shlex.quote(folder)} motor={shlex.quote(result.motor_id)}"
+    effects = ",".join((*result.asked, *result.missing))
+    model = "" if result.model == "standard" else f" model={result.model}"
+    model += f" model.effects=[{effects}]"
+    quiet = result.verdict in ("adequate", "missing")
+    return LadderView(
+        TONES.get(result.verdict, "not_evaluated"),
+        headline(result),
+        f"motor-datasheets compare {words}{model}" if result.missing else "",
+        f"motor-datasheets run input={shlex.quote(folder)}{model}" if result.missing else "",
+        tuple(_doubt(told[name]) for name in result.missing if told[name].confused_with),
+        tuple(f"{r.effect} is {r.shortfall}" for r in result.ranking if r.slight and quiet),
+        signals,
+        tuple(_rung(result, n, signals) for n in range(len(result.ladder))),
+    )
+
+
+def headline(result: Diagnosis) -> str:
+    """The verdict in words with sizes, in sentences: what is missing, and what adding it does."""
+    told = {one.effect: one for one in result.ranking}
+    names = [told[name].headline or name for name in result.missing if name in told]
+    found = f"{sentence(_listed(names))}. {_fall(result)}" if names else ""
+    if result.verdict == "insufficient":
+        return "The captures cannot tell; what to record is named below."
+    if result.verdict == "unknown":
+        one = result.unknown
+        shown = "" if one is None else f": {quantity_words(one.signal)} depends on "
+        shown += "" if one is None else " and ".join(map(quantity_words, one.variables))
+        return f"{found} Something is missing that no known effect explains{shown}.".strip()
+    if result.verdict == "adequate":
+        floors = f", to {number(result.ladder[-1].held_out)} noise floors" if result.ladder else ""
+        return f"The model explains these captures down to the noise{floors}; nothing is missing."
+    return found
+
+
+def _listed(texts: Sequence[str]) -> str:
+    if len(texts) < 2:
+        return "".join(texts)
+    return f"{', '.join(texts[:-1])}, and {texts[-1]}"
+
+
+def _fall(result: Diagnosis) -> str:
+    first, last = (number(result.ladder[n].held_out) for n in (0, -1))
+    count = len(result.missing)
+    all_of = _WITH.get(count, f"With all {count}")
+    return f"{all_of}, the error falls from {first} to {last} noise floors."
+
+
+def _doubt(one: RankedEffect) -> Doubt:
+    tests = [
+        f"against {apart.against}: {apart.experiment}, predicted power {apart.power:.0%}"
+        for apart in one.separation
+        if apart.power is not None
+    ]
+    return Doubt(one.effect, ", ".join(one.confused_with), tuple(tests) or (one.experiment,))
+
+
+def told_signals(result: Diagnosis) -> tuple[str, ...]:
+    """Signals told on every rung, the one farthest over its floor on the first rung first, those
+    of which no floor is told last.
+    """
+    if not result.ladder:
+        return ()
+    first = result.ladder[0]
+    told = dict.fromkeys([*first.errors, *first.signals])
+    names = [n for n in told if all(n in r.errors or n in r.signals for r in result.ladder)]
+    return tuple(sorted(names, key=lambda n: (n not in first.errors, -over_floor(first, n), n)))
+
+
+def mapped_signals(result: Diagnosis) -> tuple[str, ...]:
+    """Signals with a floor on every rung, those with a map over speed and current first."""
+    names = [n for n in told_signals(result) if all(n in rung.errors for rung in result.ladder)]
+    flat = [n for n in names if result.ladder[0].map_of(n, SPEED, CURRENT) is not None]
+    return (*flat, *(n for n in names if n not in flat))
+
+
+def over_floor(rung: LadderRung, name: str) -> float:
+    """A signal's error over its noise floor, 0 where none is told."""
+    error = rung.errors.get(name)
+    return 0.0 if error is None else error.rmse / max(error.noise_floor, 1e-300)
+
+
+def angle_of(signal: str) -> str:
+    """The angle that a signal's error is drawn over: torque ripples with the shaft."""
+    return "theta_mech_rad" if signal == "torque_shaft_nm" else "theta_elec_rad"
+
+
+def reaches(ladder: Sequence[LadderRung]) -> dict[tuple[str, str], float]:
+    """Full colour, or the axis' end, of each signal's maps: the largest mean on any rung [unit]."""
+    reach: dict[tuple[str, str], float] = {}
+    for rung in ladder:
+        for one in rung.maps:
+            key = (one.signal, one.x.variable)
+            reach[key] = max(reach.get(key, 0.0), one.reach)
+    return reach
+
+
+def _rung(result: Diagnosis, place: int, signals: Sequence[str]) -> RungView:
+    rung = result.ladder[place]
+    below = result.ladder[place - 1] if place else None
+    came = tuple(e for e in rung.effects if below is None or e not in below.effects)
+    gone = [e for e in below.effects if e not in rung.effects] if below is not None else []
+    title = " ".join([*(f"+ {e}" for e in came), *(f"{MINUS} {e}" for e in gone)])
+    told = {one.effect: one for one in result.ranking}
+    shown = [(name, number_text(*value)) for name, value in rung.parameters.items()]
+    own = tuple(one for one in shown if one[0].split(".")[0] in came)
+    return RungView(
+        place,
+        title or result.whole_model,
+        came,
+        tuple(sentence(told[e].headline) for e in came if e in told and told[e].headline),
+        tuple(told[e].explanation for e in came if e in told),
+        f"{rung.held_out:.4g}",
+        "" if below is None else percent(rung.held_out, below.held_out),
+        own,
+        tuple(one for one in shown if one not in own),
+        tuple(_cell(rung, below, name) for name in signals),
+        rung.signature,
+    )
+
+
+def _cell(rung: LadderRung, below: LadderRung | None, name: str) -> ErrorCell | None:
+    now, before = _rmse(rung, name), None if below is None else _rmse(below, name)
+    if now is None:
+        return None
+    error = rung.errors.get(name)
+    return ErrorCell(
+        quantity_words(name),
+        quantity(now, unit_of(name) if error is None else error.unit, 3),
+        "" if error is None else quantity(error.noise_floor, error.unit, 3),
+        "" if error is None else significant(over_floor(rung, name), 3),
+        "" if before is None else percent(now, before),
+    )
+
+
+def _rmse(rung: LadderRung, name: str) -> float | None:
+    """A signal's error, whether its floor is told or not [its unit]."""
+    if name in rung.errors:
+        return rung.errors[name].rmse
+    return rung.signals.get(name)
+
+
+def percent(now: float, before: float) -> str:
+    """A change in percent with its sign; empty where there was nothing before."""
+    if before <= 0.0:
+        return ""
+    return f"{100.0 * (now / before - 1.0):+.0f} %".replace("-", MINUS)

@@ -1,0 +1,102 @@
+"""What gives an effect away is found among all captures, signals and variables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.validation import signature as module
+from pipeline.criticism.validation.error_maps import Errors
+from pipeline.criticism.validation.signature import signature
+from pipeline.records.diagnosis import LadderRung, Signature
+from pipeline.records.error_map import Bins, ErrorMap
+
+N, TURNS, INERTIA_KGM2 = 2000, 40, 3e-5
+EMPTY = LadderRung((), 1.0, {})
+TURN = Bins("theta_mech_rad", tuple(np.linspace(0.0, 2 * np.pi, 73).tolist()))
+
+
+def segment(capture: str, *, turning: bool = True) -> Any:
+    """A capture of windows of ten samples over some turns, or over none."""
+    theta = np.linspace(0.0, 2 * np.pi * TURNS if turning else 0.1, 10 * N)
+    weak = SimpleNamespace(starts=10 * np.arange(N), length=10)
+    return SimpleNamespace(capture=capture, recorded={"theta_mech_rad": theta}, weak=weak)
+
+
+def errors(signal: str, shape: np.ndarray, of: int = 0, seed: int = 1) -> Errors:
+    """Errors of a signal in one capture of several: a shape and noise of 0.01."""
+    rng = np.random.default_rng(seed)
+    speed, current = np.linspace(5.0, 200.0, N), rng.uniform(-9.0, 9.0, N)
+    at = {"omega_mech_rad_s": speed, "iq_a": current, "temp_winding_degc": np.full(N, 25.0)}
+    noisy = shape + 0.01 * rng.normal(size=N)
+    return Errors(signal, noisy, np.full(N, 0.01), np.full(N, of), np.arange(N), at)
+
+
+def found_in(
+    monkeypatch: pytest.MonkeyPatch,
+    before: list[Errors],
+    records: tuple[LadderRung, LadderRung] = (EMPTY, EMPTY),
+) -> Signature | None:
+    """The signature of rungs with these errors and with nothing but noise."""
+    quiet = [errors(one.signal, np.zeros(N), int(one.segment[0]), seed=2) for one in before]
+    told = iter([before, quiet])
+    monkeypatch.setattr(module, "window_errors", lambda *_: next(told))
+    fitted = SimpleNamespace(values={"j_kgm2": INERTIA_KGM2})
+    rung: Any = SimpleNamespace(around=SimpleNamespace(residual=np.empty(0)), fitted=fitted)
+    return signature([segment("a.mcap"), segment("b.mcap")], (rung, rung), records)
+
+
+def test_a_bump_of_speed_is_drawn_over_speed_in_its_capture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    speed = np.linspace(5.0, 200.0, N)
+    bump = 0.5 * np.exp(-((speed / 20.0) ** 2))
+    one = found_in(monkeypatch, [errors("vq_v", 0.0 * bump), errors("vd_v", bump, of=1)])
+    assert one is not None
+    assert (one.signal, one.unit, one.variable) == ("vd_v", "V", "omega_mech_rad_s")
+    assert one.capture == "b.mcap"
+    expected = 0.5 * np.exp(-((np.array(one.at) / 20.0) ** 2))
+    assert np.array(one.before) == pytest.approx(expected, abs=0.03)
+    assert np.array(one.after) == pytest.approx(0.0, abs=0.01)
+
+
+def test_an_error_once_a_turn_is_drawn_over_the_angle_of_the_shaft(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    theta = segment("a").recorded["theta_mech_rad"][10 * np.arange(N) + 5]
+    one = found_in(monkeypatch, [errors("vd_v", 0.3 * np.sin(theta))])
+    assert one is not None
+    assert one.variable == "theta_mech_rad"
+    assert np.array(one.before) == pytest.approx(0.3 * np.sin(one.at), abs=0.03)
+
+
+def test_an_error_of_acceleration_is_told_as_torque(monkeypatch: pytest.MonkeyPatch) -> None:
+    step = 40.0 * np.sign(np.linspace(-1.0, 1.0, N))
+    one = found_in(monkeypatch, [errors("alpha_mech_rad_s2", step)])
+    assert one is not None
+    assert (one.signal, one.unit) == ("torque_nm", "N·m")
+    assert one.before[0] == pytest.approx(-40.0 * INERTIA_KGM2, rel=0.01)
+
+
+def test_a_wave_that_windows_smooth_is_taken_from_the_maps_of_the_turn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    middles = (np.array(TURN.edges[1:]) + np.array(TURN.edges[:-1])) / 2.0
+    wave = 0.01 * np.sin(12 * middles)
+    count, chance = np.full(72, 500), np.full(72, 0.5)
+    loud = ErrorMap("torque_shaft_nm", "N·m", TURN, None, count, wave, chance, 0.9, 0.1)
+    quiet = replace(loud, mean=0.001 * wave)
+    records = (replace(EMPTY, maps=(loud,)), replace(EMPTY, maps=(quiet,)))
+    one = found_in(monkeypatch, [errors("vd_v", np.zeros(N))], records)
+    assert one is not None
+    assert (one.signal, one.variable, one.capture) == ("torque_shaft_nm", "theta_mech_rad", None)
+    assert one.before == pytest.approx(wave.tolist())
+    assert one.after == pytest.approx((0.001 * wave).tolist())
+
+
+def test_without_cells_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert found_in(monkeypatch, []) is None
