@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.holding_orders import holding_orders
+from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.traces import LINES_V, tellable
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.orders import TURN_RAD
 from pipeline.physics.frames import vector_of_lines
-from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
@@ -41,7 +42,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
 
     Pole pairs come from the back-EMF against the angle, else from `start`, else the nameplate.
     """
-    slots, stated = campaign.nameplate("slots"), stated_u(campaign)
+    slots, stated = campaign.nameplate("slots"), stated_u(campaign.captures)
     pole_pairs = pole_pairs_of(campaign, start)
     if pole_pairs is None:
         if any(capture.has(name) for capture in campaign.captures for name in _TURNING):
@@ -99,38 +100,6 @@ def encoder_step(campaign: Campaign) -> float:
     step = float(np.median(found)) if found else 0.0
     agree = all(abs(one - step) <= _SAME_STEP * step for one in found)
     return step if agree else 0.0
-
-
-def stated_u(campaign: Campaign) -> dict[str, float]:
-    """Standard uncertainty of the station's gains [1] and thermometers [K], by nuisance.
-
-    The largest that the captures state; what none of them states is not in it.
-    """
-    found: dict[str, float] = {}
-    for capture in campaign.captures:
-        meta = capture.meta
-        volts = "gain_commanded" if meta.voltage_kind == "commanded" else "gain_voltage"
-        for name, u in (
-            ("gain_current", meta.u_rel_current),
-            (volts, meta.u_rel_voltage),
-            ("gain_torque", meta.u_rel_torque),
-            ("offset_temp_k", meta.u_temp_degc),
-            ("gain_lcr", _u_lcr(meta)),
-            ("gain_clock", meta.u_rel_clock),
-        ):
-            if u:
-                found[name] = max(found.get(name, 0.0), u)
-    return found
-
-
-def _u_lcr(meta: CaptureMeta) -> float | None:
-    """Gain of an LCR meter: as stated, else that of the voltage and current it is made of."""
-    if meta.test != "lcr":
-        return None
-    stated = meta.stated_u_rel("u_rel_lcr")
-    if stated is not None:
-        return stated
-    return math.hypot(meta.u_rel_voltage or 0.0, meta.u_rel_current or 0.0)
 
 
 def base_scales(machine: Machine) -> dict[str, float]:

@@ -49,16 +49,17 @@ class Segment:
 
     `recorded` holds capture columns on an even clock of period `ts_s`; `noise` the standard
     deviation of each one's sensor. `channels` are the equations: the recorded signal that each
-    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` the
-    nuisance that is its voltmeter's gain; `angle_step_rad` is the resolution of an angle whose
-    noise is its rounding. `blocks` [W] numbers the parts of a capture that are held out one by one
-    where there is no other capture to predict it from; `offsets` [K, n] are offsets of the
-    channel, of their prior size, that the capture may have; `runs_rad` the angles turned between
-    reversals, of which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak
-    samples of the mains lines, and of the wander of sensors, that there may be; `whole` are the
-    columns of a drive log before it was thinned, with `good`, the samples that were recorded well;
-    `steps` the resolution of columns whose rounding error follows the signal; `log` what an
-    instrument may be late with, at all samples, where the others were thinned.
+    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` and
+    `ammeter` the nuisances that are the gains of its voltmeter and of its current sensors;
+    `angle_step_rad` is the resolution of an angle whose noise is its rounding. `blocks` [W] numbers
+    the parts of a capture that are held out one by one where there is no other capture to predict
+    it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the capture may
+    have; `runs_rad` the angles turned between reversals, of which the column `run` numbers the one
+    at hand; `lines` [K, C, W, M] are weak samples of the mains lines, and of the wander of sensors,
+    that there may be; `whole` are the columns of a drive log before it was thinned, with `good`,
+    the samples that were recorded well; `steps` the resolution of columns whose rounding error
+    follows the signal; `log` what an instrument may be late with, at all samples, where the others
+    were thinned.
     """
 
     capture: str
@@ -81,6 +82,7 @@ class Segment:
     whole: Mapping[str, Array] | None = None
     steps: Mapping[str, float] = field(default_factory=dict)
     log: Mapping[str, Array] = field(default_factory=dict)
+    ammeter: str = "gain_current"
 
     @property
     def size(self) -> int:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.drive_segments import q_log
 from pipeline.criticism.data.holding_segments import standing
+from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.segment import (
     PAIR_RAD,
     Segment,
@@ -67,17 +68,26 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     equation needs, is too short, or whose clock does not rise, is left out.
     """
     made: list[Segment] = []
+    gains = gains_of(campaign.captures)
     for recorded in campaign.captures:
         maker = _MAKERS.get(recorded.meta.test)
         capture = None if maker is None else tellable(recorded)
         found = None if maker is None or capture is None else maker(capture, machine)
         parts = found if isinstance(found, tuple) else (found,)
         usable = (s for s in parts if s is not None and (s.weak is None or s.weak.starts.size))
-        made += [_by_encoder(s, machine.encoder_rad) for s in usable]
+        own = gains[recorded.path]
+        made += [_by_instruments(_by_encoder(s, machine.encoder_rad), own) for s in usable]
     if any(segment.kind == "dq" for segment in made):
         # there are captures to predict a table from as a whole
         made = [replace(s, blocks=None) if s.kind == "flux_map" else s for s in made]
     return tuple(made)
+
+
+def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
+    """The segment with the gains of the instruments that recorded it, by kind."""
+    volts = gains.get("gain_commanded") or gains.get("gain_voltage", "gain_voltage")
+    amps = gains.get("gain_current") or gains.get("gain_current_bench", "gain_current")
+    return replace(segment, meter=volts, ammeter=amps)
 
 
 def _by_encoder(segment: Segment, step: float) -> Segment:

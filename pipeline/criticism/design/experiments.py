@@ -33,7 +33,8 @@ _REPEATS = 4
 _CALIBRATED = 2e-3
 """Standard uncertainty of a calibrated instrument, as a share: as the words below say."""
 _GAIN_WORDS = {
-    "gain_current": "the current sensors calibrated to 0.2 %",
+    "gain_current": "the drive's current sensors calibrated to 0.2 %",
+    "gain_current_bench": "the bench's ammeter calibrated to 0.2 %",
     "gain_voltage": "the bench's voltmeters calibrated to 0.2 %",
     "gain_commanded": "the drive's voltage calibrated to 0.2 %",
     "gain_torque": "the torque transducer calibrated to 0.2 %",

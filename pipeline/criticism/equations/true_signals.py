@@ -57,7 +57,7 @@ def operate(
     theta, omega, freq = _motion(segment, signals, model)
     current = np.zeros(theta.size, dtype=complex)
     if segment.kind in ("dq", "q", "motion"):
-        current = _true_current(_recorded(segment, signals, model), model, values)
+        current = _true_current(_recorded(segment, signals, model), segment.ammeter, model, values)
     if current.size < theta.size:
         at = np.arange(theta.size) * (current.size / theta.size)
         current = np.interp(at, np.arange(current.size), current)
@@ -217,8 +217,8 @@ def ahead_in(
     return ahead if at.size == next(iter(signals.values())).size else None
 
 
-def _true_current(recorded: Recorded, model: Model, values: Values) -> Complex:
-    gain = 1.0 + values["gain_current"]
+def _true_current(recorded: Recorded, ammeter: str, model: Model, values: Values) -> Complex:
+    gain = 1.0 + values[ammeter]
     ahead = recorded.ahead
     recorded = replace(recorded, i_a=recorded.i_a / gain)
     if ahead is not None:
@@ -261,7 +261,7 @@ def _operate_still(
         bench = Recorded(
             stationary, zero, eps, zero, segment.ts_s, False, segment.instrument, phase
         )
-        current = _true_current(bench, model, values) * np.exp(-1j * eps)
+        current = _true_current(bench, segment.ammeter, model, values) * np.exp(-1j * eps)
         freq = zero
     elif segment.kind == "lcr":
         eps, current = np.radians(signals["theta_elec_deg"]), np.zeros(n, dtype=complex)
@@ -270,7 +270,7 @@ def _operate_still(
         eps, freq = zero, zero
         current = signals["id_a"] + 1j * signals["iq_a"]
         table = Recorded(current, zero, eps, zero, segment.ts_s, False, segment.instrument)
-        current = _true_current(table, model, values)
+        current = _true_current(table, segment.ammeter, model, values)
     x = _operating(segment, signals, model, values, current, zero, zero, freq)
     return replace(x, eps_rad=eps)
 
@@ -293,7 +293,7 @@ def _operate_table(
         False,
         segment.instrument,
     )
-    current = _true_current(recorded, model, values)
+    current = _true_current(recorded, segment.ammeter, model, values)
     freq = np.abs(omega) * model.machine.pole_pairs / (2 * math.pi)
     return _operating(segment, signals, model, values, current, theta, omega, freq)
 
@@ -309,5 +309,5 @@ def current_slope(segment: Segment, model: Model, values: Values) -> float:
         zero.astype(np.complex128), zero, zero, zero, segment.ts_s, False, segment.instrument
     )
     ampere = replace(nothing, i_a=np.full(4, 1j))
-    moved = _true_current(ampere, model, values) - _true_current(nothing, model, values)
-    return float(moved[0].imag)
+    moved, still = (_true_current(one, segment.ammeter, model, values) for one in (ampere, nothing))
+    return float((moved - still)[0].imag)

@@ -64,7 +64,8 @@ BASE: tuple[Constant, ...] = (
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", 0.3, hook="hold"),
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", 0.08, hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
-    Constant("gain_current", "1", "gain of the current sensors", 0.01, hook="gain"),
+    Constant("gain_current", "1", "gain of the drive's current sensors", 0.01, hook="gain"),
+    Constant("gain_current_bench", "1", "gain of the bench's ammeter", 0.01, hook="gain"),
     Constant("gain_voltage", "1", "gain of the bench's voltmeters", 0.01, hook="gain"),
     Constant("gain_commanded", "1", "gain of a drive's own voltage", 0.01, hook="gain"),
     Constant("gain_torque", "1", "gain of the torque transducer", 0.01, hook="gain"),
@@ -75,6 +76,14 @@ BASE: tuple[Constant, ...] = (
 GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
+
+
+def base_of(machine: Machine) -> tuple[Constant, ...]:
+    """The base's constants, and the gains of further instruments that the station has."""
+    known = {constant.name for constant in BASE}
+    further = sorted(set(machine.stated_u) - known)
+    words = "gain of a further instrument"
+    return (*BASE, *(Constant(name, "1", words, 0.01, hook="gain") for name in further))
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +106,8 @@ class Model:
         instruments, else the constant's own; and of what handbooks say of materials.
         """
         stated = self.machine.stated_u
-        own = {c.name: (c.center, stated.get(c.name, c.prior)) for c in BASE if c.prior != _FREE}
+        base = [c for c in base_of(self.machine) if c.prior != _FREE]
+        own = {c.name: (c.center, stated.get(c.name, c.prior)) for c in base}
         return own | {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
 
     def with_effects(self, *effects: Effect) -> Model:

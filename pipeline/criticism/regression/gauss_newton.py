@@ -15,7 +15,7 @@ from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, row_index
 from pipeline.criticism.data.segments import sparse
 from pipeline.criticism.effect import Array, Machine, Values
-from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, zero
+from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.regression.bounds import Best, bounded_step, limits_of
 from pipeline.criticism.regression.linear_system import Fitted, System, floors, system
 from pipeline.criticism.regression.linearise import Column
@@ -47,7 +47,7 @@ _SIDES = (
 def start_values(model: Model, machine: Machine) -> dict[str, float]:
     """Where Gauss-Newton begins: orders of magnitude; the base is linear in its constants."""
     scales = base_scales(machine)
-    values = {c.name: scales.get(c.name, c.center) for c in BASE}
+    values = {c.name: scales.get(c.name, c.center) for c in base_of(machine)}
     for effect in model.effects:
         values.update(zero(effect, model))
     return values

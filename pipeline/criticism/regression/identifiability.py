@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
-from pipeline.criticism.machine.model import BASE, PHYSICAL, Model
+from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
@@ -210,7 +210,8 @@ def combinations_told(
 
 def _combined(one: Combination, u: float, names: Sequence[str], model: Model) -> KnownCombination:
     """A combination as it is told."""
-    units = {c.name: c.unit for c in BASE} | {n: p.unit for n, (_, p) in model.parameters().items()}
+    base = base_of(model.machine)
+    units = {c.name: c.unit for c in base} | {n: p.unit for n, (_, p) in model.parameters().items()}
     weights = {names[place]: weight for place, weight in one.weights}
     if one.product:
         return KnownCombination(
@@ -255,5 +256,5 @@ def _sizes(fitted: Fitted, columns: Sequence[Column]) -> Array:
         ]
         own = alike if p.amplitude else [abs(values[name])]
         known[name] = max(*own, p.typical * model.machine.scale(p), 1e-300)
-    known |= {c.name: priors[c.name][1] for c in BASE if c.name in priors}
+    known |= {c.name: priors[c.name][1] for c in base_of(model.machine) if c.name in priors}
     return np.array([known.get(column.name, 1.0) for column in columns])

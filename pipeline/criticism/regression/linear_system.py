@@ -380,7 +380,7 @@ def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Ar
 
 def own_columns(model: Model) -> list[Column]:
     """The columns of a model's own parameters, base first."""
-    columns = base_columns(base_scales(model.machine))
+    columns = base_columns(model.machine, base_scales(model.machine))
     for effect in model.effects:
         columns += effect_columns(effect, model)
     return columns

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import RECORDER, Segment, projected, row_index
-from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
 from pipeline.criticism.equations.observability import HEARS, hears, hears_sensor
 from pipeline.criticism.equations.residuals import (
     RIPPLES,
@@ -25,10 +25,9 @@ from pipeline.criticism.equations.residuals import (
 )
 from pipeline.criticism.equations.true_signals import operate
 from pipeline.criticism.machine.model import (
-    BASE,
-    GAINS,
     Model,
     Pieces,
+    base_of,
     clock_gain,
     effect_flux,
     evaluate,
@@ -175,6 +174,7 @@ class _Sampler:
         self.x = operate(segment, segment.recorded, model, values)
         pieces = self.pieces = evaluate(model, self.x, values)
         self.own: dict[str, Pieces] = {}
+        self.gains = {c.name for c in base_of(model.machine) if c.hook == "gain"}
         self.paced: dict[float, Array] = {}
         self.mean = mean_current(self.x, values)
         self.start = predicted(segment, self.x, pieces, model, values)
@@ -195,7 +195,7 @@ class _Sampler:
         return self._hook(column, column.effect)
 
     def _base(self, column: Column) -> Array | None:
-        if column.name in GAINS:
+        if column.name in self.gains:
             return self._gain(column)
         if column.name not in HEARS[self.segment.kind].constants:
             return None
@@ -221,17 +221,17 @@ class _Sampler:
         heard = {
             "gain_torque": hears_sensor(self.segment, "load"),
             "gain_lcr": self.segment.kind == "lcr",
-            "gain_current": hears_sensor(self.segment, "current"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
             "gain_clock": hears_sensor(self.segment, "clock"),
             self.segment.meter: hears_sensor(self.segment, "voltage"),
+            self.segment.ammeter: hears_sensor(self.segment, "current"),
         }
         if not heard.get(column.name, False):
             return None
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        if column.name in ("gain_current", "offset_temp_k"):
+        if column.name in (self.segment.ammeter, "offset_temp_k"):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
         there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step
@@ -316,9 +316,9 @@ class _Sampler:
         return Pieces(flux, slope, drop, drag)
 
 
-def base_columns(scales: Mapping[str, float]) -> list[Column]:
+def base_columns(machine: Machine, scales: Mapping[str, float]) -> list[Column]:
     """One column a base constant, with the step of its finite difference."""
-    return [Column(c.name, 1e-3 * scales.get(c.name, 1.0)) for c in BASE]
+    return [Column(c.name, 1e-3 * scales.get(c.name, 1.0)) for c in base_of(machine)]
 
 
 def effect_columns(

@@ -148,7 +148,7 @@ def test_a_drop_may_ask_for_the_flux_whatever_the_ripple():
 
 def test_columns_of_a_free_shaft_that_are_kept_go_by_the_new_inertia():
     coast = replace(log(), kind="motion", channels=("torque_shaft_nm",))
-    columns = base_columns(base_scales(machine()))
+    columns = base_columns(machine(), base_scales(machine()))
 
     def around(values: dict[str, float], before: System | None = None) -> System:
         fitted = Fitted(Model(machine(), ()), values, sigma, BASE)

@@ -1,0 +1,79 @@
+"""Which instrument recorded what: each has a gain, with its capture's own uncertainty."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from pipeline.records.capture import Capture, CaptureMeta
+
+_AXES_A = ("id_a", "iq_a")
+_LINES_A = ("ia_a", "ib_a", "ic_a")
+_VOLTS = ("vd_v", "vq_v", "va_v", "vb_v", "vc_v", "vab_v", "vbc_v", "vca_v")
+_FLUXES = ("psi_d_wb", "psi_q_wb")
+_METERS = ("gain_current", "gain_current_bench", "gain_voltage", "gain_commanded")
+"""Gains of which a station may have several instruments; the first of a kind has its name."""
+
+
+def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
+    """The nuisance that is the gain of each instrument, by kind, of every capture by path.
+
+    Captures that state the same uncertainty of the same kind have the same instrument: a scope of
+    1.5 % is not the multimeter of 0.3 % beside it. The best of a kind has the name of the kind.
+    """
+    used = {capture.path: _used(capture) for capture in captures}
+    named = {}
+    for kind in _METERS:
+        stated = {kinds[kind] for kinds in used.values() if kind in kinds}
+        for n, u in enumerate(sorted(stated, key=lambda u: math.inf if u is None else u), 1):
+            named[kind, u] = kind if n == 1 else f"{kind}_{n}"
+    return {p: {kind: named[kind, u] for kind, u in kinds.items()} for p, kinds in used.items()}
+
+
+def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
+    """Standard uncertainty of the station's gains [1] and thermometers [K], by nuisance; what no
+    capture states is not in it. Of what there is one of, the largest that is stated.
+    """
+    captures = tuple(captures)
+    gains, found = gains_of(captures), {}
+    for capture in captures:
+        meta, used = capture.meta, _used(capture)
+        for kind, name in gains[capture.path].items():
+            u = used[kind]
+            if u is not None or name != kind:
+                # a further instrument is known by its number here, so its gain is always told
+                found[name] = meta.instrument_u("u_rel_current") if u is None else u
+        for name, one in (
+            ("gain_torque", meta.u_rel_torque),
+            ("offset_temp_k", meta.u_temp_degc),
+            ("gain_lcr", _u_lcr(meta)),
+            ("gain_clock", meta.u_rel_clock),
+        ):
+            if one:
+                found[name] = max(found.get(name, 0.0), one)
+    return found
+
+
+def _used(capture: Capture) -> Mapping[str, float | None]:
+    """The kinds of gain that a capture's columns have, with the uncertainty that it states."""
+    meta, found = capture.meta, {}
+    if meta.test == "lcr":
+        return {}
+    if any(capture.has(name) for name in _AXES_A):
+        found["gain_current"] = meta.u_rel_current or None
+    elif any(capture.has(name) for name in _LINES_A):
+        found["gain_current_bench"] = meta.u_rel_current or None
+    if any(capture.has(name) for name in (*_VOLTS, *_FLUXES)):
+        commanded = meta.voltage_kind == "commanded"
+        found["gain_commanded" if commanded else "gain_voltage"] = meta.u_rel_voltage or None
+    return found
+
+
+def _u_lcr(meta: CaptureMeta) -> float | None:
+    """Gain of an LCR meter: as stated, else that of the voltage and current it is made of."""
+    if meta.test != "lcr":
+        return None
+    stated = meta.stated_u_rel("u_rel_lcr")
+    if stated is not None:
+        return stated
+    return math.hypot(meta.u_rel_voltage or 0.0, meta.u_rel_current or 0.0)

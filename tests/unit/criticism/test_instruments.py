@@ -1,0 +1,96 @@
+"""Each instrument has a gain of its own, with the uncertainty that its captures state."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.data.instruments import gains_of, stated_u
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segments import segments
+from pipeline.criticism.machine.model import Model, base_of
+from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.constants import Constants
+
+R_OHM = 0.41
+
+
+def two_terminals(name, u_amps, u_volts, reads=1.0, seed=0):
+    """Levels of current through a pair; `reads` is the gain of the ammeter of that day."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(6000) * 1e-4
+    amps = 2.0 * (1 + np.floor(t / 0.1) % 3)
+    columns = {
+        "t_s": t,
+        "vab_v": 2.0 * R_OHM * amps + rng.normal(0.0, 1e-4, t.size),
+        "ia_a": reads * amps + rng.normal(0.0, 1e-4, t.size),
+    }
+    meta = CaptureMeta(
+        "m", "resistance", pole_pairs=4, pair="ab", u_rel_current=u_amps, u_rel_voltage=u_volts
+    )
+    return Capture(name, "0", "verified", meta, (pl.DataFrame(columns),))
+
+
+def other(test, u_amps, u_volts, *columns, **meta):
+    table = pl.DataFrame({name: [0.0, 1.0] for name in columns})
+    known = CaptureMeta("m", test, u_rel_current=u_amps, u_rel_voltage=u_volts, **meta)
+    return Capture(test, "0", "verified", known, (table,))
+
+
+def test_a_scope_a_multimeter_a_drive_and_a_bridge_are_four_instruments():
+    captures = (
+        other("drive", 0.01, 0.005, "id_a", "iq_a", "vd_v", "vq_v", voltage_kind="commanded"),
+        other("open_circuit", 0.004, 0.015, "vab_v", "vbc_v"),
+        other("resistance", 0.004, 0.003, "vab_v", "ia_a"),
+        other("lcr", 0.05, 0.05, "theta_elec_deg", "lab_h"),
+        other("spin_down", 0.2, 0.2, "omega_mech_rad_s"),
+    )
+    gains = gains_of(captures)
+    assert gains["drive"] == {"gain_current": "gain_current", "gain_commanded": "gain_commanded"}
+    assert gains["open_circuit"] == {"gain_voltage": "gain_voltage_2"}
+    assert gains["resistance"] == {
+        "gain_current_bench": "gain_current_bench",
+        "gain_voltage": "gain_voltage",
+    }
+    assert gains["lcr"] == gains["spin_down"] == {}
+    u = stated_u(captures)
+    assert u.pop("gain_lcr") == pytest.approx(0.05 * 2**0.5)
+    assert u == {
+        "gain_current": 0.01,
+        "gain_commanded": 0.005,
+        "gain_voltage_2": 0.015,
+        "gain_current_bench": 0.004,
+        "gain_voltage": 0.003,
+    }
+
+
+def test_an_instrument_that_states_nothing_is_beside_one_that_does_known_to_a_percent():
+    captures = (two_terminals("a", 0.001, 0.001), two_terminals("b", None, 0.001))
+    assert stated_u(captures)["gain_current_bench_2"] == 0.01
+    assert "gain_current_bench" not in stated_u(captures[1:])
+
+
+def test_two_ammeters_may_disagree_by_what_they_state_and_the_better_one_counts():
+    """With the larger u for both and one gain, they could not: R stood between the two."""
+    off = 0.006
+    campaign = Campaign(
+        "m",
+        (
+            two_terminals("analyser", 0.0005, 0.0005, seed=1),
+            two_terminals("shunts", 0.003, 0.0005, 1.0 + off, seed=2),
+        ),
+    )
+    found = machine_of(campaign, Constants())
+    rows = segments(campaign, found)
+    assert [s.ammeter for s in rows] == ["gain_current_bench", "gain_current_bench_2"]
+    fitted, around = first_fit(rows, rough_fit(rows, Model(found, ())))
+    assert fitted.values["r_ohm"] == pytest.approx(R_OHM, rel=3e-4)
+    apart = fitted.values["gain_current_bench_2"] - fitted.values["gain_current_bench"]
+    assert apart == pytest.approx(off, rel=0.05)
+    assert around.spreads(around.residual).max() < 1.3
+    costs = dict(zip((c.name for c in around.columns), around.prior_costs(), strict=True))
+    assert costs["gain_current_bench_2"] == pytest.approx((off / 0.003) ** 2, rel=0.15)
+    assert costs["gain_current"] == pytest.approx(0.0, abs=1e-6)
+    assert "gain_current_bench_2" in {constant.name for constant in base_of(found)}
