@@ -4,13 +4,14 @@ PY := $(VENV)/bin/python
 READY := $(VENV)/requirements.lock
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-data test test-slow lint lock screenshots stories recovery mutants clean
+.PHONY: help demo demo-data test test-slow lint docs lock screenshots stories recovery mutants clean
 
 help:
 	@echo "make demo      the whole way on data/demo: datasheets, checks, report, recordings"
 	@echo "make test      the default tests"
 	@echo "make test-slow the long sweeps as well"
 	@echo "make lint      style, types, import direction"
+	@echo "make docs      the documentation site in reports/site; any warning or broken link is an error"
 	@echo "make demo-data simulate data/demo anew"
 	@echo "make screenshots  docs/images from the demo's report and recordings (needs chromium, lavapipe)"
 	@echo "make recovery  every estimator over 1,000 seeds; writes docs/recovery.md; goes on after a stop"
@@ -62,12 +63,15 @@ lint: $(READY)
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
 
+docs: $(READY)
+	$(PY) -m tests.site reports/site
+
 # The copy of the lock in .venv is the proof of what is installed: same content, nothing to do.
 $(READY): requirements.lock
 	@if cmp -s requirements.lock $@; then touch $@; else ./.ci/environment $(VENV); fi
 
 lock:
-	uv pip compile pyproject.toml --group dev --universal --python-version 3.11 \
+	uv pip compile pyproject.toml --group dev --group docs --universal --python-version 3.11 \
 	  --fork-strategy fewest --generate-hashes --no-annotate --no-header \
 	  --output-file requirements.lock --quiet
 
