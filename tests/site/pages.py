@@ -11,7 +11,7 @@ from typing import Any
 
 import pipeline
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.registry import effects
+from pipeline.criticism.library.registry import effects
 from tests.site.gallery import signature
 
 TOP = {
@@ -23,12 +23,12 @@ TOP = {
 GROUPS: Mapping[str, Sequence[str]] = {
     "Tutorials": ("notebooks/*", "tutorial-effect"),
     "How to": ("recorder-forms", "review", "registry", "export", "lots", "fleet"),
-    "Explanation": ("architecture", "criticism", "uncertainty", "simulator", "real-recordings"),
+    "Explanation": ("criticism", "uncertainty", "simulator", "real-recordings"),
     "Reference": ("api", "glossary", "gallery"),
-    "Measured": ("benchmark", "sensitivity", "recovery", "mutants", "criticism-figures"),
     "Project": ("contributing", "changelog", "decisions/index"),
 }
-"""The pages of the side bar; one that is in no group is an error of the build."""
+"""The pages of the side bar; those that are in no group are under `REST`."""
+REST = "Measured"
 
 
 def stage(root: Path, folder: Path) -> None:
@@ -69,15 +69,17 @@ def _from_docs(text: str) -> str:
 
 def _contents(folder: Path) -> str:
     """The side bar: one hidden table of contents a group."""
+    groups = {
+        title: [path for name in names for path in sorted(folder.glob(f"{name}.md"))]
+        for title, names in GROUPS.items()
+    }
+    named = {path for pages in groups.values() for path in pages}
+    top = {folder / page for page in ("index.md", "license.md")}
+    groups[REST] = sorted({*folder.glob("*.md")} - named - top)
     parts = []
-    for title, names in GROUPS.items():
-        pages = [
-            path.relative_to(folder).with_suffix("").as_posix()
-            for name in names
-            for path in sorted(folder.glob(f"{name}.md"))
-        ]
-        lines = "\n".join(pages)
-        parts.append(f"\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n{lines}\n```\n")
+    for title, pages in groups.items():
+        names = "\n".join(p.relative_to(folder).with_suffix("").as_posix() for p in pages)
+        parts.append(f"\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n{names}\n```\n")
     return "".join(parts)
 
 
@@ -122,7 +124,7 @@ def gallery_page(images: Path) -> str:
         "models. The column is the one whose change is large and best explained by one variable.",
         "",
     ]
-    for effect in _all_effects():
+    for effect in all_effects():
         found = signature(effect)
         found.figure(effect.name).save(images / f"effect-{effect.name}.svg")
         tests = ", ".join(f"`{test}`" for test in effect.tests)
@@ -142,7 +144,8 @@ def gallery_page(images: Path) -> str:
     return "\n".join(lines)
 
 
-def _all_effects() -> list[Effect]:
+def all_effects() -> list[Effect]:
+    """Every effect by name."""
     found = effects()
     return list(found.values() if isinstance(found, Mapping) else found)
 
