@@ -24,6 +24,7 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.outcome import Stopwatch
 from pipeline.settings import ModelSettings, RunSettings, configuration_folder
+from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows
 
 DATASHEET_SCHEMA = {
     "motor_id": pl.String,
@@ -48,11 +49,11 @@ class Datasheets(ByMotor[Datasheet]):
         rows = [
             row
             for name, one in self.motors.items()
-            for row in frames.constant_rows(
+            for row in constant_rows(
                 name, one.motor_type, one.lot, (e for _, e in sorted(one.constants.items()))
             )
         ]
-        return frames.frame(rows, frames.CONSTANT_SCHEMA)
+        return frames.frame(rows, CONSTANT_SCHEMA)
 
     @property
     def checks(self) -> pl.DataFrame:

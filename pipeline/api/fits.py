@@ -20,6 +20,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.evidence import Evidence
 from pipeline.settings import RunSettings
+from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows
 
 RESIDUAL_SCHEMA = {
     "motor_id": pl.String,
@@ -97,8 +98,8 @@ class Fits(ByMotor[MotorFit]):
             found = fit.constants
             chosen = found.rest() if alternatives else tuple(found.chosen().values())
             motor_type, lot = (fit.campaign.text(key) for key in ("motor_type", "lot"))
-            rows += frames.constant_rows(motor_id, motor_type, lot, chosen)
-        return frames.frame(rows, frames.CONSTANT_SCHEMA)
+            rows += constant_rows(motor_id, motor_type, lot, chosen)
+        return frames.frame(rows, CONSTANT_SCHEMA)
 
     def _repr_html_(self) -> str:
         known = self.constants.filter(pl.col("value").is_not_null())

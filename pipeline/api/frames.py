@@ -9,7 +9,6 @@ import polars as pl
 
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import Check
-from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 
 CAPTURE_SCHEMA = {
@@ -23,24 +22,6 @@ CAPTURE_SCHEMA = {
     "masked": pl.Int64,
     "duration_s": pl.Float64,
     "columns": pl.List(pl.String),
-}
-CONSTANT_SCHEMA = {
-    "motor_id": pl.String,
-    "motor_type": pl.String,
-    "lot": pl.String,
-    "constant": pl.String,
-    "value": pl.Float64,
-    "unit": pl.String,
-    "u": pl.Float64,
-    "u_a": pl.Float64,
-    "u_b": pl.Float64,
-    "dof": pl.Float64,
-    "low_95": pl.Float64,
-    "high_95": pl.Float64,
-    "status": pl.String,
-    "method": pl.String,
-    "captures": pl.List(pl.String),
-    "note": pl.String,
 }
 CHECK_SCHEMA = {
     "motor_id": pl.String,
@@ -87,40 +68,6 @@ def capture_rows(campaign: Campaign) -> list[dict[str, Any]]:
                 "masked": count - kept,
                 "duration_s": max((float(t[-1] - t[0]) for t in clocks), default=None),
                 "columns": sorted(capture.columns),
-            }
-        )
-    return rows
-
-
-def constant_rows(
-    motor_id: str, motor_type: str | None, lot: str | None, estimates: Iterable[Estimate]
-) -> list[dict[str, Any]]:
-    """One row an estimate; value, uncertainty and interval are null where it is not identifiable.
-
-    `dof` is null where it is infinite.
-    """
-    rows = []
-    for one in estimates:
-        low, high = one.interval() if one.known else (None, None)
-        said = one.document()
-        rows.append(
-            {
-                "motor_id": motor_id,
-                "motor_type": motor_type,
-                "lot": lot,
-                "constant": one.name,
-                "value": None if one.value is None else one.number,
-                "unit": one.unit,
-                "u": said["u"],
-                "u_a": said["u_a"],
-                "u_b": said["u_b"],
-                "dof": said["dof"],
-                "low_95": low,
-                "high_95": high,
-                "status": one.status,
-                "method": one.method,
-                "captures": list(one.captures),
-                "note": one.note,
             }
         )
     return rows

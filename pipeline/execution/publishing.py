@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipeline.execution.jobs import Files, MotorResult
+from pipeline.execution.page_links import INDEX, links_of
 from pipeline.execution.statuses import Statuses
 from pipeline.io.ingest.survey import Survey
 from pipeline.io.storage.datasheets import read_datasheet
@@ -19,28 +20,42 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome, first_that_applies
-from pipeline.report.console import COLUMNS, nothing_usable, summary
+from pipeline.report.console import nothing_usable, summary
 from pipeline.settings import RunSettings
 from pipeline.views.constants import KEY_CONSTANTS
 
 MANIFEST = "outputs.json"
 INPUT, OUTPUT = "\ue000", "\ue001"
 """Placeholders for the names of the folders; no file may have such a name."""
-OF_BATCH = frozenset({*KEY_CONSTANTS, *(name for _, name, _ in COLUMNS)})
+OF_BATCH = frozenset(KEY_CONSTANTS)
 """Constants that the page and the summary of the batch show."""
 MOST_NAMED = 5
 """Most names of removed files in a note; datasheets come first."""
 FOLDERS = ("datasheets", "report", "recordings", ".cache")
 
 
-def datasheets_of(output: Path, results: Sequence[MotorResult]) -> tuple[Datasheet, ...]:
-    """The datasheets of a batch, read back from the disk.
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """The datasheets of a batch with what its page shows of each, and all constants as a table."""
 
-    Only the constants that the batch shows are kept, so that memory hardly grows with the batch.
+    datasheets: tuple[Datasheet, ...]
+    tables: Mapping[str, bytes]
+
+
+def fleet_of(output: Path, results: Sequence[MotorResult]) -> Fleet:
+    """The datasheets of a batch, read back from where they were written.
+
+    Only what belongs to the batch is kept of each, or memory would grow with the batch.
     """
+    from pipeline.views.tables import constants_frame, fleet_files
+
     names = [name for result in results for name, _ in result.finished.files]
-    sheets = (read_datasheet(output / name) for name in names if name.startswith("datasheets/"))
-    return tuple(_kept(sheet) for sheet in sheets)
+    sheets, frames = [], []
+    for name in (name for name in names if name.startswith("datasheets/")):
+        sheet = read_datasheet(output / name)
+        frames.append(constants_frame(sheet))
+        sheets.append(_kept(sheet))
+    return Fleet(tuple(sheets), fleet_files(frames) if frames else {})
 
 
 def _kept(sheet: Datasheet) -> Datasheet:
@@ -51,7 +66,7 @@ def _kept(sheet: Datasheet) -> Datasheet:
 def publish(
     settings: RunSettings,
     results: Sequence[MotorResult],
-    datasheets: Sequence[Datasheet],
+    fleet: Fleet,
     findings: Sequence[Finding],
     statuses: Statuses,
 ) -> tuple[Files, tuple[str, ...]]:
@@ -70,10 +85,14 @@ def publish(
     document = {"schema": "findings/1", "findings": [f.document() for f in findings]}
     write("findings.json", canonical_json(document))
     files += [file for result in results for file in result.finished.files]
+    for name, content in fleet.tables.items():
+        write(name, content)
     if settings.report:
         from pipeline.report.fleet_page import render_fleet
 
-        write("report/index.html", render_fleet(datasheets, tuple(findings), statuses).encode())
+        links = links_of(output, INDEX, coming=fleet.tables)
+        page = render_fleet(fleet.datasheets, tuple(findings), statuses, links)
+        write(INDEX, page.encode())
     names = sorted(name for name, _ in files)
     removed = _sweep(output, names)
     write(MANIFEST, canonical_json({"schema": "outputs/1", "files": names}))

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.execution.jobs import Files, MotorResult
+from pipeline.execution.page_links import INDEX, links_of, relink
 from pipeline.execution.run_cache import note_files
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheet
@@ -26,7 +27,6 @@ from pipeline.records.naming import file_stem
 
 Histories = Mapping[str, Sequence[Version]]
 Statuses = Mapping[str, CurrentStatus]
-INDEX = "report/index.html"
 
 
 def histories_of(registry: Registry | None) -> Histories:
@@ -60,7 +60,8 @@ def with_current_statuses(
             sheet = read_datasheet(output / name)
             current = current_status(sheet, versions.get(sheet.motor_id, ()), files[name])
             statuses[sheet.motor_id] = current
-            files |= _rewritten(output, sheet, current)
+            changed = _rewritten(output, sheet, current) | relink(output, sheet.motor_id)
+            files |= {name: sha256 for name, sha256 in changed.items() if name in files}
         finished = replace(result.finished, files=tuple(files.items()))
         updated.append(replace(result, finished=finished))
     return updated, statuses
@@ -115,7 +116,8 @@ def _index(output: Path, versions: Histories) -> Iterable[str]:
     statuses = {sheet.motor_id: status_now(output, sheet, versions) for sheet in sheets}
     documents = json.loads((output / "findings.json").read_bytes())["findings"]
     findings = [Finding.of(document) for document in documents]
-    after = render_fleet(sheets, findings, statuses).encode()
+    links = links_of(output, INDEX)
+    after = render_fleet(sheets, findings, statuses, links).encode()
     if after == (output / INDEX).read_bytes():
         return ()
     write_whole(output / INDEX, after)

@@ -19,6 +19,7 @@ from pipeline.numerics.thinning import cloud_points, line_points
 from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.axis import Axis, axis_for, padded, symmetric_axis
+from pipeline.report.band import filled, outlined
 from pipeline.report.residual import ResidualScale, residual_of, residual_scale
 from pipeline.views.names import unit_of
 
@@ -30,6 +31,8 @@ FILES = frozenset({".mcap", ".csv", ".txt", ".tsv", ".log"})
 LINE_LIMIT = 600
 FEW_DOTS = 150
 PALETTE = 6
+FAR_OUT = 9.0
+"""Medians of the residual's size, about six standard deviations, beyond which a sample is far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,22 +111,24 @@ def _bar_pitch(xs: Array) -> float:
 
 
 def _reach(evidence: Evidence, scale: ResidualScale) -> float:
-    left_over = _finite(residual_of(one) for one in evidence.series)
-    return 1.08 * max(float(np.abs(left_over).max()), 2.0 * (scale.noise or 0.0))
+    """Half the height of the residual's axis: all of it, but for one sample in a hundred at most
+    that lies far out; those are drawn at the edge.
+    """
+    sizes = np.abs(_finite(residual_of(one) for one in evidence.series))
+    largest, usual = float(sizes.max()), FAR_OUT * float(np.median(sizes))
+    outside = int(np.count_nonzero(sizes > usual))
+    if usual > 0.0 and outside <= 0.01 * sizes.size and largest > 2.0 * usual:
+        return 1.08 * usual
+    return 1.08 * max(largest, 2.0 * (scale.noise or 0.0))
 
 
 def _main_marks(evidence: Evidence, panel: Panel) -> Iterator[str]:
     fitted = any(one.fitted.size for one in evidence.series)
     several = len(evidence.series) > 1
-    draw, shape = _MARKS[evidence.kind], _shape(evidence)
     for index, one in enumerate(evidence.series):
         css = "measured" if fitted or not several else f"c{index % PALETTE}"
-        yield _path(
-            f"{css} {shape}",
-            draw(panel, one.x, one.measured, index, len(evidence.series)),
-            one.label,
-        )
-    draw = _bar_caps if evidence.kind == "bars" else _line
+        yield _drawn(css, evidence, panel, one, one.measured, index)
+    draw = _bar_caps if evidence.kind == "bars" else _fit_line
     for index, one in enumerate(evidence.series):
         if one.fitted.size:
             order = np.argsort(one.x, kind="stable") if evidence.kind == "scatter" else slice(None)
@@ -133,25 +138,40 @@ def _main_marks(evidence: Evidence, panel: Panel) -> Iterator[str]:
 
 def _residual_marks(evidence: Evidence, panel: Panel, scale: ResidualScale) -> Iterator[str]:
     left, right = panel.x.start, panel.x.end
-    top, bottom = (panel.y.pixel(side * 2.0 * (scale.noise or 0.0)) for side in (1, -1))
+    band = min(2.0 * (scale.noise or 0.0), panel.y.high)
+    top, bottom = (panel.y.pixel(side * band) for side in (1, -1))
     if scale.noise is not None:
         yield (
             f'<rect class="band" x="{left:.1f}" y="{top:.1f}" '
             f'width="{right - left:.1f}" height="{bottom - top:.1f}"/>'
         )
-    draw, shape = _MARKS[evidence.kind], _shape(evidence)
+    reach, beyond = panel.y.high, 0
     for index, one in enumerate(evidence.series):
         residual = residual_of(one)
         if residual.size:
-            marks = draw(panel, one.x, residual, index, len(evidence.series))
-            yield _path(f"residual {shape}", marks, one.label)
+            beyond += int(np.count_nonzero(np.abs(residual) > reach))
+            inside = np.clip(residual, -reach, reach)
+            yield _drawn("residual", evidence, panel, one, inside, index)
     if scale.noise is not None:
         lines = "".join(f"M{left:.1f} {y:.1f}H{right:.1f}" for y in (top, bottom))
         yield f'<path class="noise" d="{lines}"/>'
     yield (
         f'<text class="scale" x="{right:.1f}" y="{panel.y.end - 7:.1f}">'
-        f"{escape(residual_words(scale, panel.y))}</text>"
+        f"{escape(residual_words(scale, panel.y))}{f', {beyond} beyond' if beyond else ''}</text>"
     )
+
+
+def _drawn(css: str, evidence: Evidence, panel: Panel, one: Series, y: Array, index: int) -> str:
+    """The marks of one series; a dense trace is the band between its extremes."""
+    if evidence.kind == "line" and (band := filled(*panel.place(one.x, y))):
+        return _path(f"{css} trace", band, one.label)
+    marks = _MARKS[evidence.kind](panel, one.x, y, index, len(evidence.series))
+    return _path(f"{css} {_shape(evidence)}", marks, one.label)
+
+
+def _fit_line(panel: Panel, x: Array, y: Array, index: int, count: int) -> str:
+    """A fitted curve, or the edges of a dense one, through which the measured one shows."""
+    return outlined(*panel.place(x, y)) or _line(panel, x, y, index, count)
 
 
 def residual_words(scale: ResidualScale, axis: Axis) -> str:

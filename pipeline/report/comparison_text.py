@@ -9,7 +9,7 @@ from pipeline.physics.notation import quantity, reading, significant
 from pipeline.records.comparison import Comparison, Dependence, SignalError
 from pipeline.records.error_map import ErrorMap
 from pipeline.records.naming import counted
-from pipeline.report.registry_text import safe, table
+from pipeline.views.table_text import safe, table
 
 _SURE = 1e-3
 _SHARE = 0.05

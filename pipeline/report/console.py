@@ -1,30 +1,23 @@
-"""The summary that a run prints: one line a motor, what failed, where to look."""
+"""The summary that a run prints: a line a motor, what failed, why, where to look."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from pipeline.records.current_status import CurrentStatus, current_status
+from pipeline.records.current_status import CurrentStatus
 from pipeline.records.datasheet import Datasheet
-from pipeline.records.estimate import Estimate
 from pipeline.records.finding import Finding
 from pipeline.records.naming import counted, printable
-from pipeline.report.status_text import status_lines
+from pipeline.views.fleet import Column, FleetView, MotorRow, fleet_view
 from pipeline.views.model_words import model_words
+from pipeline.views.status_text import status_lines
+from pipeline.views.table_text import NONE, blocks
 
-COLUMNS: tuple[tuple[str, str, float], ...] = (
-    ("p", "pole_pairs", 1.0),
-    ("R [mohm]", "r_phase_ohm", 1e3),
-    ("Ld [uH]", "ld_h", 1e6),
-    ("Lq [uH]", "lq_h", 1e6),
-    ("psi [mWb]", "psi_pm_wb", 1e3),
-    ("Kt [mN·m/A]", "kt_peak_nm_a", 1e3),
-    ("J [g·cm²]", "j_rotor_kgm2", 1e7),
-    ("Tc [mN·m]", "torque_coulomb_nm", 1e3),
-    ("cogging", "cogging_order", 1.0),
-)
-NONE = "-"
+FEW = 20
+"""So many motors are told with all their key constants; of more, those that fit one table."""
+LONGEST = 20
+"""Characters of a motor's id and of a lot's name in a table."""
 
 
 def summary(
@@ -41,11 +34,11 @@ def summary(
     `statuses` are the current ones, by motor; what a datasheet says of itself without. `folder` is
     where the captures lie.
     """
-    now = {s.motor_id: (statuses or {}).get(s.motor_id, current_status(s)) for s in datasheets}
+    view = fleet_view(datasheets, statuses)
     lines: list[str] = []
-    if datasheets:
-        lines += [*_table(datasheets, now), ""]
-    for sheet in datasheets:
+    if view.rows:
+        lines += [*_tables(view), ""]
+    for sheet in (row.sheet for row in view.rows):
         lines += [
             f"{printable(sheet.motor_id)}: {c.name} {c.status}: {c.meaning}"
             + (f"; suspect: {c.suspect}" if c.suspect else "")
@@ -54,11 +47,11 @@ def summary(
         ]
     lines += _unexplained(datasheets, folder)
     lines += [
-        f"{printable(motor_id)}: {printable(line)}"
-        for motor_id, current in now.items()
-        for line in status_lines(current)
+        f"{printable(row.sheet.motor_id)}: {printable(line)}"
+        for row in view.rows
+        for line in status_lines(row.current)
     ]
-    counts = Counter(current.status for current in now.values())
+    counts = Counter(row.current.status for row in view.rows)
     states = f"{counts['released']} released, {counts['provisional']} provisional, "
     states += f"{counts['refused']} refused"
     states += f", {counts['revoked']} revoked" if counts["revoked"] else ""
@@ -66,6 +59,8 @@ def summary(
     lines.append(
         f"{counted(len(datasheets), 'motor')}: {states}; {counted(refused, 'capture')} refused"
     )
+    if datasheets:
+        lines.append(f"all constants: {output}/fleet.csv")
     if report and datasheets:
         lines.append(f"open {output}/report/index.html")
     return "\n".join(lines)
@@ -94,31 +89,31 @@ def nothing_usable(folder: str, *, refused: bool) -> str:
     return f"undecided: no usable capture in {folder}; {remedy}"
 
 
-def _table(datasheets: Sequence[Datasheet], now: Mapping[str, CurrentStatus]) -> list[str]:
-    head = ["motor", "lot", "status", "model", *(title for title, *_ in COLUMNS)]
-    rows = [
-        [
-            printable(sheet.motor_id),
-            printable(sheet.lot or NONE),
-            now[sheet.motor_id].status,
-            model_words(sheet.model, sheet.motor_id).short,
-            *(_cell(sheet.constants.get(name), scale) for _, name, scale in COLUMNS),
-        ]
-        for sheet in datasheets
-    ]
-    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+def _tables(view: FleetView) -> list[str]:
+    """Tables no wider than a terminal, units as on the page; one alone for many motors."""
+    head = ["motor", "lot", "status", "model", *map(_heading, view.columns)]
+    units = ["", "", "", "[floors]", *(f"[{c.unit}]" if c.unit else "" for c in view.columns)]
+    rows = [head, units, *map(_row, view.rows)]
+    found = blocks(rows, right=range(3, len(head)))
+    return [one for n, one in enumerate(found) if n == 0 or len(view.rows) <= FEW]
+
+
+def _heading(column: Column) -> str:
+    """The symbol in a line: `Kt` of K with the subscript `t, peak`."""
+    letter, below = column.symbol
+    return f"{letter}{below.partition(',')[0]}" or column.name
+
+
+def _row(row: MotorRow) -> list[str]:
+    sheet = row.sheet
     return [
-        "  ".join(
-            text.ljust(width) if column < 4 else text.rjust(width)
-            for column, (text, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [head, *rows]
+        _short(printable(sheet.motor_id)),
+        _short(printable(sheet.lot or NONE)),
+        row.current.status,
+        row.model.short.removesuffix(" floors"),
+        *(cell.reading.value if cell.reading else NONE for cell in row.cells),
     ]
 
 
-def _cell(estimate: Estimate | None, scale: float) -> str:
-    if estimate is None or estimate.value is None:
-        return NONE
-    if isinstance(estimate.value, int):
-        return str(estimate.value)
-    return f"{estimate.value * scale:.4g}"
+def _short(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pipeline.physics.notation import quantity, reading, scale_for
 from pipeline.records.lot_constant import Component, ConstantResult, Gauge
 from pipeline.records.lot_regression import EffectChange, LotRegression, OrderLevel
+from pipeline.report.link_block import Link, link_block
 from pipeline.report.lot_chart import cogging_chart, lot_chart
 from pipeline.report.lot_text import mean_of
 from pipeline.report.page import render
@@ -54,8 +55,8 @@ class Detail:
     missing: tuple[str, ...]
 
 
-def render_regression(found: LotRegression) -> str:
-    """The self-contained HTML page; equal input, equal text."""
+def render_regression(found: LotRegression, links: Sequence[Link] = ()) -> str:
+    """The self-contained HTML page; equal input, equal text. `links` lead to other pages."""
     present = sorted(
         (one for one in found.constants if one.motors),
         key=lambda one: RANK.get(one.verdict, 9),
@@ -63,6 +64,7 @@ def render_regression(found: LotRegression) -> str:
     return render(
         "lot.html.jinja",
         found=found,
+        links=link_block(links),
         tone=TONES.get(found.verdict, "none"),
         short=found.verdict.replace("_", " "),
         reasons=found.reasons,

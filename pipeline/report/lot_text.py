@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pipeline.physics.notation import quantity
 from pipeline.records.lot_constant import ConstantResult, Side
 from pipeline.records.lot_regression import LotRegression
-from pipeline.report.registry_text import NONE, safe, table
+from pipeline.views.table_text import NONE, safe, table
 
 
 def regression_text(found: LotRegression, files: Sequence[str]) -> str:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from datetime import datetime
 
 from pipeline.physics.notation import MINUS, quantity, reading
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.difference import Change
 from pipeline.records.estimate import Estimate
-from pipeline.records.ledger import Event, Version
+from pipeline.records.ledger import Version
 from pipeline.records.naming import counted
 from pipeline.views.model_words import model_words
+from pipeline.views.status_text import decision, when
+from pipeline.views.table_text import NONE, safe, table
 
-NONE = "-"
 SHOWN_DIGITS = 12
 
 
@@ -107,38 +107,6 @@ def difference_text(before: Version, after: Version, changes: Sequence[Change]) 
         "u: both uncertainties, root sum of squares; u_d: what one instrument adds to both cancels",
     ]
     return "\n".join(lines)
-
-
-def decision(event: Event) -> str:
-    """`approved by NAME on DATE: why`."""
-    word = "approved" if event.kind == "approve" else "revoked"
-    who, why = safe(event.by or NONE), safe(event.why or NONE)
-    return f"{word} by {who} on {when(event.recorded_at)}: {why}"
-
-
-def when(moment: datetime) -> str:
-    """A moment to the second, in UTC."""
-    return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
-
-
-def table(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """Columns of text, left-aligned but for those named; nothing in a cell moves the cursor."""
-    cells = [[safe(cell) for cell in row] for row in rows]
-    widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
-    return "\n".join(
-        "  ".join(
-            cell.rjust(width) if column in right else cell.ljust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in cells
-    )
-
-
-def safe(text: str) -> str:
-    """The text with everything that a terminal would act on written out."""
-    return "".join(
-        char if char.isprintable() else char.encode("unicode_escape").decode() for char in text
-    )
 
 
 def _value(estimate: Estimate | None) -> str:

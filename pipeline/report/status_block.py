@@ -9,7 +9,7 @@ from pipeline.records.current_status import CurrentStatus
 from pipeline.records.datasheet import Datasheet
 from pipeline.report.link_block import replaced
 from pipeline.report.page import render
-from pipeline.report.status_text import status_lines, status_words
+from pipeline.views.status_text import status_lines, status_words
 
 BEGIN, END = "<!-- status -->", "<!-- end of status -->"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pipeline.execution.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
@@ -29,14 +30,16 @@ def _judge(task: Task) -> Judged:
     if result.unknown is not None and result.unknown.sketch:
         effect = output / "diagnosis" / "effects" / f"{result.unknown.effect}.py"
         write_whole(effect, result.unknown.source.encode())
-    from pipeline.report.ladder_page import render_ladder
-
-    with task.watch.stage("page"):
-        page = render_ladder(result, task.folder)
-        write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
     if result.ladder:
         from pipeline.io.recordings.ladder import write_ladder_recording
 
         with task.watch.stage("recording"):
             write_ladder_recording(result, output / "recordings" / f"ladder-{stem}.rrd")
+    from pipeline.report.ladder_page import render_ladder
+
+    with task.watch.stage("page"):
+        links = links_of(output, "diagnosis/{}.html", result.motor_id)
+        page = render_ladder(result, task.folder, links)
+        write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
+        relink(output, result.motor_id)
     return Judged(ladder_text(result, task.folder), result.verdict == "insufficient")

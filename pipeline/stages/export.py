@@ -14,8 +14,8 @@ from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Selection, Version, in_force
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
-from pipeline.report.status_text import exported, not_exported
 from pipeline.settings import ExportSettings
+from pipeline.views.status_text import exported, not_exported
 
 
 def main(settings: ExportSettings) -> Outcome:

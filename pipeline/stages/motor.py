@@ -92,11 +92,14 @@ def _write(
         with watch.stage("datasheet"):
             write(f"datasheets/{stem}.json", work.content_of(datasheet))
         if job.report:
+            from pipeline.execution.page_links import links_of
             from pipeline.report.motor_page import render_motor
 
             with watch.stage("report"):
                 terms = {term.name: term for estimator in estimators() for term in estimator.terms}
-                page = render_motor(datasheet, evidence, findings, terms)
+                coming = (f"recordings/motor-{stem}.rrd",) if job.recordings else ()
+                links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
+                page = render_motor(datasheet, evidence, findings, terms, links)
                 write(f"report/{stem}.html", page.encode())
         if job.recordings:
             from pipeline.io.recordings.seal import SEAL, seal_line

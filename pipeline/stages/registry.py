@@ -18,14 +18,13 @@ from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome
 from pipeline.report.registry_text import (
     datasheet_text,
-    decision,
     difference_text,
     in_force_table,
-    safe,
     versions_table,
-    when,
 )
 from pipeline.settings import RegistrySettings
+from pipeline.views.status_text import decision, when
+from pipeline.views.table_text import safe
 
 PREFIX = re.compile("[0-9a-f]{4,64}")
 TAG = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,63}")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.estimation.registry import estimators
+from pipeline.execution.page_links import LOTS, links_of, relink_index
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.diagnoses import read_diagnoses
 from pipeline.io.storage.limits import limits_file, read_limits
@@ -102,7 +103,7 @@ def _write(output: Path, regression: LotRegression) -> tuple[str, ...]:
     files = {
         "report.json": canonical_json(regression.document()),
         "report.xml": junit_xml(regression),
-        "report.html": render_regression(regression).encode(),
+        "report.html": render_regression(regression, links_of(output, LOTS)).encode(),
     }
     for name, content in files.items():
         write_whole(folder / name, content)
@@ -110,4 +111,5 @@ def _write(output: Path, regression: LotRegression) -> tuple[str, ...]:
 
     recording = output / "recordings" / lots_name(regression)
     write_lots_recording(regression, recording)
+    relink_index(output)
     return (*((folder / name).as_posix() for name in files), recording.as_posix())

@@ -29,8 +29,8 @@ from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.records.errors import MachineError, RecordingError, UsageError
 from pipeline.records.naming import file_stem, printable
 from pipeline.records.outcome import Outcome
-from pipeline.report.status_text import status_lines
 from pipeline.settings import ReviewSettings
+from pipeline.views.status_text import status_lines
 
 LAST_PORT = 65534
 """One less than there are, for the fleet's table is on the next."""

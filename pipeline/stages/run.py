@@ -16,7 +16,7 @@ from pipeline.execution.jobs import MotorJob, MotorResult
 from pipeline.execution.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.pools import Cluster, core_count, open_pool
 from pipeline.execution.publishing import (
-    datasheets_of,
+    fleet_of,
     outcome_of,
     publish,
     removed_note,
@@ -114,8 +114,9 @@ def _run(settings: RunSettings, registry: Registry | None, workers: WorkerPool) 
         batch = _batch_key(settings, plain, found, registry)
         results, statuses = with_current_statuses(output, results, histories_of(registry))
     with watch.stage("fleet"):
-        datasheets = datasheets_of(output, results)
-        files, removed = publish(settings, results, datasheets, findings, statuses)
+        fleet = fleet_of(output, results)
+        datasheets = fleet.datasheets
+        files, removed = publish(settings, results, fleet, findings, statuses)
         outcome = outcome_of(datasheets, findings, found, statuses, report=settings.report)
     lasting = not died and all(result.lasting for result in results)
     if lasting and registered.code == 0 and _revocations(registry) == revoked:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 
 from pipeline.physics.glossary import CONSTANTS, Term
@@ -110,8 +111,13 @@ def grouped(names: Iterable[str]) -> list[tuple[str, list[str]]]:
     present = set(names)
     known = {name for group in GROUPS.values() for name in group}
     groups = [(title, [n for n in group if n in present]) for title, group in GROUPS.items()]
-    groups.append((OTHER, sorted(present - known)))
+    groups.append((OTHER, sorted(present - known, key=in_order)))
     return [(title, members) for title, members in groups if members]
+
+
+def in_order(name: str) -> list[tuple[int, str]]:
+    """A key that sorts numbers in names by their size: harmonic 5 before harmonic 11."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
 def sentence(text: str) -> str:

@@ -133,7 +133,8 @@ def test_a_motor_that_breaks_leaves_the_others(
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "stray" in line]
     assert line.startswith("error: motor stray could not be finished: RecursionError: too deep")
     listed = json.loads((batch.output / "outputs.json").read_bytes())["files"]
-    assert listed == ["datasheets/gimbal~2fone.json", "findings.json"]
+    tables = ["fleet.csv", "fleet.parquet"]
+    assert listed == ["datasheets/gimbal~2fone.json", "findings.json", *tables]
 
 
 def test_an_output_whose_place_a_file_has_taken(

@@ -59,3 +59,14 @@ for (const button of document.querySelectorAll("button.copy")) button.addEventLi
 // A link to something folded opens it.
 const unfold = () => { const place = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1))); for (let fold = place; fold; fold = fold.parentElement) if (fold.tagName === "DETAILS") fold.open = true; if (place) place.scrollIntoView(); };
 addEventListener("hashchange", unfold); unfold();
+// On a narrow screen rows are stacked: each cell says which column it was.
+for (const table of document.querySelectorAll("table.stack")) {
+  const heads = [...(table.tHead?.rows[0].cells ?? [])].map((cell) => cell.textContent.trim());
+  for (const body of table.tBodies) for (const row of body.rows) { let column = 0; for (const cell of row.cells) { if (cell.tagName === "TD" && cell.colSpan === 1 && heads[column]) cell.dataset.label = heads[column]; column += cell.colSpan; } }
+}
+// A plot can be as wide as the page.
+for (const figure of document.querySelectorAll("figure")) if (figure.querySelector("svg.chart")) {
+  const button = Object.assign(document.createElement("button"), { type: "button", className: "enlarge", textContent: "Enlarge" });
+  button.addEventListener("click", () => { button.textContent = figure.classList.toggle("big") ? "Smaller" : "Enlarge"; figure.scrollIntoView({ block: "nearest" }); });
+  figure.prepend(button);
+}

@@ -236,3 +236,40 @@ def test_a_strip_draws_each_motor_at_its_value_with_its_uncertainty() -> None:
     width = float(bar.split("h")[1])
     assert width / (places[1] - places[0]) == pytest.approx(0.008 / 0.02, abs=0.01)
     assert dots["m2: 320.0 ± 4.0 mΩ"].find("circle").get("class") == "dot refused"
+
+
+def test_a_dense_trace_is_a_band_between_its_extremes_and_its_fit_two_edges() -> None:
+    """A curve drawn over itself a hundred times is one block that hides what was measured."""
+    x = np.linspace(0.0, 1.0, 40_000)
+    wave = np.sin(2 * np.pi * 400 * x) * (1.0 + x)
+    one = Evidence("e", "t", "t_s", "ia_a", "line", (Series("", x, wave, 0.9 * wave),))
+    paths = {p.attrib["class"]: p.attrib["d"] for p in ET.fromstring(chart(one)).iter("path")}
+    band, edges = paths["measured trace"], paths["fitted"]
+    assert band.endswith("Z") and band.count("M") == 1
+    assert edges.count("M") == 2 and "Z" not in edges
+    places = [(float(a), float(b)) for a, b in re.findall(r"[ML]([\d.]+) ([\d.]+)", band)]
+    upper, lower = places[: len(places) // 2], places[len(places) // 2 :]
+    widths = [low[1] - up[1] for up, low in zip(upper, reversed(lower), strict=True)]
+    assert widths[-2] == pytest.approx(2.0 * widths[1], rel=0.05), "it grows with the wave"
+    assert all(up[0] == low[0] for up, low in zip(upper, reversed(lower), strict=True))
+
+
+def test_a_quiet_trace_stays_a_line() -> None:
+    x = np.linspace(0.0, 1.0, 40_000)
+    one = Evidence("e", "t", "t_s", "ia_a", "line", (Series("", x, x, np.empty(0)),))
+    svg = chart(one)
+    assert "trace" not in svg and "curve" in svg
+
+
+def test_one_sample_far_out_does_not_flatten_the_residual() -> None:
+    rng = np.random.default_rng(3)
+    x, noise = np.linspace(0.0, 1.0, 500), rng.normal(0.0, 0.01, 500)
+    noise[250] = 5.0
+    one = Evidence("e", "t", "iq_a", "vd_v", "scatter", (Series("", x, noise, np.zeros(500)),))
+    assert ", 1 beyond</text>" in chart(one)
+    residual = re.search(r'class="residual[^"]*" data-label="" d="([^"]*)"', chart(one))
+    assert residual is not None
+    ys = np.array([float(y) for y in re.findall(r" ([\d.]+)h0", residual[1])])
+    assert np.percentile(ys, 95) - np.percentile(ys, 5) > 15.0
+    noise[::25] = 5.0
+    assert "beyond" not in chart(one), "one in twenty-five is no outlier"

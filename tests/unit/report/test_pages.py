@@ -20,6 +20,7 @@ from pipeline.report.fleet_page import page_of, render_fleet
 from pipeline.report.motor_page import render_motor
 from pipeline.views.conditions import conditions
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
+from pipeline.views.motor import kind_of, parts_of
 
 VOID = {"meta", "br", "input", "path", "rect", "circle"}
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>\u202e'
@@ -84,7 +85,7 @@ def test_the_table_of_constants_is_the_datasheet(
             assert squeezed(row[1]) == "not identifiable"
             assert estimate.note in squeezed(row[-1])
             continue
-        value, _, rest = squeezed(row[1]).partition(" ± ")
+        value, _, rest = re.sub(r" [\d.]+ %$", "", squeezed(row[1])).partition(" ± ")
         if estimate.u == 0.0:
             assert value == f"{estimate.value}"
             continue
@@ -94,7 +95,9 @@ def test_the_table_of_constants_is_the_datasheet(
         factor = 1e-6 if unit.startswith("µ") else factor
         assert float(expanded) * factor == pytest.approx(2 * estimate.u, rel=0.05), name
         assert float(value) * factor == pytest.approx(estimate.value, abs=0.06 * 2 * estimate.u)
-        assert float(row[3]) ** 2 + float(row[4]) ** 2 == pytest.approx(
+        parts = re.search(r"uA ([\d.]+), uB ([\d.]+)", squeezed(row[2]))
+        assert parts is not None
+        assert float(parts[1]) ** 2 + float(parts[2]) ** 2 == pytest.approx(
             (estimate.u / factor) ** 2, rel=0.06
         )
 
@@ -112,6 +115,58 @@ def test_the_other_method_stands_under_the_published_one(
     assert other[0] == "also by lcr"
     assert other[1] == "211.5 ± 1.8 µH"
     assert other[2] == f"+0.67 % apart, {gap:.1f} u of the difference"
+
+
+def test_what_u_comes_from_is_a_bar_that_adds_up(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    html = render_motor(datasheet, evidence, ())
+    row = html.split('<tr id="r_phase_ohm"')[1].split("</tr>")[0]
+    assert 'aria-label="current 64 %, scatter 36 %"' in row
+    shares = re.findall(r'<i class="b-(\w+)" style="flex-grow:([\d.]+)"', row)
+    assert shares == [("current", "0.6400"), ("scatter", "0.3600")]
+    for name, estimate in datasheet.constants.items():
+        parts = parts_of(estimate.budget)
+        assert sum(part.share for part in parts) == pytest.approx(1.0 if parts else 0.0), name
+
+
+@pytest.mark.parametrize(
+    ("source", "kind"),
+    [
+        ("current@bench-1", "current"),
+        ("voltage_commanded@bench-1", "voltage"),
+        ("theta_elec:330@bench-1", "angle"),
+        ("scatter:lcr:r_lcr_ohm", "scatter"),
+        ("between:methods:ld_h", "disagreement"),
+        ("assumed:drag_form", "assumptions"),
+        ("lcr@bench-1", "LCR meter"),
+        ("seal_gauge@bench-1", "seal gauge"),
+    ],
+)
+def test_a_source_of_uncertainty_in_a_word(source: str, kind: str) -> None:
+    assert kind_of(source) == kind
+
+
+def test_what_failed_is_a_card_above_the_constants(
+    datasheet: Datasheet, evidence: tuple[Evidence, ...]
+) -> None:
+    html = render_motor(datasheet, evidence, ())
+    cards = html.split('<div class="cards">')[1].split("</div>")[0]
+    assert re.findall(r'class="card (\w+)" href="#(check-\d)"', cards) == [
+        ("fail", "check-1"),
+        ("marginal", "check-2"),
+    ]
+    for words in ("kt vs ke", "1.1547", "limit 0.01", "torque test against back-EMF", "2/sqrt(3)"):
+        assert words in cards
+    assert html.index('class="cards"') < html.index('id="constants"')
+    sound = replace(datasheet, checks=(Check("kt_vs_ke", "pass", "holds", 1.0, 0.01, "1"),))
+    assert 'class="cards"' not in render_motor(sound, evidence, ())
+
+
+def test_numbers_in_names_go_by_size() -> None:
+    names = ["bemf_harmonic_11", "bemf_harmonic_5", "bemf_harmonic_13", "bemf_harmonic_7", "a"]
+    ((_, others),) = grouped(names)
+    assert others == ["a", *(f"bemf_harmonic_{n}" for n in (5, 7, 11, 13))]
 
 
 def test_checks_stand_worst_first_with_value_limit_and_suspect(
@@ -191,7 +246,8 @@ def test_pages_fetch_nothing(datasheet: Datasheet, evidence: tuple[Evidence, ...
         page = Page(html)
         assert not [a for _, attrs in page.tags for a in attrs if a in {"src", "srcset", "data"}]
         links = [attrs["href"] for _, attrs in page.tags if "href" in attrs]
-        assert all(link.startswith("#") or re.fullmatch(r"[\w~.-]+\.html", link) for link in links)
+        beside = re.compile(r"#.*|[\w~.-]+\.html|\.\./datasheets/[\w~.-]+\.json")
+        assert all(beside.fullmatch(link) for link in links)
         assert "@import" not in html
         assert "url(" not in html
         assert not {tag for tag, _ in page.tags} & {"link", "iframe", "object", "embed", "base"}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+
 from pipeline.records.current_status import CurrentStatus
-from pipeline.records.ledger import Version
-from pipeline.report.registry_text import decision
+from pipeline.records.ledger import Event, Version
+from pipeline.views.table_text import NONE, safe
 
 WORDS = {
     "released": "Every capture verified, every check holds, approved.",
@@ -46,3 +48,15 @@ def not_exported(last: Version) -> str:
     points = "; ".join(last.published.reasons[:3])
     why = f" ({points})" if points else ""
     return f"revision {last.revision} is newer and {last.status}{why}; it is not exported"
+
+
+def decision(event: Event) -> str:
+    """`approved by NAME on DATE: why`."""
+    word = "approved" if event.kind == "approve" else "revoked"
+    who, why = safe(event.by or NONE), safe(event.why or NONE)
+    return f"{word} by {who} on {when(event.recorded_at)}: {why}"
+
+
+def when(moment: datetime) -> str:
+    """A moment to the second, in UTC."""
+    return moment.strftime("%Y-%m-%dT%H:%M:%SZ")

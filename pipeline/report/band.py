@@ -1,0 +1,48 @@
+"""A dense trace as the band between its extremes: a curve drawn over itself would be one block."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+COLUMN_PX, FEWEST_A_COLUMN, LEAST_HEIGHT_PX = 1.5, 4.0, 8.0
+"""Width of a column; samples in one on average and median height, from which on it is dense."""
+
+
+def extremes(x_px: Array, y_px: Array) -> tuple[Array, Array, Array] | None:
+    """Middle, top and bottom [C, px] of the columns of a dense trace; None for any other.
+
+    `x_px`, `y_px` are [n], x rising; samples that are not finite are left out.
+    """
+    fine = np.isfinite(x_px) & np.isfinite(y_px)
+    x, y = x_px[fine], y_px[fine]
+    if x.size < 2 or np.any(np.diff(x) < 0.0):
+        return None
+    column = np.floor(x / COLUMN_PX)
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1])
+    if x.size < FEWEST_A_COLUMN * starts.size:
+        return None
+    top, bottom = np.minimum.reduceat(y, starts), np.maximum.reduceat(y, starts)
+    if float(np.median(bottom - top)) < LEAST_HEIGHT_PX:
+        return None
+    return (column[starts] + 0.5) * COLUMN_PX, top, bottom
+
+
+def filled(x_px: Array, y_px: Array) -> str:
+    """The path of the band, closed; empty where the trace is not dense."""
+    found = extremes(x_px, y_px)
+    if found is None:
+        return ""
+    x, top, bottom = found
+    return f"{_path(x, top)}L{_path(x[::-1], bottom[::-1])[1:]}Z"
+
+
+def outlined(x_px: Array, y_px: Array) -> str:
+    """The path of the band's two edges, so that another shows through; empty as above."""
+    found = extremes(x_px, y_px)
+    return "" if found is None else _path(found[0], found[1]) + _path(found[0], found[2])
+
+
+def _path(x: Array, y: Array) -> str:
+    return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))

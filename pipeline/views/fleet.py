@@ -1,0 +1,177 @@
+"""All motors beside each other: key constants on one scale each, and every reason told once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from pipeline.physics.notation import Reading, Scale, reading, scale_for
+from pipeline.records.current_status import CurrentStatus, current_status
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import MODEL_REASON, number
+from pipeline.views.constants import KEY_CONSTANTS, constant_words, symbol
+from pipeline.views.model_words import ModelWords, model_words
+from pipeline.views.names import quantity_words
+from pipeline.views.status_text import status_lines
+
+STATUS_ORDER = ("refused", "revoked", "provisional", "released")
+SHARED = 2
+"""Motors from which on a reason is told once for all of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One constant across all motors, on one scale."""
+
+    name: str
+    symbol: tuple[str, str]
+    words: str
+    scale: Scale
+
+    @property
+    def unit(self) -> str:
+        """The unit that all its numbers are shown in."""
+        return self.scale.unit
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One constant of one motor; `reading` is None where it has no value."""
+
+    reading: Reading | None
+    sort: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why motors are not released, told once: `text`, and the motors that it holds for."""
+
+    text: str
+    motors: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MotorRow:
+    """One line of the table; `why` are the motor's own reasons, `shared` numbers of the others."""
+
+    sheet: Datasheet
+    current: CurrentStatus
+    why: str
+    shared: tuple[int, ...]
+    failed: tuple[tuple[str, str], ...]
+    model: ModelWords
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FleetView:
+    """Motors in order of their ids; `reasons` that more than one has, the commonest first."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[MotorRow, ...]
+    reasons: tuple[Reason, ...]
+    counts: tuple[tuple[str, int], ...]
+
+
+def fleet_view(
+    datasheets: Sequence[Datasheet], statuses: Mapping[str, CurrentStatus] | None = None
+) -> FleetView:
+    """The view of all motors, whatever order they come in.
+
+    `statuses` are the current ones, by motor; what a datasheet says of itself without.
+    """
+    sheets = sorted(datasheets, key=lambda sheet: sheet.motor_id)
+    now = [(statuses or {}).get(sheet.motor_id, current_status(sheet)) for sheet in sheets]
+    columns = tuple(
+        Column(name, symbol(name), constant_words(name), scale)
+        for name in KEY_CONSTANTS
+        if (scale := _scale(name, sheets)) is not None
+    )
+    reasons = _shared(sheets, now)
+    counts: Counter[str] = Counter(current.status for current in now)
+    return FleetView(
+        columns,
+        tuple(_row(*one, columns, reasons) for one in zip(sheets, now, strict=True)),
+        reasons,
+        tuple((status, counts[status]) for status in STATUS_ORDER if counts[status]),
+    )
+
+
+def known_estimates(name: str, sheets: Sequence[Datasheet]) -> list[Estimate]:
+    """The estimates of a constant that have a value."""
+    found = (sheet.constants.get(name) for sheet in sheets)
+    return [estimate for estimate in found if estimate is not None and estimate.known]
+
+
+def _scale(name: str, sheets: Sequence[Datasheet]) -> Scale | None:
+    """One power of ten for a constant of all motors; None where no motor has it."""
+    known = known_estimates(name, sheets)
+    if not known:
+        return None
+    return scale_for(median(abs(estimate.number) for estimate in known), known[0].unit)
+
+
+def _row(
+    sheet: Datasheet,
+    current: CurrentStatus,
+    columns: Sequence[Column],
+    reasons: Sequence[Reason],
+) -> MotorRow:
+    failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
+    common = {reason.text: number for number, reason in enumerate(reasons, 1)}
+    told = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
+    own = [reason for reason, kind in told if kind not in common]
+    return MotorRow(
+        sheet,
+        current,
+        "; ".join((*status_lines(current), *own)),
+        tuple(sorted({common[kind] for _, kind in told if kind in common})),
+        failed,
+        model_words(sheet.model, sheet.motor_id),
+        tuple(_cell(sheet.constants.get(column.name), column.scale) for column in columns),
+    )
+
+
+def _cell(estimate: Estimate | None, scale: Scale) -> Cell:
+    if estimate is None or not estimate.known:
+        return Cell(None, "")
+    shown = reading(estimate.number, estimate.u, estimate.unit, scale)
+    return Cell(shown, repr(estimate.number))
+
+
+def _shared(sheets: Sequence[Datasheet], now: Sequence[CurrentStatus]) -> tuple[Reason, ...]:
+    """Reasons of two motors or more, the commonest first."""
+    motors: dict[str, list[str]] = {}
+    for sheet, current in zip(sheets, now, strict=True):
+        for kind in dict.fromkeys(kind_of_reason(sheet, reason) for reason in current.why):
+            motors.setdefault(kind, []).append(sheet.motor_id)
+    found = [Reason(kind, tuple(own)) for kind, own in motors.items() if len(own) >= SHARED]
+    return tuple(sorted(found, key=lambda reason: (-len(reason.motors), reason.text)))
+
+
+def kind_of_reason(sheet: Datasheet, reason: str) -> str:
+    """The reason less what is the motor's own: the capture and the size of what a model misses."""
+    model = sheet.model
+    if not reason.startswith(MODEL_REASON) or model is None or model.worst is None:
+        return reason
+    order = f", {model.worst.order:g} a turn" if model.worst.order else ""
+    found = f"; found: {', '.join(model.missing)}" if model.missing else ""
+    return f"{model.name} misses {quantity_words(model.worst.signal)}{order}{found}"
+
+
+def floors_of(reason: Reason, rows: Sequence[MotorRow]) -> str:
+    """`252 to 364 noise floors` where a reason is a model's; empty for any other."""
+    own = [row for row in rows if row.sheet.motor_id in reason.motors]
+    sizes = [
+        row.sheet.model.worst.floors
+        for row in own
+        if row.sheet.model is not None
+        and row.sheet.model.worst is not None
+        and reason.text.startswith(row.sheet.model.name)
+    ]
+    if len(sizes) < len(own):
+        return ""
+    return f"{number(min(sizes))} to {number(max(sizes))} noise floors"

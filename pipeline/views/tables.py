@@ -1,0 +1,87 @@
+"""Constants as a tidy table: one row a motor and constant, the unit in a column of its own."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import polars as pl
+
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.estimate import Estimate
+
+CONSTANT_SCHEMA: dict[str, Any] = {
+    "motor_id": pl.String,
+    "motor_type": pl.String,
+    "lot": pl.String,
+    "constant": pl.String,
+    "value": pl.Float64,
+    "unit": pl.String,
+    "u": pl.Float64,
+    "u_a": pl.Float64,
+    "u_b": pl.Float64,
+    "dof": pl.Float64,
+    "low_95": pl.Float64,
+    "high_95": pl.Float64,
+    "status": pl.String,
+    "method": pl.String,
+    "captures": pl.List(pl.String),
+    "note": pl.String,
+}
+
+
+def constant_rows(
+    motor_id: str, motor_type: str | None, lot: str | None, estimates: Iterable[Estimate]
+) -> list[dict[str, Any]]:
+    """One row an estimate; value, uncertainty and interval are null where it is not identifiable.
+
+    `dof` is null where it is infinite.
+    """
+    rows = []
+    for one in estimates:
+        low, high = one.interval() if one.known else (None, None)
+        said = one.document()
+        rows.append(
+            {
+                "motor_id": motor_id,
+                "motor_type": motor_type,
+                "lot": lot,
+                "constant": one.name,
+                "value": None if one.value is None else one.number,
+                "unit": one.unit,
+                "u": said["u"],
+                "u_a": said["u_a"],
+                "u_b": said["u_b"],
+                "dof": said["dof"],
+                "low_95": low,
+                "high_95": high,
+                "status": one.status,
+                "method": one.method,
+                "captures": list(one.captures),
+                "note": one.note,
+            }
+        )
+    return rows
+
+
+def constants_frame(sheet: Datasheet) -> pl.DataFrame:
+    """The constants of one datasheet, by name, with its status and version."""
+    estimates = [estimate for _, estimate in sorted(sheet.constants.items())]
+    rows = constant_rows(sheet.motor_id, sheet.motor_type, sheet.lot, estimates)
+    words = {"datasheet_status": sheet.status, "datasheet_version": sheet.version}
+    return pl.DataFrame(rows, schema=CONSTANT_SCHEMA, orient="row").with_columns(
+        pl.lit(word, pl.String).alias(name) for name, word in words.items()
+    )
+
+
+def fleet_files(frames: Sequence[pl.DataFrame]) -> dict[str, bytes]:
+    """`fleet.csv` and `fleet.parquet` of some motors' constants; equal tables give equal bytes.
+
+    A list of captures is one text in CSV, its paths parted by semicolons.
+    """
+    whole = pl.concat(frames)
+    flat, packed = io.BytesIO(), io.BytesIO()
+    whole.with_columns(pl.col("captures").list.join(";")).write_csv(flat)
+    whole.write_parquet(packed, compression="zstd", statistics=False)
+    return {"fleet.csv": flat.getvalue(), "fleet.parquet": packed.getvalue()}

@@ -1,0 +1,109 @@
+"""All motors beside each other: reasons told once, tables that fit a terminal, tidy files."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import polars as pl
+import pytest
+
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.estimate import not_identifiable
+from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.report.console import summary
+from pipeline.report.fleet_page import render_fleet
+from pipeline.views.fleet import fleet_view, floors_of
+from pipeline.views.table_text import blocks, table
+from pipeline.views.tables import constants_frame, fleet_files
+from tests.unit.report.conftest import make_datasheet
+
+AWAITS = "not approved"
+
+
+def misses(floors: float, motor_id: str) -> ModelVerdict:
+    worst = Excess(f"{motor_id}/cogging_cw.mcap", "torque_shaft_nm", 84, floors, 0.004, "N·m")
+    return ModelVerdict("missing", held_out=20.0, residual=floors, worst=worst, over=3)
+
+
+def motor(motor_id: str, floors: float, *more: str) -> Datasheet:
+    sheet = make_datasheet(motor_id)
+    model = misses(floors, motor_id)
+    reason = model.reason(motor_id)
+    assert reason is not None
+    return replace(sheet, model=model, why=(AWAITS, reason, *more))
+
+
+def test_equal_reasons_are_told_once_with_their_motors_and_sizes() -> None:
+    sheets = [motor("b", 252.0), motor("a", 364.0, "ld_h is not measured"), make_datasheet("c")]
+    view = fleet_view(sheets)
+    assert [(reason.text, reason.motors) for reason in view.reasons] == [
+        ("not approved", ("a", "b", "c")),
+        ("the standard model misses torque shaft, 84 a turn", ("a", "b")),
+    ]
+    assert [floors_of(reason, view.rows) for reason in view.reasons] == [
+        "",
+        "252 to 364 noise floors",
+    ]
+    rows = {row.sheet.motor_id: row for row in view.rows}
+    assert (rows["a"].why, rows["a"].shared) == ("ld_h is not measured", (1, 2))
+    assert rows["b"].why == ""
+    assert rows["c"].why == "cogging_amplitude_nm is not measured"
+    html = render_fleet(sheets, ())
+    assert html.count("the standard model misses torque shaft") == 1
+    assert (
+        "<b>2 motors</b>: the standard model misses torque shaft, 84 a turn, by 252 to 364" in html
+    )
+
+
+@pytest.mark.parametrize("length", [3, 60])
+def test_a_summary_fits_eighty_columns_in_the_units_of_the_page(length: int) -> None:
+    sheets = [motor("m" * length + name, 252.0) for name in "abc"]
+    text = summary(sheets, (), "out", report=True)
+    lines = text.split("\n\n")[0].splitlines()
+    assert max(map(len, lines)) <= 80
+    page = render_fleet(sheets, ())
+    for unit in ("mΩ", "µH", "mWb", "mN·m/A", "×10⁻⁶ kg·m²"):
+        assert f"[{unit}]" in text and f"[{unit}]" in page
+    assert sum("310.04" in line for line in lines) == 3, "as on the page, to two digits of U"
+    assert "all constants: out/fleet.csv" in text
+
+
+def test_many_motors_are_told_in_one_table() -> None:
+    sheets = [make_datasheet(f"m{number:02d}") for number in range(30)]
+    lines = summary(sheets, (), "out", report=False).split("\n\n")[0].splitlines()
+    assert len(lines) == 32
+    assert max(map(len, lines)) <= 80
+
+
+def test_a_table_is_parted_where_it_would_be_too_wide() -> None:
+    rows = [["motor", *(f"column {n}" for n in range(9))], ["a", *"123456789"]]
+    found = blocks(rows, right=range(1, 10), width=40)
+    assert all(len(line) <= 40 for block in found for line in block.splitlines())
+    assert all(block.startswith("motor") for block in found)
+    numbers = [word for block in found for word in block.splitlines()[1].split()[1:]]
+    assert numbers == list("123456789")
+    assert blocks(rows, right=range(1, 10), width=1000) == [table(rows, right=range(1, 10))]
+    assert blocks([["a" * 50, "b" * 50]], width=40) == [f"{'a' * 50}  {'b' * 50}"]
+
+
+def test_the_tidy_files_hold_every_constant_of_every_motor() -> None:
+    lacking = make_datasheet("two")
+    lacking = replace(
+        lacking,
+        constants={**lacking.constants, "ld_h": not_identifiable("ld_h", "H", "lcr", "record it")},
+    )
+    sheets = [make_datasheet("one"), lacking]
+    files = fleet_files([constants_frame(sheet) for sheet in sheets])
+    flat = pl.read_csv(io.BytesIO(files["fleet.csv"]))
+    packed = pl.read_parquet(io.BytesIO(files["fleet.parquet"]))
+    assert packed["captures"].dtype == pl.List(pl.String)
+    assert flat.height == packed.height == sum(len(sheet.constants) for sheet in sheets)
+    for frame in (flat, packed):
+        told = {(m, c): v for m, c, v in frame.select("motor_id", "constant", "value").rows()}
+        for sheet in sheets:
+            for name, estimate in sheet.constants.items():
+                expected = None if estimate.value is None else estimate.number
+                assert told[sheet.motor_id, name] == expected
+    assert flat["datasheet_status"].unique().to_list() == ["provisional"]
+    assert fleet_files([constants_frame(sheet) for sheet in sheets]) == files
