@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,14 +62,14 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     maps = all_maps(found, around, residual, fitted)
     parameters = parameters_told(fitted, around, held)
     without = model_of(model.bare(), machine)
-    bare, total, moved = _bare(found, fitted, without, parameters, (around, held))
+    bare = _bare(found, fitted, without, parameters, (around, held))
     return Comparison(
         campaign.motor_id,
         model.name,
         names,
         parameters,
         (*_errors(found, around, held), *run_errors(simulated)),
-        total,
+        held.total if bare is None else bare.whole,
         tuple(_where(maps)),
         (
             *unused(campaign, found),
@@ -78,10 +78,11 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
             *held.notes,
         ),
         maps,
-        moved,
-        bare,
+        () if bare is None else bare.moved,
+        None if bare is None else bare.total,
         tuple(traces(found, fitted, simulated)),
         combinations_told(found, fitted, around, held),
+        () if bare is None else bare.errors,
     )
 
 
@@ -90,22 +91,33 @@ def _nothing(campaign: Campaign, model: ModelSpec, names: tuple[str, ...], note:
     return Comparison(campaign.motor_id, model.name, names, {}, (), 0.0, (), (note,))
 
 
+@dataclass(frozen=True, slots=True)
+class _Bare:
+    """A model less what was added: its held-out error beside that of the `whole` one, over the
+    same rows; parameters of both; its errors.
+    """
+
+    total: float
+    whole: float
+    moved: tuple[Move, ...]
+    errors: tuple[SignalError, ...]
+
+
 def _bare(
     found: Sequence[Segment],
     fitted: Fitted,
     without: Model,
     after: dict[str, ModelParameter],
     whole: tuple[System, HeldOut],
-) -> tuple[float | None, float, tuple[Move, ...]]:
-    """Held-out error of the model without the effects that were asked for, and of the `whole` one;
-    parameters of both.
+) -> _Bare | None:
+    """The model without the effects that were asked for; None where none were.
 
     Both fits share the noise floor of the fuller one and hold out the same rows, so that their
     errors compare.
     """
     names = {effect.name for effect in without.effects}
     if names == {effect.name for effect in fitted.model.effects}:
-        return None, whole[1].total, ()
+        return None
     gone = [e.name for e in fitted.model.effects if e.name not in names]
     values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
     begun = replace(fitted, model=without, values=values, tolerance=())
@@ -114,7 +126,8 @@ def _bare(
     held = leave_out(around, len(own_columns(without)), found)
     moved = _moves(parameters_told(plain, around, held), after)
     less, full = in_common((around, whole[0]), (held, whole[1]))
-    return less.total, full.total, moved
+    errors = tuple(_errors(found, around, held))
+    return _Bare(less.total, full.total, moved, errors)
 
 
 def _moves(

@@ -198,7 +198,8 @@ class Comparison:
 
     `moved` tells parameters with and without the effects that were added; `bare` the held-out
     error without them, None where none were. `combinations` are known where their parameters are
-    not. `traces` are for looking, not for the document.
+    not. `traces` are for looking, not for the document. `before` are the errors of the equations
+    without the effects that were added.
     """
 
     motor_id: str
@@ -214,6 +215,7 @@ class Comparison:
     bare: float | None = None
     traces: tuple[Trace, ...] = field(default=())
     combinations: tuple[KnownCombination, ...] = field(default=())
+    before: tuple[SignalError, ...] = field(default=())
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema model-comparison/1.
@@ -233,6 +235,7 @@ class Comparison:
             },
             "errors": [one for named, one in errors if named],
             "errors_other": [one for named, one in errors if not named],
+            "errors_before": [one.document() for one in self.before],
             "total": {"held_out": self.held_out, "without_effects": self.bare},
             "where": [one for named, one in where if named],
             "where_other": [one for named, one in where if not named],

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 COLUMN_PX, FEWEST_A_COLUMN, LEAST_HEIGHT_PX = 1.5, 4.0, 8.0
 """Width of a column; samples in one on average and median height, from which on it is dense."""
+GAP_COLUMNS = 3.0
+"""Columns from one to the next, beyond which there is a gap."""
 
 
 def extremes(x_px: Array, y_px: Array) -> tuple[Array, Array, Array] | None:
@@ -30,18 +34,26 @@ def extremes(x_px: Array, y_px: Array) -> tuple[Array, Array, Array] | None:
 
 
 def filled(x_px: Array, y_px: Array) -> str:
-    """The path of the band, closed; empty where the trace is not dense."""
-    found = extremes(x_px, y_px)
-    if found is None:
-        return ""
-    x, top, bottom = found
-    return f"{_path(x, top)}L{_path(x[::-1], bottom[::-1])[1:]}Z"
+    """The path of the band, closed between its gaps; empty where the trace is not dense."""
+    return "".join(
+        f"{_path(x, top)}L{_path(x[::-1], bottom[::-1])[1:]}Z"
+        for x, top, bottom in _runs(x_px, y_px)
+    )
 
 
 def outlined(x_px: Array, y_px: Array) -> str:
     """The path of the band's two edges, so that another shows through; empty as above."""
+    return "".join(_path(x, top) + _path(x, bottom) for x, top, bottom in _runs(x_px, y_px))
+
+
+def _runs(x_px: Array, y_px: Array) -> Iterator[tuple[Array, Array, Array]]:
+    """The band's columns from gap to gap."""
     found = extremes(x_px, y_px)
-    return "" if found is None else _path(found[0], found[1]) + _path(found[0], found[2])
+    if found is None:
+        return
+    cuts = np.flatnonzero(np.diff(found[0]) > GAP_COLUMNS * COLUMN_PX) + 1
+    parts = (np.split(one, cuts) for one in found)
+    yield from zip(*parts, strict=True)
 
 
 def _path(x: Array, y: Array) -> str:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
+from pipeline.execution.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
+from pipeline.records.comparison import Comparison
+from pipeline.records.comparison_history import Earlier, document_of, history_of, with_latest
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
 from pipeline.report.comparison_text import comparison_text
@@ -11,7 +17,10 @@ from pipeline.stages.criticism import Judged, Task, each_motor
 
 
 def main(settings: CompareSettings) -> Outcome:
-    """Writes `comparison/MOTOR.json` and a recording for every motor of `input`."""
+    """Writes `comparison/MOTOR.json`, its page and a recording for every motor of `input`.
+
+    What a motor was compared with before stays on its page.
+    """
     return each_motor(settings, _judge, "pipeline.criticism.comparison")
 
 
@@ -28,4 +37,29 @@ def _judge(task: Task) -> Judged:
         with task.watch.stage("recording"):
             path = output / "recordings" / f"comparison-{stem}.rrd"
             write_comparison_recording(result, path)
+    with task.watch.stage("page"):
+        _write_page(output, result)
     return Judged(comparison_text(result), not result.errors)
+
+
+def _write_page(output: Path, result: Comparison) -> None:
+    from pipeline.report.comparison_page import render_comparison
+
+    stem = file_stem(result.motor_id)
+    kept = output / "comparison" / "history" / f"{stem}.json"
+    earlier = _read_history(kept)
+    links = links_of(output, "comparison/{}.html", result.motor_id)
+    page = render_comparison(result, earlier, links)
+    write_whole(output / "comparison" / f"{stem}.html", page.encode())
+    if result.errors:
+        history = with_latest(earlier, Earlier.of(result))
+        write_whole(kept, canonical_json(document_of(result.motor_id, history)))
+    relink(output, result.motor_id)
+
+
+def _read_history(path: Path) -> tuple[Earlier, ...]:
+    """What was compared before; nothing where that cannot be read, as it is for looking alone."""
+    try:
+        return history_of(json.loads(path.read_bytes()))
+    except (OSError, ValueError, RecursionError):
+        return ()

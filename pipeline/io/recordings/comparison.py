@@ -40,15 +40,14 @@ from pipeline.io.recordings.views import (
 )
 from pipeline.io.storage.publish import canonical_json
 from pipeline.numerics.thinning import line_points
-from pipeline.physics.notation import quantity, significant
 from pipeline.records.comparison import Comparison, Trace
+from pipeline.views.comparison import KINDS, comparison_view
 from pipeline.views.names import with_unit
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint
 
 MOST_POINTS = 4000
-_KINDS = {"equation": "from the measured state", "free_run": "on its own"}
 
 
 def write_comparison_recording(result: Comparison, path: Path) -> None:
@@ -101,7 +100,7 @@ def planned(result: Comparison, capture: str) -> tuple[ViewPlan, ...]:
         if trace.capture != capture:
             continue
         entity = entity_of(trace)
-        words = f"{with_unit(trace.signal)}, model {_KINDS[trace.kind]}"
+        words = f"{with_unit(trace.signal)}, model {KINDS[trace.kind]}"
         lines = (
             Line(entity, "measured", "measured", MEASURED, WIDE),
             Line(entity, "model", "model", MODEL),
@@ -122,7 +121,7 @@ def _layout(result: Comparison) -> Blueprint:
     for capture in dict.fromkeys(trace.capture for trace in result.traces):
         plans = planned(result, capture)
         sides = []
-        for kind in _KINDS:
+        for kind in KINDS:
             mine = [p for p in plans if f"/{kind}/" in p.lines[0].entity]
             if mine:
                 sides.append(stacked(mine))
@@ -132,21 +131,18 @@ def _layout(result: Comparison) -> Blueprint:
 
 
 def _sheet(result: Comparison) -> str:
-    effects = ", ".join(result.effects) or "no effects"
+    view = comparison_view(result)
     lines = [
-        f"# {plain(result.motor_id)}: model {plain(result.name)}",
+        f"# {plain(result.motor_id)}",
         "",
-        f"with {plain(effects)}; held-out error **{result.held_out:.4g}** (1 is the noise floor)",
+        plain(view.headline),
         "",
         "| capture | signal | | rms | noise floor | ratio |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    for one in result.errors:
-        how = "held out" if one.split == "held_out" else "in the fit"
-        ratio = significant(one.rmse / max(one.noise_floor, 1e-300), 3)
-        lines.append(
-            f"| {plain(one.capture)} | {plain(one.signal)} | {_KINDS[one.kind]}, {how} "
-            f"| {quantity(one.rmse, one.unit, 3)} | {quantity(one.noise_floor, one.unit, 3)} "
-            f"| {ratio} |"
-        )
+    lines += [
+        f"| {plain(one.capture)} | {plain(one.signal)} | {one.kind}, {one.split} "
+        f"| {one.rmse} | {one.floor} | {one.ratio} |"
+        for one in view.captures
+    ]
     return "\n".join([*lines, ""])

@@ -254,6 +254,15 @@ def test_a_dense_trace_is_a_band_between_its_extremes_and_its_fit_two_edges() ->
     assert all(up[0] == low[0] for up, low in zip(upper, reversed(lower), strict=True))
 
 
+def test_a_band_ends_at_a_gap() -> None:
+    x = np.linspace(0.0, 1.0, 40_000)
+    wave = np.where((x > 0.4) & (x < 0.6), np.nan, np.sin(2 * np.pi * 400 * x))
+    svg = chart(Evidence("e", "t", "t_s", "ia_a", "line", (Series("", x, wave, 0.9 * wave),)))
+    paths = {p.attrib["class"]: p.attrib["d"] for p in ET.fromstring(svg).iter("path")}
+    assert paths["measured trace"].count("Z") == 2
+    assert paths["fitted"].count("M") == 4
+
+
 def test_a_quiet_trace_stays_a_line() -> None:
     x = np.linspace(0.0, 1.0, 40_000)
     one = Evidence("e", "t", "t_s", "ia_a", "line", (Series("", x, x, np.empty(0)),))

@@ -1,0 +1,57 @@
+"""Which models of a motor were compared before, and what each came to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pipeline.records.comparison import Comparison
+
+SCHEMA = "comparison-history/1"
+MOST = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """One comparison in short: the model, its held-out error, and that without what was added."""
+
+    name: str
+    effects: tuple[str, ...]
+    held_out: float
+    bare: float | None
+
+    @classmethod
+    def of(cls, result: Comparison) -> Earlier:
+        """What is kept of a comparison."""
+        return cls(result.name, result.effects, result.held_out, result.bare)
+
+
+def history_of(document: Mapping[str, Any] | None) -> tuple[Earlier, ...]:
+    """The comparisons that a document tells; none where it is none of ours."""
+    if document is None or document.get("schema") != SCHEMA:
+        return ()
+    try:
+        return tuple(
+            Earlier(
+                str(one["name"]),
+                tuple(map(str, one["effects"])),
+                float(one["held_out"]),
+                None if one["bare"] is None else float(one["bare"]),
+            )
+            for one in document["comparisons"]
+        )
+    except (LookupError, TypeError, ValueError):
+        return ()
+
+
+def with_latest(earlier: Sequence[Earlier], latest: Earlier) -> tuple[Earlier, ...]:
+    """The history with one more; the same model again takes the place of its last one."""
+    others = [e for e in earlier if (e.name, e.effects) != (latest.name, latest.effects)]
+    return (*others, latest)[-MOST:]
+
+
+def document_of(motor_id: str, history: Sequence[Earlier]) -> dict[str, Any]:
+    """The JSON form."""
+    told = [{**asdict(one), "effects": list(one.effects)} for one in history]
+    return {"schema": SCHEMA, "motor_id": motor_id, "comparisons": told}

@@ -1,0 +1,215 @@
+"""A comparison for people: each signal's error before and after, where it lives, what moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pipeline.physics.notation import number_text, quantity, reading, significant
+from pipeline.records.comparison import Comparison, Dependence, SignalError
+from pipeline.records.error_map import ErrorMap
+from pipeline.records.model_verdict import number
+from pipeline.records.naming import counted
+from pipeline.views.names import quantity_words
+
+SURE, SHARE, MOVED = 1e-3, 0.05, 3.0
+"""P-value and share of variance from which on a variable is named, change in u of a parameter."""
+KINDS = {"equation": "from the measured state", "free_run": "on its own"}
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorRow:
+    """One signal's error over all captures; `before` is the ratio without what was added."""
+
+    signal: str
+    kind: str
+    rmse: str
+    floor: str
+    ratio: str
+    before: str
+    held_out: str
+    worst: str
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureRow:
+    """One signal's error in one capture."""
+
+    capture: str
+    signal: str
+    kind: str
+    split: str
+    rmse: str
+    floor: str
+    ratio: str
+
+
+@dataclass(frozen=True, slots=True)
+class MoveRow:
+    """One parameter before and after, and its change over the u that it had before."""
+
+    parameter: str
+    before: str
+    after: str
+    in_u: str
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonView:
+    """One comparison, every text ready to be shown.
+
+    `added` are sizes of the effects that were asked for; `unknown` parameters that these captures
+    do not determine, `together` what they tell of them; `places` what errors depend on.
+    """
+
+    headline: str
+    signals: tuple[ErrorRow, ...]
+    captures: tuple[CaptureRow, ...]
+    added: tuple[tuple[str, str], ...]
+    places: tuple[str, ...]
+    unknown: tuple[str, ...]
+    together: tuple[tuple[str, str], ...]
+    moved: tuple[MoveRow, ...]
+    stayed: str
+
+
+def comparison_view(result: Comparison) -> ComparisonView:
+    """The view of one comparison."""
+    own = ("", *result.effects)
+    moved = [m for m in result.moved if abs(m.in_u) >= MOVED]
+    still = counted(len(result.moved) - len(moved), "parameter")
+    return ComparisonView(
+        headline(result),
+        tuple(_signals(result)),
+        tuple(map(_capture, result.errors)),
+        tuple(
+            (name, number_text(one.value, one.u, one.unit))
+            for name, one in result.parameters.items()
+            if "." in name and name.split(".")[0] in own
+        ),
+        tuple(_places(result)),
+        tuple(name for name, one in result.parameters.items() if not one.known),
+        tuple((c.expression, reading(c.value, c.u, c.unit).text()) for c in result.combinations),
+        tuple(
+            MoveRow(
+                m.parameter,
+                reading(m.before, m.u_before, m.unit).text(),
+                reading(m.after, m.u_after, m.unit).text(),
+                f"{m.in_u:+.1f}",
+            )
+            for m in sorted(moved, key=lambda m: -abs(m.in_u))
+        ),
+        f"{still} stayed within {MOVED:.0f} u" if result.moved else "",
+    )
+
+
+def headline(result: Comparison) -> str:
+    """How far the model is off, and how far it was without what was added, in a sentence."""
+    if not result.errors:
+        return "; ".join(result.notes)
+    effects = ", ".join(result.effects) or "no effects"
+    out = any(error.split == "held_out" for error in result.errors)
+    what = "held-out error" if out else "error of the fit, none held out,"
+    told = (
+        f"model {result.name} with {effects}: {what} {result.held_out:.4g} (1 is the noise floor)"
+    )
+    if result.bare is not None:
+        told += f"; without what was added: {number(result.bare)}"
+    return told
+
+
+def ratio_of(error: SignalError) -> float:
+    """An error over its noise floor."""
+    return error.rmse / max(error.noise_floor, 1e-300)
+
+
+def pooled(errors: Sequence[SignalError], name: str) -> float:
+    """Root of the mean square of `rmse` or `noise_floor` over all windows of some captures."""
+    total = sum(e.n * getattr(e, name) ** 2 for e in errors)
+    return math.sqrt(total / max(sum(e.n for e in errors), 1))
+
+
+def _signals(result: Comparison) -> list[ErrorRow]:
+    rows = []
+    for signal, kind in dict.fromkeys((e.signal, e.kind) for e in result.errors):
+        own = [e for e in result.errors if (e.signal, e.kind) == (signal, kind)]
+        old = [e for e in result.before if (e.signal, e.kind) == (signal, kind)]
+        worst = max(own, key=ratio_of)
+        rows.append(
+            ErrorRow(
+                signal,
+                kind,
+                quantity(pooled(own, "rmse"), worst.unit, 3),
+                quantity(pooled(own, "noise_floor"), worst.unit, 3),
+                _pooled_ratio(own),
+                _pooled_ratio(old) if old else "",
+                f"{sum(e.split == 'held_out' for e in own)} of {len(own)} held out",
+                f"{worst.capture} ({significant(ratio_of(worst), 2)})",
+            )
+        )
+    return rows
+
+
+def _pooled_ratio(errors: Sequence[SignalError]) -> str:
+    return significant(pooled(errors, "rmse") / max(pooled(errors, "noise_floor"), 1e-300), 2)
+
+
+def _capture(one: SignalError) -> CaptureRow:
+    return CaptureRow(
+        one.capture,
+        one.signal,
+        KINDS[one.kind],
+        "held out" if one.split == "held_out" else "in the fit",
+        quantity(one.rmse, one.unit, 3),
+        quantity(one.noise_floor, one.unit, 3),
+        significant(ratio_of(one), 3),
+    )
+
+
+def _places(result: Comparison) -> list[str]:
+    """Variables that an error surely depends on, and the cell of speed and current it is in; of
+    signals that are over their noise floor in some capture, since below it there is no failure.
+    """
+    lines = []
+    over = {e.signal for e in result.errors if e.kind == "equation" and ratio_of(e) > 1.0}
+    for signal in dict.fromkeys(d.signal for d in result.where if d.signal in over):
+        sure = [d for d in result.where if d.signal == signal and _surely(d)]
+        sure.sort(key=lambda d: -d.explained)
+        told = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
+        worst = next((_worst(m) for m in result.maps if m.signal == signal and m.y is not None), "")
+        if told or worst:
+            lines.append(f"{signal} depends on {', '.join(told) or 'nothing surely'}{worst}")
+    return lines
+
+
+def _surely(dependence: Dependence) -> bool:
+    p_value = dependence.p_value
+    return p_value is not None and p_value < SURE and dependence.explained >= SHARE
+
+
+def _worst(one: ErrorMap) -> str:
+    """The cell whose mean is farthest from zero among those that chance does not make."""
+    if one.y is None:
+        return ""
+    cells = one.mean.size
+    sure = [
+        (abs(one.mean[row, column]), row, column)
+        for row in range(one.mean.shape[0])
+        for column in range(one.mean.shape[1])
+        if one.p_value[row, column] * cells < SURE
+    ]
+    if not sure:
+        return ""
+    _, row, column = max(sure)
+    speed, current = one.x.edges[column : column + 2], one.y.edges[row : row + 2]
+    return (
+        f"; worst at {speed[0]:.3g} to {speed[1]:.3g} rad/s, {current[0]:.3g} to "
+        f"{current[1]:.3g} A: {quantity(float(one.mean[row, column]), one.unit, 2)}"
+    )
+
+
+def signal_title(row: ErrorRow) -> str:
+    """A signal in words, with `on its own` for a free run."""
+    words = quantity_words(row.signal)
+    return words if row.kind == "equation" else f"{words}, {KINDS[row.kind]}"
