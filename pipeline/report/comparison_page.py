@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pipeline.records.comparison import Comparison, Trace
 from pipeline.records.comparison_history import Earlier
@@ -80,7 +81,7 @@ def _worst_traces(result: Comparison) -> list[Trace]:
     return list(worst.values())
 
 
-def _ratio(one: Trace, ratios: dict[tuple[str, str, str], float]) -> float:
+def _ratio(one: Trace, ratios: Mapping[Any, float]) -> float:
     return ratios.get((one.signal, one.kind, one.capture), 0.0)
 
 

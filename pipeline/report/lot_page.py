@@ -10,42 +10,17 @@ from pipeline.records.lot_constant import Component, ConstantResult, Gauge
 from pipeline.records.lot_regression import EffectChange, LotRegression, OrderLevel
 from pipeline.report.link_block import Link, link_block
 from pipeline.report.lot_chart import cogging_chart, lot_chart
-from pipeline.report.lot_text import mean_of
 from pipeline.report.page import render
-from pipeline.views.constants import constant_words, symbol
+from pipeline.views.lots import NONE, TONES, ConstantRow, lot_view, p_text
 
-NONE = "–"
-RANK = {"fail": 0, "CONFOUNDED": 1, "INSUFFICIENT_HISTORY": 2, "undecided": 3, "marginal": 4}
-TONES = {"pass": "pass", "marginal": "marginal", "fail": "fail"}
 MOST_MOTORS = 200
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One constant in the table of all."""
-
-    name: str
-    symbol: tuple[str, str]
-    words: str
-    verdict: str
-    tone: str
-    why: str
-    decides: bool
-    before: str
-    after: str
-    change: str
-    change_sort: str
-    p_value: str
-    same: str
-    power: str
-    cpk: str
 
 
 @dataclass(frozen=True, slots=True)
 class Detail:
     """One constant's own section: chart, facts as (name, value), tables."""
 
-    row: Row
+    row: ConstantRow
     chart: str
     facts: tuple[tuple[str, str], ...]
     parts: tuple[tuple[str, str, str, str], ...]
@@ -57,10 +32,7 @@ class Detail:
 
 def render_regression(found: LotRegression, links: Sequence[Link] = ()) -> str:
     """The self-contained HTML page; equal input, equal text. `links` lead to other pages."""
-    present = sorted(
-        (one for one in found.constants if one.motors),
-        key=lambda one: RANK.get(one.verdict, 9),
-    )
+    view = lot_view(found)
     return render(
         "lot.html.jinja",
         found=found,
@@ -68,57 +40,21 @@ def render_regression(found: LotRegression, links: Sequence[Link] = ()) -> str:
         tone=TONES.get(found.verdict, "none"),
         short=found.verdict.replace("_", " "),
         reasons=found.reasons,
-        rows=[_row(one) for one in present],
-        absent=[one.name for one in found.constants if not one.motors],
+        view=view,
         changed=[e for e in found.effects if e.verdict != "pass"],
         effects=[_effect(one) for one in found.effects],
         orders=_orders(found.orders),
         cogging=cogging_chart(found.cogging, found.orders),
         outliers=[(o, quantity(o.value, o.unit)) for o in found.outliers],
-        details=[_detail(one) for one in present],
+        details=[_detail(*one) for one in zip(view.present, view.rows, strict=True)],
         tones=TONES,
     )
 
 
-def _row(one: ConstantResult) -> Row:
-    before, after = mean_of(one, "baseline"), mean_of(one, "candidate")
-    effect = one.effect
-    relative = ""
-    if effect.relative is not None and before:
-        spread = (effect.expanded_u or 0.0) / abs(before)
-        relative = f"{100 * effect.relative:+.2f} ± {100 * spread:.2f} %"
-    elif effect.in_sd is not None:
-        relative = f"{effect.in_sd:+.3g} u"
-    cpk = one.capability
-    return Row(
-        name=one.name,
-        symbol=symbol(one.name),
-        words=constant_words(one.name) if one.words == one.name else one.words,
-        verdict=one.verdict.replace("_", " "),
-        tone=TONES.get(one.verdict, "none"),
-        why=one.why,
-        decides=one.decides,
-        before=NONE if before is None else quantity(before, one.unit),
-        after=NONE if after is None else quantity(after, one.unit),
-        change=relative or NONE,
-        change_sort=repr(effect.relative or 0.0),
-        p_value=_p(one.test.p_holm)
-        if one.test.status == "evaluated"
-        else one.test.status.replace("_", " ").lower(),
-        same=one.equivalence.status.replace("_", " "),
-        power=NONE if one.power.power is None else f"{100 * one.power.power:.0f} %",
-        cpk=NONE if cpk.cpk is None else f"{cpk.cpk:.2f}",
-    )
-
-
-def _p(value: float | None) -> str:
-    return NONE if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
-
-
-def _detail(one: ConstantResult) -> Detail:
+def _detail(one: ConstantResult, row: ConstantRow) -> Detail:
     shown = one.motors[:MOST_MOTORS]
     return Detail(
-        row=_row(one),
+        row=row,
         chart=lot_chart(one),
         facts=tuple((name, text) for name, text in _facts(one) if text),
         parts=tuple(_part(part, one.unit) for part in one.variance),
@@ -193,8 +129,8 @@ def _test(one: ConstantResult) -> str:
         return f"{test.status.replace('_', ' ')}: {test.lots} of {test.needed} baseline lots"
     t = NONE if test.t is None else f"{test.t:.3g}"
     return (
-        f"t = {t} with {test.dof:.3g} degrees of freedom, p {_p(test.p_value)}, "
-        f"after Holm {_p(test.p_holm)}"
+        f"t = {t} with {test.dof:.3g} degrees of freedom, p {p_text(test.p_value)}, "
+        f"after Holm {p_text(test.p_holm)}"
     )
 
 
@@ -203,7 +139,7 @@ def _same(one: ConstantResult) -> str:
     if same.low is None or same.high is None or same.margin is None:
         return ""
     low, high, margin = (quantity(x, one.unit, 3) for x in (same.low, same.high, same.margin))
-    return f"{same.status}: difference {low} to {high} against ± {margin}, p {_p(same.p_value)}"
+    return f"{same.status}: difference {low} to {high} against ± {margin}, p {p_text(same.p_value)}"
 
 
 def _power(one: ConstantResult) -> str:
@@ -246,7 +182,7 @@ def _effect(one: EffectChange) -> tuple[EffectChange, str, str, str, str]:
         NONE if size is None or not one.unit else quantity(size, one.unit, 3)
         for size in (one.baseline_amplitude, one.candidate_amplitude)
     ]
-    return one, TONES.get(one.verdict, "none"), sizes[0], sizes[1], _p(one.p_holm)
+    return one, TONES.get(one.verdict, "none"), sizes[0], sizes[1], p_text(one.p_holm)
 
 
 def _orders(levels: Sequence[OrderLevel]) -> list[tuple[int, str, str]]:

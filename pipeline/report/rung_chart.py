@@ -8,9 +8,11 @@ from html import escape
 
 from pipeline.views.names import quantity_words
 
-WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 760.0, 250.0, 56.0, 130.0, 22.0, 44.0
+WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 760.0, 250.0, 56.0, 22.0, 44.0
 LABEL_PITCH, COLOURS = 14.0, 6
-LETTER, MOST_LEVELS = 6.3, 3
+LETTER, MOST_LEVELS, LONGEST = 6.3, 3, 30
+END_LETTER = 8.2
+"""Width of a letter of a signal's name where the chart is small and its letters are large [px]."""
 LEAST = 1e-3
 
 
@@ -26,30 +28,31 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     low = min(math.floor(math.log10(min(finite)) * 2) / 2, -0.5)
     high = max(math.ceil(math.log10(max(finite)) * 2) / 2, 0.5)
     bottom = TOP + HEIGHT
+    ends = {name: _short(quantity_words(name)) for name in over}
+    right = WIDTH - 24.0 - END_LETTER * max(map(len, ends.values()))
 
     def y(value: float) -> float:
         place = (math.log10(max(value, 10**low)) - low) / (high - low)
         return bottom - HEIGHT * place
 
     def x(rung: int) -> float:
-        wide = WIDTH - LEFT - RIGHT
-        return LEFT + wide * (rung + 0.5) / len(names)
+        return LEFT + (right - LEFT) * (rung + 0.5) / len(names)
 
     parts = [
-        f'<rect class="band" x="{LEFT:g}" y="{y(1.0):.1f}" width="{WIDTH - LEFT - RIGHT:g}" '
+        f'<rect class="band" x="{LEFT:g}" y="{y(1.0):.1f}" width="{right - LEFT:g}" '
         f'height="{bottom - y(1.0):.1f}"/>'
     ]
     for decade in range(math.ceil(low), math.floor(high) + 1):
         place = y(10.0**decade)
-        parts.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')
+        parts.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{right:g}"/>')
         parts.append(
             f'<text class="tick y" x="{LEFT - 6:g}" y="{place + 4:.1f}">{10.0**decade:g}</text>'
         )
-    levels = _levels(names)
+    levels = _levels(names, right - LEFT)
     for rung, name in enumerate(names):
         where = f'x="{x(rung):.1f}" y="{bottom + 16 + LABEL_PITCH * (rung % levels):.1f}"'
         parts.append(f'<text class="tick x" {where}>{escape(name)}</text>')
-    parts += _lines(over, x, y)
+    parts += _lines(over, ends, x, y)
     parts += [
         f'<text class="tick x" x="{x(n):.1f}" y="{bottom - 6:.1f}">↓ {value:.1g}</text>'
         for values in over.values()
@@ -65,15 +68,22 @@ def rung_chart(names: Sequence[str], over: Mapping[str, Sequence[float]]) -> str
     )
 
 
-def _levels(names: Sequence[str]) -> int:
+def _short(text: str) -> str:
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+def _levels(names: Sequence[str], wide: float) -> int:
     """Over how many lines the rungs' words go in turn, so that neighbours do not meet."""
-    pitch = (WIDTH - LEFT - RIGHT) / len(names)
+    pitch = wide / len(names)
     longest = LETTER * max(map(len, names))
     return min(math.ceil(longest / pitch), MOST_LEVELS, len(names))
 
 
 def _lines(
-    over: Mapping[str, Sequence[float]], x: Callable[[int], float], y: Callable[[float], float]
+    over: Mapping[str, Sequence[float]],
+    words: Mapping[str, str],
+    x: Callable[[int], float],
+    y: Callable[[float], float],
 ) -> Iterator[str]:
     ends = sorted((y(values[-1]), name) for name, values in over.items())
     places: dict[str, float] = {}
@@ -89,5 +99,6 @@ def _lines(
         yield f'<path class="{css}" d="{line}"/><path class="{css} dots few" d="{dots}"/>'
         yield (
             f'<text class="end t{number % COLOURS}" x="{x(len(values) - 1) + 12:.1f}" '
-            f'y="{places[name] - lift + 4:.1f}">{escape(quantity_words(name))}</text>'
+            f'y="{places[name] - lift + 4:.1f}"><title>{escape(quantity_words(name))}</title>'
+            f"{escape(words[name])}</text>"
         )

@@ -15,11 +15,10 @@ from pipeline.records.model_verdict import MODEL_REASON, number
 from pipeline.views.constants import KEY_CONSTANTS, constant_words, symbol
 from pipeline.views.model_words import ModelWords, model_words
 from pipeline.views.names import quantity_words
+from pipeline.views.reasons import Reason, shared_reasons
 from pipeline.views.status_text import status_lines
 
 STATUS_ORDER = ("refused", "revoked", "provisional", "released")
-SHARED = 2
-"""Motors from which on a reason is told once for all of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +42,6 @@ class Cell:
 
     reading: Reading | None
     sort: str
-
-
-@dataclass(frozen=True, slots=True)
-class Reason:
-    """Why motors are not released, told once: `text`, and the motors that it holds for."""
-
-    text: str
-    motors: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +81,11 @@ def fleet_view(
         for name in KEY_CONSTANTS
         if (scale := _scale(name, sheets)) is not None
     )
-    reasons = _shared(sheets, now)
+    reasons = shared_reasons(
+        (sheet.motor_id, kind_of_reason(sheet, reason))
+        for sheet, current in zip(sheets, now, strict=True)
+        for reason in current.why
+    )
     counts: Counter[str] = Counter(current.status for current in now)
     return FleetView(
         columns,
@@ -142,16 +137,6 @@ def _cell(estimate: Estimate | None, scale: Scale) -> Cell:
     return Cell(shown, repr(estimate.number))
 
 
-def _shared(sheets: Sequence[Datasheet], now: Sequence[CurrentStatus]) -> tuple[Reason, ...]:
-    """Reasons of two motors or more, the commonest first."""
-    motors: dict[str, list[str]] = {}
-    for sheet, current in zip(sheets, now, strict=True):
-        for kind in dict.fromkeys(kind_of_reason(sheet, reason) for reason in current.why):
-            motors.setdefault(kind, []).append(sheet.motor_id)
-    found = [Reason(kind, tuple(own)) for kind, own in motors.items() if len(own) >= SHARED]
-    return tuple(sorted(found, key=lambda reason: (-len(reason.motors), reason.text)))
-
-
 def kind_of_reason(sheet: Datasheet, reason: str) -> str:
     """The reason less what is the motor's own: the capture and the size of what a model misses."""
     model = sheet.model
@@ -164,7 +149,7 @@ def kind_of_reason(sheet: Datasheet, reason: str) -> str:
 
 def floors_of(reason: Reason, rows: Sequence[MotorRow]) -> str:
     """`252 to 364 noise floors` where a reason is a model's; empty for any other."""
-    own = [row for row in rows if row.sheet.motor_id in reason.motors]
+    own = [row for row in rows if row.sheet.motor_id in reason.members]
     sizes = [
         row.sheet.model.worst.floors
         for row in own

@@ -30,7 +30,6 @@ from pipeline.io.recordings.lots_traces import (
     PLACE,
     SIDES,
     band_trace,
-    compared,
     drift,
     histogram,
 )
@@ -48,6 +47,7 @@ from pipeline.io.storage.publish import canonical_json
 from pipeline.records.lot_constant import ConstantResult
 from pipeline.records.lot_regression import LotRegression
 from pipeline.records.naming import file_stem
+from pipeline.views.lots import compared
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

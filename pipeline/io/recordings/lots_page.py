@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pipeline.io.recordings.datasheet_page import plain
-from pipeline.physics.notation import MINUS, quantity, reading
-from pipeline.records.lot_constant import ConstantResult, Side
 from pipeline.records.lot_regression import LotRegression
+from pipeline.views.lots import ConstantRow, lot_view
 
-_MARKS = {"pass": "✓", "fail": "✗", "marginal": "⚠"}
 MOST_OUTLIERS = 12
 
 
@@ -28,8 +26,14 @@ def verdict_markdown(result: LotRegression) -> str:
     if result.history != "sufficient":
         needed = result.limits.min_lots
         lines.append(f"- {plain(result.history)}: the test over lots needs {needed} baseline lots")
-    lines += ["", "| | constant | baseline | candidate | Δ | p |", "| --- |" + " --- |" * 5]
-    lines += [_line(one) for one in result.constants if one.motors]
+    lines += [
+        "",
+        "| | constant | baseline | candidate | change ± U | p |",
+        "| --- |" + " --- |" * 5,
+    ]
+    view = lot_view(result)
+    lines += [_line(row) for row in view.rows]
+    lines += ["", *(f"- {len(r.members)} constants: {plain(r.text)}" for r in view.reasons)]
     changed = [one for one in result.effects if one.verdict != "pass"]
     if changed:
         lines += ["", "## Effects and orders", ""]
@@ -48,31 +52,9 @@ def verdict_markdown(result: LotRegression) -> str:
     return "\n".join([*lines, ""])
 
 
-def side_mean(one: ConstantResult, side: Side) -> tuple[float, float] | None:
-    """Mean over a side's lots (else its motors) and the standard deviation between its motors."""
-    values = [motor.value for motor in one.of(side)]
-    if not values:
-        return None
-    means = [lot.mean for lot in one.lots if lot.side == side] or values
-    middle = sum(values) / len(values)
-    spread = sum((v - middle) ** 2 for v in values) / max(len(values) - 1, 1)
-    return sum(means) / len(means), float(spread**0.5)
-
-
-def _line(one: ConstantResult) -> str:
-    cells = []
-    for side in ("baseline", "candidate"):
-        told = side_mean(one, side)
-        cells.append("–" if told is None else reading(told[0], 0.5 * told[1], one.unit).text())
-    change = "–"
-    if one.effect.relative is not None:
-        change = f"{100.0 * one.effect.relative:+.2f} %".replace("-", MINUS)
-    elif one.effect.difference is not None:
-        change = quantity(one.effect.difference, one.unit, 3)
-    p_value = "–" if one.test.p_holm is None else f"{one.test.p_holm:.2g}"
-    mark = _MARKS.get(one.verdict, "–")
-    strong = "**" if one.verdict == "fail" else ""
+def _line(row: ConstantRow) -> str:
+    strong = "**" if row.tone == "fail" else ""
     return (
-        f"| {mark} | {strong}{plain(one.name)}{strong} | {cells[0]} | {cells[1]} "
-        f"| {strong}{plain(change)}{strong} | {p_value} |"
+        f"| {row.mark} | {strong}{plain(row.name)}{strong} | {row.before} | {row.after} "
+        f"| {strong}{plain(row.change)}{strong} | {row.p_value} |"
     )

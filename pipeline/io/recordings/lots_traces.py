@@ -22,18 +22,6 @@ COVERAGE = 2.0
 FILL = 8
 
 
-def compared(result: LotRegression) -> tuple[ConstantResult, ...]:
-    """Constants that both sides have: those that fail first, then by size of the change."""
-    ranks = ("fail", "CONFOUNDED", "marginal", "undecided", "INSUFFICIENT_HISTORY")
-
-    def weight(one: ConstantResult) -> tuple[int, float, str]:
-        rank = ranks.index(one.verdict) if one.verdict in ranks else len(ranks)
-        return rank, -abs(one.effect.in_sd or 0.0), one.name
-
-    both = [one for one in result.constants if all(one.of(side) for side in SIDES)]
-    return tuple(sorted(both, key=weight))
-
-
 def constant_scale(one: ConstantResult) -> Scale:
     """The unit in which a constant is shown."""
     return scale_for(max(abs(motor.value) for motor in one.motors), one.unit)

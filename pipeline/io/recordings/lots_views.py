@@ -10,7 +10,6 @@ from pipeline.io.recordings.lots_traces import (
     FILL,
     PLACE,
     SIDES,
-    compared,
     constant_scale,
     drift,
     leading_order,
@@ -30,6 +29,7 @@ from pipeline.io.recordings.views import (
 )
 from pipeline.records.lot_constant import ConstantResult
 from pipeline.records.lot_regression import LotRegression
+from pipeline.views.lots import compared
 from pipeline.views.names import quantity_words
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ import pytest
 
 from pipeline.io.recordings.lots import lots_name, write_lots_recording
 from pipeline.io.recordings.lots_page import verdict_markdown
-from pipeline.io.recordings.lots_traces import SIDES, compared, constant_scale, drift, histogram
+from pipeline.io.recordings.lots_traces import SIDES, constant_scale, drift, histogram
 from pipeline.io.recordings.lots_views import cogging_plan, drift_plan
 from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.io.recordings.seal import verify
+from pipeline.views.lots import compared
 from tests.unit.regressions import AFTER, BEFORE, COGGING_NM, make_regression
 
 
@@ -97,6 +98,6 @@ def test_the_page_leads_with_the_verdict_and_marks_what_failed() -> None:
     text = verdict_markdown(make_regression()).replace("\\", "")
     assert text.startswith("# lot:2026-W0* → lot:2026-W14: fail")
     assert "| ✗ | **cogging_amplitude_nm** | 8.0" in text
-    assert "**+75.00 %**" in text
+    assert "**+75 ± 12 %**" in text
     assert "- 3: 2026-W14" in text
     assert "M3: r_phase_ohm 4 sd (M3/r.mcap)" in text

@@ -37,7 +37,7 @@ def motor(motor_id: str, floors: float, *more: str) -> Datasheet:
 def test_equal_reasons_are_told_once_with_their_motors_and_sizes() -> None:
     sheets = [motor("b", 252.0), motor("a", 364.0, "ld_h is not measured"), make_datasheet("c")]
     view = fleet_view(sheets)
-    assert [(reason.text, reason.motors) for reason in view.reasons] == [
+    assert [(reason.text, reason.members) for reason in view.reasons] == [
         ("not approved", ("a", "b", "c")),
         ("the standard model misses torque shaft, 84 a turn", ("a", "b")),
     ]

@@ -1,0 +1,140 @@
+"""Lots held against lots, for people: what changed first, by how much, and why, told once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.physics.notation import quantity, reading
+from pipeline.records.lot_constant import ConstantResult, Side
+from pipeline.records.lot_regression import LotRegression
+from pipeline.views.constants import constant_words, symbol
+from pipeline.views.reasons import Reason, shared_reasons
+
+NONE = "–"
+RANKS = ("fail", "CONFOUNDED", "INSUFFICIENT_HISTORY", "undecided", "marginal")
+TONES = {"pass": "pass", "marginal": "marginal", "fail": "fail"}
+MARKS = {"pass": "✓", "fail": "✗", "marginal": "⚠"}
+MOST_RELATIVE = 2.0
+"""Change over the baseline from which on it is told in the constant's own unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantRow:
+    """One constant of a comparison, every text ready to be shown.
+
+    `before` and `after` are means of lot means, `change` their difference ± U in percent, or in
+    the constant's unit where a share of the baseline says nothing. `shared` is the number of a
+    reason that other constants have too, 0 where `why` is its own.
+    """
+
+    name: str
+    symbol: tuple[str, str]
+    words: str
+    verdict: str
+    tone: str
+    mark: str
+    why: str
+    shared: int
+    decides: bool
+    before: str
+    after: str
+    change: str
+    change_sort: str
+    p_value: str
+    same: str
+    power: str
+    cpk: str
+
+
+@dataclass(frozen=True, slots=True)
+class LotView:
+    """The constants that a side has, what matters first; reasons that several of them have."""
+
+    rows: tuple[ConstantRow, ...]
+    present: tuple[ConstantResult, ...]
+    reasons: tuple[Reason, ...]
+    absent: tuple[str, ...]
+
+
+def lot_view(found: LotRegression) -> LotView:
+    """The view of one comparison of lots."""
+    present = tuple(sorted((one for one in found.constants if one.motors), key=_weight))
+    reasons = shared_reasons((one.name, one.why) for one in present if one.why)
+    numbers = {reason.text: number for number, reason in enumerate(reasons, 1)}
+    return LotView(
+        tuple(_row(one, numbers.get(one.why, 0)) for one in present),
+        present,
+        reasons,
+        tuple(one.name for one in found.constants if not one.motors),
+    )
+
+
+def compared(found: LotRegression) -> tuple[ConstantResult, ...]:
+    """Constants that both sides have, what matters first."""
+    both = [one for one in found.constants if one.of("baseline") and one.of("candidate")]
+    return tuple(sorted(both, key=_weight))
+
+
+def mean_of(one: ConstantResult, side: Side) -> float | None:
+    """The mean of lot means of a side, or of its motors where there are no lots."""
+    means = [lot.mean for lot in one.lots if lot.side == side]
+    means = means or [motor.value for motor in one.of(side)]
+    return sum(means) / len(means) if means else None
+
+
+def change_text(one: ConstantResult) -> str:
+    """The difference of the sides ± U, with its sign; empty where there is none.
+
+    In percent of the baseline, but where U or the change is beyond it: a share of nearly nothing
+    says nothing.
+    """
+    effect, before = one.effect, mean_of(one, "baseline")
+    difference, spread = effect.difference, effect.expanded_u or 0.0
+    if difference is None:
+        if effect.relative is not None:
+            return _signed(100.0 * effect.relative, 0.0, "%")
+        return "" if effect.in_sd is None else f"{effect.in_sd:+.3g} u"
+    size = abs(before or 0.0)
+    if size > spread and abs(difference) <= MOST_RELATIVE * size:
+        return _signed(100.0 * difference / size, 100.0 * spread / size, "%")
+    return _signed(difference, spread, one.unit)
+
+
+def p_text(value: float | None) -> str:
+    """A p-value to three places."""
+    return NONE if value is None else "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
+def _signed(value: float, expanded: float, unit: str) -> str:
+    text = reading(value, expanded / 2.0, unit).text()
+    return f"+{text}" if value > 0.0 else text
+
+
+def _weight(one: ConstantResult) -> tuple[int, float, str]:
+    """The worst verdicts first, then the largest change in motors' standard deviations."""
+    rank = RANKS.index(one.verdict) if one.verdict in RANKS else len(RANKS)
+    return rank, -abs(one.effect.in_sd or 0.0), one.name
+
+
+def _row(one: ConstantResult, shared: int) -> ConstantRow:
+    before, after = mean_of(one, "baseline"), mean_of(one, "candidate")
+    tested = one.test.status == "evaluated"
+    return ConstantRow(
+        name=one.name,
+        symbol=symbol(one.name),
+        words=constant_words(one.name) if one.words == one.name else one.words,
+        verdict=one.verdict.replace("_", " "),
+        tone=TONES.get(one.verdict, "none"),
+        mark=MARKS.get(one.verdict, NONE),
+        why=one.why,
+        shared=shared,
+        decides=one.decides,
+        before=NONE if before is None else quantity(before, one.unit),
+        after=NONE if after is None else quantity(after, one.unit),
+        change=change_text(one) or NONE,
+        change_sort=repr(one.effect.relative or 0.0),
+        p_value=p_text(one.test.p_holm) if tested else one.test.status.replace("_", " ").lower(),
+        same=one.equivalence.status.replace("_", " "),
+        power=NONE if one.power.power is None else f"{100 * one.power.power:.0f} %",
+        cpk=NONE if one.capability.cpk is None else f"{one.capability.cpk:.2f}",
+    )

@@ -1,0 +1,26 @@
+"""Reasons that several motors or constants have, each told once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+SHARED = 2
+"""Members from which on a reason is told once for all of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """A reason, and the motors or constants that it holds for."""
+
+    text: str
+    members: tuple[str, ...]
+
+
+def shared_reasons(told: Iterable[tuple[str, str]]) -> tuple[Reason, ...]:
+    """Reasons of two members or more, the commonest first, of (member, reason) pairs."""
+    members: dict[str, dict[str, None]] = {}
+    for member, text in told:
+        members.setdefault(text, {})[member] = None
+    found = [Reason(text, tuple(own)) for text, own in members.items() if len(own) >= SHARED]
+    return tuple(sorted(found, key=lambda reason: (-len(reason.members), reason.text)))
