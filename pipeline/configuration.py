@@ -51,7 +51,7 @@ def load_settings(command: Command, words: list[str]) -> Settings:
                     f"`python -m pipeline {command.name} --help` lists the keys",
                 )
             _well_formed(command, key.lstrip("+"), value)
-            nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict
+            nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict and not _group(key)
             rest.append(f"++{word}" if nested else word)
     settings = _composed(command, rest)
     for key, text in texts.items():
@@ -91,18 +91,29 @@ def _well_formed(command: Command, key: str, value: str) -> None:
             has = ", ".join(f"{group}.{known}" for known in kinds)
             raise UsageError(f"{command.name}: no key {key!r}", f"{group} has {has}")
         kind = kinds[name]
+    if _group(key):
+        _known_name(command, key, value)
     if kind in _KINDS and not _KINDS[kind][0].fullmatch(_unquoted(value)):
         _, wrong, right = _KINDS[kind]
         raise UsageError(f"{command.name}: {key}={value} is {wrong}", f"write {key}= and {right}")
     if kind is str and value == "null":
         raise UsageError(f"{command.name}: {key}=null is nothing", f"write {key}= and a name")
     if is_dataclass(kind):
-        known = sorted(path.stem for path in (configuration_folder() / key).glob("*.yaml"))
-        if value not in known:
-            raise UsageError(f"{command.name}: no {key} {value!r}", f"known are {', '.join(known)}")
+        _known_name(command, key, value)
     elif typing.get_origin(kind) is list and not (value[:1] == "[" and value[-1:] == "]"):
         listed = f"[{value.strip('[]')}]"
         raise UsageError(f"{command.name}: {key}={value} is no list", f"write {key}={listed}")
+
+
+def _group(key: str) -> bool:
+    """Whether a key takes the name of a file of `conf/KEY/`."""
+    return key == "policy"
+
+
+def _known_name(command: Command, key: str, value: str) -> None:
+    known = sorted(path.stem for path in (configuration_folder() / key).glob("*.yaml"))
+    if value not in known:
+        raise UsageError(f"{command.name}: no {key} {value!r}", f"known are {', '.join(known)}")
 
 
 def _with_names(command: Command, words: list[str]) -> list[str]:

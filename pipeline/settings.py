@@ -123,6 +123,9 @@ class RunSettings(ReadingSettings):
         "not_tested, which a person may release and release=auto does not",
     )
     model: ModelSettings = field(default_factory=ModelSettings)
+    policy: dict[str, Any] = key(
+        {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
+    )
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
     constants: dict[str, Any] = key(
         {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
@@ -256,6 +259,9 @@ class CompareSettings(ReadingSettings):
     )
     motor: str | None = key(None, "motor_id; every motor without it")
     model: ModelSettings = field(default_factory=ModelSettings)
+    policy: dict[str, Any] = key(
+        {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
+    )
     effects_path: str | None = key(None, "folder of your own effects, one file each", place=True)
 
 

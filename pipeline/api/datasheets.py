@@ -144,7 +144,7 @@ def check(
 
 
 def _datasheet(fit: MotorFit, settings: RunSettings, required: tuple[str, ...]) -> Datasheet:
-    model = model_spec(settings.model.name, settings.model.effects)
+    model = model_spec(settings.model.name, settings.model.effects, policy=settings.policy)
     job = MotorJob(
         motor_id=fit.campaign.motor_id,
         entries=(),

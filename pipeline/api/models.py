@@ -196,6 +196,7 @@ def compare(
     effects: Sequence[str] = (),
     *,
     effects_path: str | None = None,
+    policy: Mapping[str, Any] | None = None,
 ) -> Comparisons:
     """Holds a model against measurements that it was not fitted to, signal by signal.
 
@@ -209,6 +210,8 @@ def compare(
         Effects to add; a name with a leading `-` takes one away.
     effects_path : str, optional
         Folder of your own effects, one file each.
+    policy : mapping of mapping, optional
+        Constants of judgement that differ from the defaults: {section: {field: number}}.
 
     Returns
     -------
@@ -227,7 +230,7 @@ def compare(
     """
     from pipeline.criticism.comparison import compare as compare_one
 
-    spec = model_spec(model, effects, effects_path)
+    spec = model_spec(model, effects, effects_path, policy)
     campaigns = _recordings(recordings).campaigns
     return Comparisons({n: compare_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
 
@@ -238,6 +241,7 @@ def diagnose(
     effects: Sequence[str] = (),
     *,
     effects_path: str | None = None,
+    policy: Mapping[str, Any] | None = None,
 ) -> Diagnoses:
     """Names the physical effects that a model lacks, or says that it knows none.
 
@@ -257,20 +261,26 @@ def diagnose(
     """
     from pipeline.criticism.diagnosis import diagnose as diagnose_one
 
-    spec = model_spec(model, effects, effects_path)
+    spec = model_spec(model, effects, effects_path, policy)
     campaigns = _recordings(recordings).campaigns
     return Diagnoses({n: diagnose_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
 
 
-def model_spec(name: str, effects: Sequence[str], effects_path: str | None = None) -> ModelSpec:
-    """The model asked for; raises UsageError for a model or an effect that there is not."""
+def model_spec(
+    name: str,
+    effects: Sequence[str],
+    effects_path: str | None = None,
+    policy: Mapping[str, Any] | None = None,
+) -> ModelSpec:
+    """The model asked for; raises UsageError for a model, effect or policy field that is not."""
     from pipeline.criticism.library.named_models import MODELS
     from pipeline.criticism.library.registry import known_effects
+    from pipeline.criticism.policy.policy import policy_changes
 
     if name not in MODELS:
         raise UsageError(f"no model {name!r}", f"known are {', '.join(MODELS)}")
     known_effects(effects, effects_path)
-    return ModelSpec(name, tuple(effects), effects_path)
+    return ModelSpec(name, tuple(effects), effects_path, policy_changes(policy or {}))
 
 
 def _recordings(given: Recordings | str | Path) -> Recordings:

@@ -334,7 +334,7 @@ def diagnosis_schema() -> Schema:
             "ladder": _list(step),
             "unknown": _or_null(unknown),
         },
-        {"asked": _list(NAME), "combinations": _list(_combination())},
+        {"policy": TEXT, "asked": _list(NAME), "combinations": _list(_combination())},
     )
     return _document("model-diagnosis/1", "What a model of a motor leaves out", body)
 

@@ -17,6 +17,7 @@ from pipeline.criticism.ladder import parameters_of, rung_record
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
     HeldOut,
@@ -29,7 +30,7 @@ from pipeline.criticism.search import End, ended
 from pipeline.criticism.selection.alternatives import experiment_for, remedies, rivals_of
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.criticism.selection.score_test import TIE, Candidate, Score, candidates
+from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import Rung, loss_without
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
@@ -46,6 +47,7 @@ from pipeline.records.diagnosis import (
     Verdict,
 )
 from pipeline.records.naming import file_stem
+from pipeline.records.policy import policy_digest
 
 TOO_LITTLE = (
     "the captures cannot fit the base model: record a torque map or drive log with dq voltages, "
@@ -57,8 +59,6 @@ _STATELESS = (
 )
 _AGAINST = "captures speak against it: see the note"
 _GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
-_AS_GOOD = 0.1
-"""Share of the fall that a rival's promise may be short of."""
 
 
 def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosis:
@@ -105,6 +105,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         unseen,
         model.effects,
         together,
+        policy_digest(last.fitted.policy),
     )
 
 
@@ -170,6 +171,7 @@ def _insufficient(
         (),
         (note,),
         asked=model.effects,
+        policy=policy_digest(policy_of(model.policy)),
     )
 
 
@@ -249,9 +251,11 @@ def _loss(found: Sequence[Segment], last: Rung, effect: Effect, dof: int) -> flo
 
 def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tuple[Candidate, ...]:
     """Candidates that promised as much as an effect on the rung before it was added."""
+    policy = rungs[0].fitted.policy.selection
     before = [rung for rung in rungs if name not in rung.added][-1]
     falls = {score.candidate.effect.name: score.fall for score in before.scores}
-    least = falls[name] - max(TIE, _AS_GOOD * falls[name]) if name in falls else math.inf
+    short = max(policy.tie, policy.passed_over_share * falls.get(name, 0.0))
+    least = falls[name] - short if name in falls else math.inf
     return tuple(
         score.candidate
         for score in before.scores

@@ -16,7 +16,7 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.regression.linear_system import own_columns
-from pipeline.criticism.selection.drift import SIZE, wandering
+from pipeline.criticism.selection.drift import wandering
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import Begun, fit_of
 from pipeline.criticism.selection.stepwise import Rung, search
@@ -25,7 +25,7 @@ from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
 
-_WANDER = f"instruments wander slowly, by some {SIZE:g} times their noise at most: taken as noise"
+_DRIFT = "instruments wander slowly, by some {:g} times their noise at most: taken as noise"
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
@@ -97,7 +97,7 @@ def ended(
         if calm is not None:
             ladder, left = calm, calm.large()
             sketch = _sketched(ladder, left, name)
-            notes.append(_WANDER)
+            notes.append(_DRIFT.format(begun.fitted.policy.selection.drift_size))
     if sketch is None:
         sketch = _sketched(ladder, left, name, in_parts=True)
         left = left if sketch else ladder.large()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.error_map import ErrorMap
+from pipeline.records.policy import Overrides
 
 Array = NDArray[np.float64]
 SIGNALS = (
@@ -27,12 +28,14 @@ SIGNALS = (
 class ModelSpec:
     """Which model: `ideal` or `standard`, plus effects, less those whose name starts with `-`.
 
-    `effects_path`: a folder of the user's own effects.
+    `effects_path`: a folder of the user's own effects. `policy`: constants of judgement that differ
+    from the default ones, by their full names.
     """
 
     name: str = "standard"
     effects: tuple[str, ...] = ()
     effects_path: str | None = None
+    policy: Overrides = ()
 
     def bare(self) -> ModelSpec:
         """The same model without the effects that were added."""

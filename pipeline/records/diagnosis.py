@@ -276,7 +276,8 @@ class Diagnosis:
     """The verdict on one motor's model, with the ladder that leads to it.
 
     `asked`: effects that were asked for beside the `model`'s own; the first rung holds them.
-    `combinations` are known where their parameters, on the last rung, are not.
+    `combinations` are known where their parameters, on the last rung, are not. `policy`: digest of
+    the constants of judgement.
     """
 
     motor_id: str
@@ -291,6 +292,7 @@ class Diagnosis:
     unexcited: tuple[Unexcited, ...] = ()
     asked: tuple[str, ...] = ()
     combinations: tuple[KnownCombination, ...] = ()
+    policy: str = ""
 
     @property
     def whole_model(self) -> str:
@@ -304,6 +306,7 @@ class Diagnosis:
             "schema": "model-diagnosis/1",
             "motor_id": self.motor_id,
             "model": self.model,
+            "policy": self.policy,
             "asked": list(self.asked),
             "verdict": self.verdict,
             "missing": list(self.missing),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
+from pipeline.criticism.policy.policy import policy_changes
 from pipeline.execution.segment_worker import segment_worker
 from pipeline.execution.start import start_constants
 from pipeline.io.ingest.files import input_folder
@@ -54,6 +55,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
         from pipeline.criticism.library.registry import known_effects
 
         known_effects(settings.model.effects, settings.effects_path)
+    changes = policy_changes(settings.policy)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     watch, output = Stopwatch(), output_folder(settings.output)
     with segment_worker(settings.effects_path) as worker:
@@ -62,7 +64,8 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
             read = aside.submit(campaigns, *request)
             import_module(needs)
             found = read.result()
-        spec = ModelSpec(settings.model.name, tuple(settings.model.effects), settings.effects_path)
+        effects = tuple(settings.model.effects)
+        spec = ModelSpec(settings.model.name, effects, settings.effects_path, changes)
         results = []
         for campaign in found.campaigns:
             with worker.campaign():

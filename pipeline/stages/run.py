@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.api.options import check_options
+from pipeline.criticism.policy.policy import policy_changes
 from pipeline.execution.jobs import MotorJob, MotorResult
 from pipeline.execution.keys import batch_parts, key_of, motor_parts
 from pipeline.execution.pools import Cluster, core_count, open_pool
@@ -69,6 +70,7 @@ def main(settings: RunSettings) -> Outcome:
         from pipeline.criticism.library.registry import known_effects
 
         known_effects(settings.model.effects)
+    policy_changes(settings.policy)
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
     registry = _registry(settings)
@@ -219,7 +221,8 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
     required = required_constants(limits)
-    model = ModelSpec(settings.model.name, tuple(settings.model.effects))
+    changes = policy_changes(settings.policy)
+    model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)
     jobs = [
         MotorJob(
             motor_id=motor_id,

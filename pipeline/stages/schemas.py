@@ -7,22 +7,26 @@ from pathlib import Path
 import pipeline
 from pipeline.contracts.glossary_page import glossary_page
 from pipeline.contracts.json_schema import build_schemas
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
+from pipeline.report.policy_page import policy_page
 from pipeline.settings import Settings
 
 SCHEMA_FOLDER = "pipeline/contracts/json"
 GLOSSARY_PAGE = "docs/glossary.md"
+POLICY_PAGE = "docs/policy.md"
 
 
 def build() -> dict[str, bytes]:
-    """Every file that is built from the glossary: its path in the repository, its content."""
+    """Files that are built from glossary and policy: path in the repository, content."""
     files = {
         f"{SCHEMA_FOLDER}/{stem}.schema.json": canonical_json(schema)
         for stem, schema in build_schemas().items()
     }
-    return files | {GLOSSARY_PAGE: glossary_page().encode()}
+    pages = {GLOSSARY_PAGE: glossary_page(), POLICY_PAGE: policy_page(DEFAULT)}
+    return files | {name: page.encode() for name, page in pages.items()}
 
 
 def main(settings: Settings) -> Outcome:

@@ -23,7 +23,6 @@ from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVE
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.effect import Array
 from pipeline.criticism.regression.linear_system import System
-from pipeline.criticism.selection.score_test import TIE
 
 _MOST, _WORTH = 4, 0.01
 """Groups of terms at the most, and the share of the whole gain that one must add. By judgement: a
@@ -208,7 +207,7 @@ def expression(pursuit: Pursuit) -> Expression:
         if not tried:
             break
         now = tried[0][0]
-        if cost - now < max(TIE, _WORTH * (start - now)):
+        if cost - now < max(pursuit.around.policy.selection.tie, _WORTH * (start - now)):
             break
         chosen, cost = tried[0][1], now
     return _finished(pursuit, chosen, start)

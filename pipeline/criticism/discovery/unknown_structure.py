@@ -18,7 +18,6 @@ from pipeline.criticism.regression.gauss_newton import clipped
 from pipeline.criticism.regression.goodness import told_groups
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
 from pipeline.criticism.regression.linearise import Column, effect_columns
-from pipeline.criticism.selection.score_test import LEAST_SHARE, TIE
 from pipeline.records.diagnosis import UnknownStructure
 
 _NEAR = 0.05
@@ -76,7 +75,7 @@ def unknown_structure(
     found, wide = _ranked(segments, fitted, _hooks(signals), before, in_parts)
     if not found:
         return None, 0.0
-    best = _simplest(found)
+    best = _simplest(found, fitted.policy.selection.tie)
     others = tuple(
         (one.port.columns, one.held / best.held)
         for one in found
@@ -132,6 +131,7 @@ def _ranked(
     reference = _held_out(wide, own, left, np.zeros(own.size), units)
     excess = float(wide.counts @ np.log(np.maximum(wide.spreads(left), 1.0)))
     price = math.log(wide.size)
+    least = max(fitted.policy.selection.tie, fitted.policy.selection.least_share * excess)
     found = []
     first = own.size
     for place, (port, mine) in enumerate(zip(offered, columns, strict=True)):
@@ -148,7 +148,7 @@ def _ranked(
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
         held = reference - _held_out(wide, chosen, after, ridge, units)
-        if held > max(TIE, LEAST_SHARE * excess):
+        if held > least:
             found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
@@ -164,16 +164,16 @@ def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fitted: Fitted) -
     return (_PRIOR * np.array(scales)) ** -2.0
 
 
-def _simplest(found: Sequence[Found]) -> Found:
+def _simplest(found: Sequence[Found], tie: float) -> Found:
     """Of the ports that do about as well as the best, the one of fewest variables.
 
     Of several that no evidence parts it is the one listed first, the commonest in machines.
     """
-    enough = found[0].held - max(TIE, _NEAR * found[0].held)
+    enough = found[0].held - max(tie, _NEAR * found[0].held)
     close = [one for one in found if one.held >= enough]
     fewest = min(len(one.port.columns) for one in close)
     simple = [one for one in close if len(one.port.columns) == fewest]
-    level = max(one.held for one in simple) - TIE
+    level = max(one.held for one in simple) - tie
     return min((one for one in simple if one.held >= level), key=lambda one: one.place)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.library.registry import chosen
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import policy_of
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.errors import UsageError
 
@@ -21,4 +22,5 @@ def model_of(spec: ModelSpec, machine: Machine) -> Model:
     less = {name[1:] for name in spec.effects if name.startswith("-")}
     more = [name for name in spec.effects if not name.startswith("-")]
     names = [name for name in dict.fromkeys([*MODELS[spec.name], *more]) if name not in less]
-    return Model(machine, tuple(chosen(tuple(names), spec.effects_path).values()))
+    found = tuple(chosen(tuple(names), spec.effects_path).values())
+    return Model(machine, found, policy_of(spec.policy))

@@ -28,6 +28,7 @@ from pipeline.criticism.effect import (
     Parameter,
     Values,
 )
+from pipeline.criticism.policy.policy import DEFAULT, Policy
 
 _STEP = 1e-30
 """Complex step [A, rad]: its square is below the rounding of anything."""
@@ -88,10 +89,14 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A machine, its base constants and effects; parameters are addressed `effect.parameter`."""
+    """A machine, its base constants and effects; parameters are addressed `effect.parameter`.
+
+    `policy` is what a fit of the model, and what is concluded from it, goes by.
+    """
 
     machine: Machine
     effects: tuple[Effect, ...]
+    policy: Policy = DEFAULT
 
     def parameters(self) -> dict[str, tuple[Effect, Parameter]]:
         """Every effect parameter by its full name, in order."""

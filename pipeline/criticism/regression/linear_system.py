@@ -13,6 +13,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.equations.residuals import over_inertia
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.linearise import (
     Column,
     Rows,
@@ -52,6 +53,11 @@ class Fitted:
     near: Values
     tolerance: tuple[Array, ...] = ()
 
+    @property
+    def policy(self) -> Policy:
+        """What the fit goes by."""
+        return self.model.policy
+
 
 @dataclass(frozen=True, slots=True)
 class System:
@@ -81,6 +87,11 @@ class System:
     around: Fitted
     tests: tuple[str, ...]
     made_at: Mapping[ColumnKey, Values]
+
+    @property
+    def policy(self) -> Policy:
+        """What the fit goes by."""
+        return self.around.policy
 
     @property
     def size(self) -> int:

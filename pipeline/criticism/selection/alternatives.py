@@ -12,12 +12,8 @@ from pipeline.criticism.effect import Effect
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
 from pipeline.criticism.selection.discrimination import kin, told_by_wholes
-from pipeline.criticism.selection.score_test import TIE, Candidate
+from pipeline.criticism.selection.score_test import Candidate
 from pipeline.criticism.selection.stepwise import loss_without, shaped
-
-_NEAR, _MOST = 0.5, 6
-"""Share of what an effect explains that a refit with another in its place may lose to first order,
-and how many are refitted. By judgement: the tangent may be wrong, and each costs a fit."""
 
 
 def rivals_of(
@@ -35,12 +31,13 @@ def rivals_of(
     that were `passed_over` for it. Effects that share its closer look are rivals if that look does
     not tell them apart.
     """
+    policy = fitted.policy.selection
     effect = next(e for e in fitted.model.effects if e.name == name)
     alike = kin(effect, {one.effect.name: one.effect for one in offered})
     ties = [] if told_by_wholes(segments, fitted, effect) else list(alike)
     grams = wide.grams()
     lost = loss_without(wide, fitted, (name,), grams=grams)
-    first = len(own_columns(fitted.model))
+    most, first = policy.alternative_share * lost, len(own_columns(fitted.model))
     near: dict[str, tuple[float, Candidate]] = {}
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
@@ -49,19 +46,19 @@ def rivals_of(
             continue
         rise = loss_without(wide, fitted, (name,), places, grams)
         other = candidate.effect.name
-        if rise < _NEAR * lost and rise < near.get(other, (np.inf, candidate))[0]:
+        if rise < most and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate
     for candidate in passed_over:
         if candidate.effect.name in alike:
             continue
-        near.setdefault(candidate.effect.name, (_NEAR * lost, candidate))
-    nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))[:_MOST]
-    for _, candidate in nearest:
+        near.setdefault(candidate.effect.name, (most, candidate))
+    nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))
+    for _, candidate in nearest[: policy.most_alternatives]:
         swapped = _refitted(name, fitted, candidate, segments, wide)
         if (
             swapped is not None
-            and swapped.misfit < wide.misfit + TIE
-            and swapped.excess < wide.excess + TIE
+            and swapped.misfit < wide.misfit + policy.tie
+            and swapped.excess < wide.excess + policy.tie
         ):
             ties.append(candidate.effect.name)
     return tuple(sorted(ties))

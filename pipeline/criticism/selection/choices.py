@@ -11,7 +11,6 @@ from pipeline.criticism.effect import Effect, Values
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import told_groups
 from pipeline.criticism.regression.linear_system import Fitted, System
-from pipeline.criticism.selection.score_test import TIE
 
 
 def reconsidered(
@@ -31,7 +30,7 @@ def reconsidered(
         for other in _others(effect, fitted):
             start = replace(fitted, values={**fitted.values, **other})
             tried = gauss_newton(segments, start)
-            if tried[1].misfit < around.misfit - TIE:
+            if tried[1].misfit < around.misfit - fitted.policy.selection.tie:
                 fitted, around = tried
     return fitted, around
 

@@ -26,13 +26,6 @@ from pipeline.criticism.regression.linear_system import Fitted
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.records.diagnosis import Remainder
 
-SIZE = 4.0
-"""Standard deviation at a capture's end, in standard deviations of the sensor's noise."""
-
-_TERMS = 8
-"""Sines that are kept: they hold 97 % of a random walk's power."""
-_TESTS = 2
-"""Tests in whose captures wander must show: a machine that warms up does so in its own alone."""
 _WANDERS = ("v", "i", "torque")
 """Beginnings of the names of signals that wander: voltages, currents and torque."""
 
@@ -47,7 +40,8 @@ def wandering(
     changes slowly in one.
     """
     captures = {one.capture for one in left}
-    if len({segment.test for segment in segments if segment.capture in captures}) < _TESTS:
+    tests = {segment.test for segment in segments if segment.capture in captures}
+    if len(tests) < fitted.policy.selection.drift_tests:
         return None
     told = with_wander(segments, fitted.model, fitted.values)
     _, around = gauss_newton(told, fitted)
@@ -63,7 +57,8 @@ def wanders(segment: Segment, model: Model, values: Values) -> Segment:
     """A segment with the slowest sines of a random walk of each of its sensors."""
     if segment.weak is None:
         return segment
-    sines = SIZE * slowest(clock(segment))
+    policy = model.policy.selection
+    sines = policy.drift_size * slowest(clock(segment), policy.drift_terms)
     made = [] if segment.lines is None else [segment.lines]
     made += [
         disturbed(segment, segment.weak, model, values, name, sigma * sines)
@@ -73,9 +68,9 @@ def wanders(segment: Segment, model: Model, values: Values) -> Segment:
     return replace(segment, lines=np.concatenate(made)) if made else segment
 
 
-def slowest(time_s: Array) -> Array:
-    """The slowest sines [8, n] of a random walk that ends at a standard deviation of one."""
+def slowest(time_s: Array, terms: int) -> Array:
+    """The slowest sines [terms, n] of a random walk that ends at a standard deviation of one."""
     time = (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), 1e-300)
-    rates = (np.arange(_TERMS)[:, None] + 0.5) * math.pi
+    rates = (np.arange(terms)[:, None] + 0.5) * math.pi
     sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates
     return sines

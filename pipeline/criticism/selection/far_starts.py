@@ -23,7 +23,6 @@ from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.selection.score_test import (
-    THOROUGH,
     Candidate,
     Score,
     Standing,
@@ -33,9 +32,6 @@ from pipeline.criticism.selection.score_test import (
     searched,
     share_of,
 )
-
-_NEARER = (0.5**0.5, 0.5**0.25, 2.0**0.25, 2.0**0.5)
-"""Multiples of the best start that are tried after it: starts are an octave apart."""
 
 
 def with_starts(
@@ -53,8 +49,9 @@ def with_starts(
     if not told.any():
         return tuple(scores)
     best = {score.candidate.effect.name: score for score in scores}
+    thorough = fitted.policy.selection.thorough
     own = wide.along(range(len(own_columns(fitted.model))))
-    before = Standing.of(own, np.arange(len(own.columns)), own.grams().best(*THOROUGH))
+    before = Standing.of(own, np.arange(len(own.columns)), own.grams().best(*thorough))
     price = searched(offered)
     for candidate in offered:
         for parameter in candidate.effect.parameters_of(fitted.model.machine):
@@ -78,15 +75,15 @@ def _tried(
     if not parameter.starts:
         return ()
     name = f"{candidate.effect.name}.{parameter.name}"
-    scale = fitted.model.machine.scale(parameter)
+    scale, policy = fitted.model.machine.scale(parameter), fitted.policy.selection
 
     def at(start: float) -> tuple[float, float, System, Descent]:
         moved = _moved(segments, own, fitted, candidate, {name: start * scale})
-        end = moved.grams().best(*THOROUGH)
+        end = moved.grams().best(*policy.thorough)
         return end.misfit, start, moved, end
 
     nearest = min((at(start) for start in parameter.starts), key=lambda one: one[:2])
-    around = [at(factor * nearest[1]) for factor in _NEARER]
+    around = [at(factor * nearest[1]) for factor in policy.finer_starts]
     _, start, moved, end = min([nearest, *around], key=lambda one: one[:2])
     places = np.arange(len(own.columns))
     after = Standing.of(moved, places, end)
@@ -99,10 +96,11 @@ def _tried(
         share_of(own, candidate.effect, before, after),
         abs(start) / parameter.negligible,
         quiet_fall(own, before.spreads, after.spreads),
-        clears(own.counts, told, before.spreads, after.spreads),
+        clears(own, told, before.spreads, after.spreads),
+        policy=policy,
     )
     dof = paid_for(candidate.effect, fitted.model.machine, found)
-    search = 2.0 * math.log(len(parameter.starts) + len(_NEARER))
+    search = 2.0 * math.log(len(parameter.starts) + len(policy.finer_starts))
     return (replace(found, price=dof * math.log(own.size) + search),)
 
 

@@ -14,8 +14,6 @@ from pipeline.criticism.selection.stepwise import Rung
 from pipeline.records.capture import Campaign
 from pipeline.records.diagnosis import Unexcited
 
-_SEEN = 3.0
-"""Standard deviations of a typical size from which on captures would show an effect."""
 _WARMED = {"drop": ("dq", "q"), "flux": ("dq", "q", "open")}
 """Equations in which what an effect of a hook does grows with a temperature while it changes."""
 
@@ -48,12 +46,12 @@ def unexcited(
     a signal in it; each with the tests that are not there.
     """
     inside = {effect.name for effect in last.fitted.model.effects}
-    found = []
+    least, found = last.fitted.policy.selection.visible_u, []
     for name, effect in library.items():
         lacking = tuple(test for test in effect.tests if not _holds(campaign, effect, test))
         if name in inside or not lacking or lacking[0] != effect.tests[0]:
             continue
-        if detectable(effect, last.fitted, last.around, offered) < _SEEN:
+        if detectable(effect, last.fitted, last.around, offered) < least:
             signals = _missing(campaign, effect, lacking)
             found.append(Unexcited(name, lacking, effect.experiment, signals))
     return tuple(found)

@@ -26,53 +26,31 @@ from scipy.ndimage import median_filter
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex
 from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.goodness import material_size
 from pipeline.criticism.regression.linear_system import System
 from pipeline.numerics.orders import TURN_RAD
 from pipeline.numerics.projection import Projection, bump
-
-_LOWEST, _HIGHEST, _STEP = 1.5, 128.0, 0.25
-"""Orders looked at, up to beyond any tooth count times two of the machines here, and how densely:
-a part of four turns tells no finer ones apart. Below the lowest is what a drag leaves of itself."""
-_TURNS, _LEAST_TURNS = 4.0, 3.0
-"""Turns of a part of a log; and the fewest that tell orders apart."""
-_SAMPLES = 5.0
-"""Samples a cycle that an order must have at the mean speed of a part of a log."""
-_BESIDE = 12
-_STANDS_OUT = 20.0
-"""Power over the median of what is beside: of noise averaged over eight parts one in a million has
-four."""
-_CAPTURES = 2
-"""Captures that must have an order: what only one has predicts no other."""
-_MOST = 4
-"""Orders of one log: each is another fit of the machine, and its harmonics follow the first."""
-_AS_GOOD = 0.9
-"""Power of the best order near a whole one that the whole one must have to be it."""
-_APART = 0.1
-"""How far apart two captures may find one order."""
-_TRIED = 25
-"""Orders tried on either side of a line within a step: every hundredth."""
-_OVERSAMPLED = 8.0
-"""Orders tried for every one that the angles of several logs together tell apart."""
 
 
 def orders_left(segments: Sequence[Segment], around: System) -> tuple[float, ...]:
     """Orders that two captures have over what is beside them and in a size that matters, of those
     that no equation looks at; one that is no whole number as close as their angles tell it.
     """
+    policy = around.policy.order_scan
     lines = [
         (order, log)
         for segment in segments
         for log in _logs(segment, around)
-        for order in _lines(log)
+        for order in _lines(log, policy)
         if order not in log.looked_at
     ]
     lines.sort(key=lambda line: line[0])
     found = []
-    for near in _clustered(lines):
+    for near in _clustered(lines, policy):
         logs = [log for _, log in near]
-        if len({log.capture for log in logs}) >= _CAPTURES:
-            order = _common(float(np.median([order for order, _ in near])), logs)
+        if len({log.capture for log in logs}) >= policy.captures:
+            order = _common(float(np.median([order for order, _ in near])), logs, policy)
             found.append(int(order) if order.is_integer() else order)
     return tuple(dict.fromkeys(found))
 
@@ -111,9 +89,9 @@ class Part:
         sums = [carried @ np.exp(-1j * order * self.theta_rad) for order in orders.tolist()]
         return np.array(sums).T
 
-    def spectrum(self, count: int) -> Array:
+    def spectrum(self, count: int, step: float) -> Array:
         """Mean square [2, K] of every order of the grid from its first step, as `power`."""
-        turn = np.exp(-1j * _STEP * self.theta_rad)
+        turn = np.exp(-1j * step * self.theta_rad)
         carried = np.stack(self.carriers) * self.left + 0j
         sums = np.empty((2, count), dtype=np.complex128)
         for place in range(count):
@@ -146,12 +124,16 @@ class Log:
     looked_at: frozenset[float]
 
 
+Line = tuple[float, Log]
+"""An order that stands out of a log."""
+
+
 def _logs(segment: Segment, around: System) -> Iterator[Log]:
     weak, theta = segment.weak, segment.recorded.get("theta_mech_rad")
     if segment.kind != "dq" or weak is None or theta is None or not (weak.orders > 0).any():
         return
     weight = _weight(weak, segment.size)
-    rows = list(_parts(theta, weight))
+    rows = list(_parts(theta, weight, around.policy.order_scan))
     if not rows:
         return
     fitted, current = around.around, segment.recorded["iq_a"]
@@ -173,7 +155,7 @@ def _weight(weak: Projection, size: int) -> Array:
     return weight
 
 
-def _parts(theta: Array, weight: Array) -> Iterator[NDArray[np.int64]]:
+def _parts(theta: Array, weight: Array, policy: OrderScan) -> Iterator[NDArray[np.int64]]:
     """Rows of each part of a log, of some four turns."""
     rows = np.flatnonzero(weight > 0.0)
     if not rows.size:
@@ -182,66 +164,67 @@ def _parts(theta: Array, weight: Array) -> Iterator[NDArray[np.int64]]:
     # a gap between windows is no turn that anything was seen of
     turned = np.cumsum(np.where(np.diff(rows, prepend=rows[:1] - 1) == 1, step, 0.0))
     turns = float(turned[-1]) / TURN_RAD
-    count = max(round(turns / _TURNS), int(turns >= _LEAST_TURNS))
+    count = max(round(turns / policy.turns), int(turns >= policy.least_turns))
     edges = np.searchsorted(turned, np.linspace(0.0, turned[-1], count + 1)) if count else ()
     for first, last in pairwise(edges):
         yield rows[first:last]
 
 
-def _lines(log: Log) -> list[float]:
+def _lines(log: Log, policy: OrderScan) -> list[float]:
     """Orders that stand out of the twelve steps at either side by 20 in power and have an rms that
     matters; the clearest is taken out before the next is looked for.
     """
     parts = log.parts
-    count = int(min(_HIGHEST, *(_seen_to(part.theta_rad) for part in parts)) / _STEP)
-    grid = _STEP * np.arange(1, count + 1)
+    seen_to = (_seen_to(part.theta_rad, policy.samples) for part in parts)
+    count = int(min(policy.highest, *seen_to) / policy.step)
+    grid = policy.step * np.arange(1, count + 1)
     found: list[float] = []
-    while len(found) < _MOST and count > 2 * _BESIDE:
-        power = np.mean([part.spectrum(count) for part in parts], axis=0)
-        beside = median_filter(power, (1, 2 * _BESIDE + 1), mode="nearest")
+    while len(found) < policy.most and count > 2 * policy.beside:
+        power = np.mean([part.spectrum(count, policy.step) for part in parts], axis=0)
+        beside = median_filter(power, (1, 2 * policy.beside + 1), mode="nearest")
         clear = power / np.maximum(beside, 1e-300)
-        clear = np.where((power > log.least**2) & (grid >= _LOWEST), clear, 0.0).max(axis=0)
+        clear = np.where((power > log.least**2) & (grid >= policy.lowest), clear, 0.0).max(axis=0)
         best = int(np.argmax(clear))
-        if clear[best] <= _STANDS_OUT:
+        if clear[best] <= policy.stands_out:
             break
-        found.append(_peak(parts, float(grid[best])))
+        found.append(_peak(parts, float(grid[best]), policy))
         parts = tuple(part.without(found[-1]) for part in parts)
     return found
 
 
-def _peak(parts: Sequence[Part], near: float) -> float:
+def _peak(parts: Sequence[Part], near: float, policy: OrderScan) -> float:
     """The order within a step that has the most power; a whole one that has about as much."""
     whole = float(round(near))
-    tried = np.append(near + _STEP * np.linspace(-1.0, 1.0, 2 * _TRIED + 1), whole)
+    tried = np.append(near + policy.step * np.linspace(-1.0, 1.0, 2 * policy.finer + 1), whole)
     power = np.sum([part.power(tried) for part in parts], axis=0).max(axis=0)
     best = int(np.argmax(power))
-    return whole if power[-1] >= _AS_GOOD * power[best] else float(tried[best])
+    return whole if power[-1] >= policy.whole_share * power[best] else float(tried[best])
 
 
-def _clustered(lines: Sequence[tuple[float, Log]]) -> Iterator[list[tuple[float, Log]]]:
+def _clustered(lines: Sequence[Line], policy: OrderScan) -> Iterator[list[Line]]:
     """Lines in order, cut where two that follow each other are apart."""
     number, before = 0, -math.inf
     numbers = []
     for order, _ in lines:
-        number += order - before > _APART
+        number += order - before > policy.apart
         before = order
         numbers.append(number)
     for _, mine in groupby(zip(numbers, lines, strict=True), key=lambda one: one[0]):
         yield [line for _, line in mine]
 
 
-def _common(near: float, logs: Sequence[Log]) -> float:
+def _common(near: float, logs: Sequence[Log], policy: OrderScan) -> float:
     """The order that several logs have: whole, or where waves of one phase fit all of them best.
 
     Angles go on from turn to turn, so that a wave of any order is one function of them.
     """
-    order = _peak([part for log in logs for part in log.parts], near)
+    order = _peak([part for log in logs for part in log.parts], near, policy)
     if order.is_integer():
         return order
     channels = dict.fromkeys(log.channel for log in logs)
     turned = np.ptp(np.concatenate([log.whole.theta_rad for log in logs])) / TURN_RAD
-    count = int(_OVERSAMPLED * _APART * turned) + 1
-    tried = order + _APART * np.linspace(-1.0, 1.0, 2 * count + 1)
+    count = int(policy.oversampled * policy.apart * turned) + 1
+    tried = order + policy.apart * np.linspace(-1.0, 1.0, 2 * count + 1)
     each = [_in_phase([g.whole for g in logs if g.channel == name], tried) for name in channels]
     return round(float(tried[int(np.argmax(np.sum(each, axis=0).max(axis=0)))]), 4)
 
@@ -254,6 +237,6 @@ def _in_phase(logs: Sequence[Part], orders: Array) -> Array:
     return power
 
 
-def _seen_to(theta: Array) -> float:
+def _seen_to(theta: Array, samples: float) -> float:
     """Highest order that has samples enough a cycle."""
-    return TURN_RAD / (_SAMPLES * float(np.median(np.abs(np.diff(theta)))) + 1e-12)
+    return TURN_RAD / (samples * float(np.median(np.abs(np.diff(theta)))) + 1e-12)

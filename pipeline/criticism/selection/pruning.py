@@ -18,9 +18,6 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
 from pipeline.criticism.regression.normal_equations import Grams
 
-_CLEARLY = 20.0
-"""Prices from which on the tangent is believed that a term pays."""
-
 
 def trimmed(
     segments: Sequence[Segment], fitted: Fitted, around: System, names: Sequence[str]
@@ -130,7 +127,7 @@ def _doubtful(
         term
         for term in sorted(terms)
         if _loss(fitted, around, known, names := _parameters(fitted, effect, (term,)))
-        < _CLEARLY * price * len(names)
+        < fitted.policy.selection.tangent_penalties * price * len(names)
     )
 
 

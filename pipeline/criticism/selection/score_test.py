@@ -18,24 +18,10 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.policy.selection import Selection
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.criticism.regression.normal_equations import Descent, Grams, misfit_of
-
-TIE = 12.0
-"""Difference of −2 log L below which captures do not part two explanations: 3.5 deviations."""
-LEAST_SHARE = 0.1
-"""Of what is over the floor, what an effect must take to be named for it."""
-WORTH, _CLEAR = 30.0, 0.5
-"""An excess that counts, as −2 log L; or a sample, where there are few."""
-_MOST_OF = 0.5
-"""Of what would be told as a remainder, what makes an effect matter at any size."""
-_GLANCE, THOROUGH = ((1.0,), 3), ((1.0, 0.0), 20)
-"""Exponents of the weights that a descent begins with, and its steps."""
-_PROMISING = 0.3
-"""Prices that a glance must see for a thorough look."""
-_BELOW = 1.5
-"""Prices that evidence below the floor must be worth: noise that is not white is down there too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +56,7 @@ class Score:
     quiet: float = 0.0
     clears: bool = False
     shadow: str | None = None
+    policy: Selection = field(kw_only=True)
 
     @property
     def matters(self) -> bool:
@@ -87,12 +74,12 @@ class Score:
         """
         effect = self.candidate.effect
         below = self._below_floor and effect.hook != "sensor" and effect.closer is None
-        helps = self.share >= LEAST_SHARE or below
+        helps = self.share >= self.policy.least_share or below
         return self.fall > self.price and self.matters and helps and self.shadow is None
 
     @property
     def _below_floor(self) -> bool:
-        return self.quiet > _BELOW * self.price
+        return self.quiet > self.policy.below_floor_penalties * self.price
 
     @property
     def shortfall(self) -> str:
@@ -180,10 +167,10 @@ def score_all(
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
         first += len(candidate.columns)
-        score = by.score(candidate, places, _GLANCE)
+        score = by.score(candidate, places, fitted.policy.selection.quick)
         cost = paid_for(candidate.effect, fitted.model.machine, score) * price + search_price
-        if score is not None and score.fall > _PROMISING * cost:
-            score = by.score(candidate, places, THOROUGH)
+        if score is not None and score.fall > fitted.policy.selection.quick_penalties * cost:
+            score = by.score(candidate, places, fitted.policy.selection.thorough)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known[0].fall):
             best[candidate.effect.name] = replace(score, price=cost), places
@@ -270,7 +257,8 @@ class _Scoring:
             max(sizes, default=math.inf),
             quiet_fall(around, self.before.spreads, after.spreads),
             candidate.effect.closer is None
-            and clears(around.counts, self.told, self.before.spreads, after.spreads),
+            and clears(around, self.told, self.before.spreads, after.spreads),
+            policy=self.fitted.policy.selection,
         )
 
     def shadow(
@@ -288,25 +276,27 @@ class _Scoring:
             for other, places in best.values()
             if not other.matters
             and other.fall > other.price
-            and other.fall > score.fall + TIE
+            and other.fall > score.fall + score.policy.tie
             and other.candidate.effect.closer is None
         ]
         if not small:
             return None
         clearest, beside = max(small, key=lambda pair: pair[0].fall)
+        thorough = self.fitted.policy.selection.thorough
         _, mine = best[score.candidate.effect.name]
-        without = self.grams.along(np.concatenate([self.own, beside])).best(*THOROUGH)
-        both = self.grams.along(np.concatenate([self.own, beside, mine])).best(*THOROUGH)
+        without = self.grams.along(np.concatenate([self.own, beside])).best(*thorough)
+        both = self.grams.along(np.concatenate([self.own, beside, mine])).best(*thorough)
         worth = without.misfit - both.misfit > score.price
         return None if worth else clearest.candidate.effect.name
 
 
-def clears(counts: Array, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
+def clears(around: System, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
     """Whether most of the power over the floor goes, between two sets of χ²/n [G], of the groups
     that are `told` [G] as a remainder.
     """
-    over, left = (counts * np.maximum(spreads - 1.0, 0.0) for spreads in (before, after))
-    return bool(told.any()) and float(left[told].sum()) < _MOST_OF * float(over[told].sum())
+    over, left = (around.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
+    most = around.policy.selection.clears_share * float(over[told].sum())
+    return bool(told.any()) and float(left[told].sum()) < most
 
 
 def _outside(value: float, parameter: Parameter) -> bool:
@@ -318,9 +308,10 @@ def share_of(around: System, effect: Effect, before: Standing, after: Standing) 
     captures of the tests that excite the effect, or of what the priors of the station cost; but of
     a signal's error no more than the share of its power, at one order, that went with it.
 
-    An excess counts from 30 on, or from half a nat a sample where there are few. Instruments that
-    wander and effects of nobody's library are misfit that many an effect can nibble at.
+    Small excesses do not count (`excess`, `excess_a_sample`): drift and unmodelled effects are
+    deviance that many candidates partly absorb.
     """
+    policy = around.policy.selection
     excess = around.counts * np.log(np.maximum(before.spreads, 1.0))
     left = around.counts * np.log(np.maximum(after.spreads, 1.0))
     channel = np.array([name for _, name, _ in around.labels])
@@ -329,22 +320,22 @@ def share_of(around: System, effect: Effect, before: Standing, after: Standing) 
     shares = [0.0]
     for place in places:
         had = float(excess[place].sum())
-        if had > min(WORTH, _CLEAR * float(around.counts[place].sum())):
+        if had > min(policy.excess, policy.excess_a_sample * float(around.counts[place].sum())):
             shares.append(1.0 - float(left[place].sum()) / had)
     error = min(max(shares), power_share(around, before.spreads, after.spreads))
     cost = before.prior_cost
-    return max(error, 1.0 - after.prior_cost / cost if cost > WORTH else 0.0)
+    return max(error, 1.0 - after.prior_cost / cost if cost > policy.excess else 0.0)
 
 
 def quiet_fall(around: System, before: Array, after: Array) -> float:
     """Fall of misfit between two sets of χ²/n [G], in signals without an excess that counts."""
-    fall = 0.0
+    fall, policy = 0.0, around.policy.selection
     channel = np.array([name for _, name, _ in around.labels])
     for name in dict.fromkeys(channel.tolist()):
         mine = channel == name
         counts = around.counts[mine]
         excess = float(counts @ np.log(np.maximum(before[mine], 1.0)))
-        if excess <= min(WORTH, _CLEAR * float(counts.sum())):
+        if excess <= min(policy.excess, policy.excess_a_sample * float(counts.sum())):
             fall += misfit_of(counts, before[mine]) - misfit_of(counts, after[mine])
     return fall
 
@@ -361,5 +352,6 @@ def power_share(around: System, before: Array, after: Array) -> float:
         np.bincount(pool, around.counts * np.maximum(spreads - 1.0, 0.0))
         for spreads in (before, after)
     )
-    worth = nats > np.minimum(WORTH, _CLEAR * count)
+    policy = around.policy.selection
+    worth = nats > np.minimum(policy.excess, policy.excess_a_sample * count)
     return float((1.0 - has[worth] / had[worth]).max(initial=0.0))

@@ -36,10 +36,6 @@ from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.pruning import trimmed, whole
 from pipeline.criticism.selection.score_test import (
-    LEAST_SHARE,
-    THOROUGH,
-    TIE,
-    WORTH,
     Score,
     candidates,
     clears,
@@ -48,24 +44,6 @@ from pipeline.criticism.selection.score_test import (
     score_all,
     widened,
 )
-
-_MOST = 6
-"""Rungs: the model as asked for and five effects."""
-_REFITS, _ROUNDS = 3, 2
-"""Candidates that are refitted at a time, and how often the next ones are."""
-_CLOSE = 0.7
-"""Share of the best fall of misfit that a candidate needs to be refitted beside it."""
-_HELD, _BESIDE = 0.5, 3.0
-"""Prices that captures held out must pay, and below the floor beside an effect of its own kind."""
-_KIN = 0.05
-"""Share that the form of an effect of the same kind may be wrong by."""
-_SURELY = 2.0
-"""Standard uncertainties that an amplitude must be away from zero."""
-_OTHER_FLOOR = math.log(1.5)
-"""Change of some noise floor that calls for a fit by the new ones."""
-_OTHER_INERTIA = 2.0
-"""Factor between a fit's inertia and a rough fit's from which on the fit is begun anew: a rough
-fit is a tenth off at most, an inertia that was spoiled before an effect came in tens of times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +63,9 @@ def search(
     effects are in.
     """
     rungs: list[Rung] = []
+    policy = fitted.policy.selection
     base = len(fitted.model.effects)
-    for _ in range(_MOST):
+    for _ in range(policy.most_steps):
         offered = candidates(library, fitted)
         wide = widened(segments, fitted, offered, rungs[-1].around if rungs else None)
         told = told_groups(wide, segments)
@@ -94,7 +73,7 @@ def search(
         scores = with_starts(segments, wide, fitted, offered, scores, told)
         added = tuple(e.name for e in fitted.model.effects[base:])
         rungs.append(Rung(added, fitted, wide, scores))
-        if len(rungs) == _MOST:
+        if len(rungs) == policy.most_steps:
             break
         inside = {e.closer for e in fitted.model.effects} - {None}
         passing = [s for s in scores if s.passes and s.candidate.effect.closer not in inside]
@@ -121,9 +100,10 @@ def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
     sensor's lag adds noise, and so does a twist told by an angle. An encoder off its centre drives
     J to next to nothing, and the floors were computed with that J.
     """
+    policy = fitted.policy.selection
     floor = floors(segments, fitted.model, fitted.values)
     ratio = np.concatenate(floor) / np.concatenate(fitted.sigma)
-    if np.abs(np.log(ratio)).max() >= _OTHER_FLOOR:
+    if np.abs(np.log(ratio)).max() >= math.log(policy.floor_ratio):
         fitted = replace(fitted, sigma=floor, near=fitted.values)
         ended = gauss_newton(segments, fitted)
     else:
@@ -132,7 +112,7 @@ def _floored_anew(segments: Sequence[Segment], fitted: Fitted) -> Fitted:
             return fitted
     near = rough_anew(segments, fitted)
     lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (near, fitted))
-    if heavier < _OTHER_INERTIA * lighter:
+    if heavier < policy.inertia_ratio * lighter:
         return ended[0]
     return min(ended, first_fit(segments, near), key=lambda end: end[1].misfit)[0]
 
@@ -149,8 +129,9 @@ def _chosen(
 
     That fit is finished with columns of its own, and without terms that do not pay.
     """
-    for first in range(0, min(len(passing), _ROUNDS * _REFITS), _REFITS):
-        batch = list(passing[first : first + _REFITS])
+    policy = fitted.policy.selection
+    for first in range(0, min(len(passing), policy.refit_rounds * policy.refits), policy.refits):
+        batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(segments, fitted, batch, wide, found)) is not None:
             named = [effect.name for effect in best[0].model.effects]
             near = gauss_newton(segments, whole(best[0]), before=best[1])
@@ -177,23 +158,24 @@ def _refit_best(
     must hold even if any effect found has such a form; beside one of its own kind it must be worth
     three prices, since what a form leaves there is of that size.
     """
-    own = len(own_columns(fitted.model))
+    policy, own = fitted.policy.selection, len(own_columns(fitted.model))
     before, shrunk = leave_out(wide, own, segments), _shrunk(segments, wide)
     any_wrong, told = _doubt(segments, fitted, wide, found), told_groups(wide, segments)
-    close = [s for s in passing if s.fall >= _CLOSE * passing[0].fall]
+    close = [s for s in passing if s.fall >= policy.close_share * passing[0].fall]
     best: tuple[Fitted, System] | None = None
     least = math.inf
     for score in close:
         effect = score.candidate.effect
         tried = _refitted(segments, fitted, score, wide)
         # of two that tie, the one that some capture here was made to show
-        unsought = TIE if set(effect.tests).isdisjoint(wide.tests) else 0.0
+        unsought = policy.tie if set(effect.tests).isdisjoint(wide.tests) else 0.0
         cost = tried[1].misfit + score.price + unsought
         if not _matters(*tried, wide, told) or cost >= min(least, wide.misfit):
             continue
         kin = _kin(effect, found)
         doubts = _doubt(segments, fitted, wide, kin), any_wrong
-        promised = _HELD * score.price, (_BESIDE if kin else _HELD) * score.price
+        below = policy.same_hook_penalties if kin else policy.held_out_penalties
+        promised = policy.held_out_penalties * score.price, below * score.price
         held = leave_out(tried[1], len(tried[1].columns), segments)
         one, other = in_common((wide, tried[1]), (before, held))
         without = predicted_spreads(wide, one) * shrunk
@@ -226,7 +208,7 @@ def _matters(fitted: Fitted, around: System, before: System, told: NDArray[np.bo
     if material(fitted, effect):
         return True
     was, now = before.spreads(before.residual), around.spreads(around.residual)
-    most = effect.closer is None and clears(around.counts, told, was, now)
+    most = effect.closer is None and clears(around, told, was, now)
     return most and shaped(fitted, effect)
 
 
@@ -238,7 +220,7 @@ def _sure(fitted: Fitted, around: System, held: HeldOut) -> bool:
     sense at a reversal, while its own size is not known at all.
     """
     effect = fitted.model.effects[-1]
-    sure = surely_there(around, held, _SURELY)
+    sure = surely_there(around, held, fitted.policy.selection.least_u)
     known = effect.parameters_of(fitted.model.machine)
     told = [p for p in known if f"{effect.name}.{p.name}" in sure]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]
@@ -261,7 +243,8 @@ def _doubt(
     if not found:
         return np.ones(len(wide.labels))
     model, values = fitted.model, fitted.values
-    wrong = np.concatenate([form_tolerance(s, model, values, found, _KIN) for s in segments])
+    share = fitted.policy.selection.form_error
+    wrong = np.concatenate([form_tolerance(s, model, values, found, share) for s in segments])
     noise = np.bincount(wide.group, wide.whiten**-2, len(wide.labels)) / np.maximum(
         wide.counts, 1.0
     )
@@ -284,11 +267,12 @@ def _holds(
     `after` are χ²/n [G] without and with the candidate. They are multiplied by the first of the
     `doubts` [G]; below the floor, the smaller fall with and without the second counts.
     """
+    policy = wide.policy.selection
     kin, below = doubts
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
     fall = wide.misfit_of(kin * before) + cost - tried.misfit_of(kin * after) - left
-    priors = cost > WORTH and left < (1.0 - LEAST_SHARE) * cost
-    helps = priors or power_share(wide, kin * before, kin * after) >= LEAST_SHARE
+    priors = cost > policy.excess and left < (1.0 - policy.least_share) * cost
+    helps = priors or power_share(wide, kin * before, kin * after) >= policy.least_share
     quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
     return fall > least[0] and (helps or quiet > least[1])
 
@@ -347,9 +331,10 @@ def _backward(
     segments: Sequence[Segment], fitted: Fitted, around: System, base: int
 ) -> tuple[Fitted, System]:
     """Takes out effects that later ones have made superfluous."""
+    most = fitted.policy.selection.most_penalties
     for effect in fitted.model.effects[base:-1]:
         price = effect.dof(fitted.model.machine) * math.log(around.size)
-        if material(fitted, effect) and loss_without(around, fitted, (effect.name,)) > 4 * price:
+        if material(fitted, effect) and loss_without(around, fitted, (effect.name,)) > most * price:
             continue
         kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{effect.name}.")}
         model = fitted.model.without(effect.name)
@@ -386,4 +371,5 @@ def loss_without(
     names_out = [around.columns[n].name for n in out]
     move = np.array([-fitted.values[n] if amplitude[n] else 0.0 for n in names_out])
     known = around.grams() if grams is None else grams
-    return known.moved(out, move).along(stay).best(*THOROUGH).misfit - known.misfit()
+    end = known.moved(out, move).along(stay).best(*fitted.policy.selection.thorough)
+    return end.misfit - known.misfit()

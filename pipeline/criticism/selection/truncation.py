@@ -10,20 +10,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import values_of
 from pipeline.criticism.regression.goodness import HeldOut, remainder, told_groups
 from pipeline.criticism.regression.linear_system import System, own_columns
-from pipeline.criticism.selection.score_test import LEAST_SHARE
 from pipeline.criticism.selection.stepwise import Rung
 from pipeline.records.diagnosis import Remainder
-
-_EXPLAINED = 0.5
-"""Share of the misfit, and of held-out power over the floor, that effects found may leave, and
-still explain what is left."""
-_NO_GUESS = 0.2
-"""Share of the held-out error that an effect must take to be named beside an unknown: a tenth of
-heat in a winding looked like skin effect."""
-_COMES_TO = 0.5
-"""Share of the amplitude it should come to that another one must have, or captures deny both."""
-_NOTHING = 0.01
-"""Share of the held-out error that a further effect must take while anything is left."""
 
 
 def trusted(
@@ -36,15 +24,17 @@ def trusted(
     cleared a signal of all waves of the angle; one goes that some captures speak against. A further
     effect also goes if it lowers the held-out error by less than 1 % while anything is left.
     """
+    policy = rungs[0].fitted.policy.selection
     for count in range(len(rungs), 0, -1):
         kept, around = tuple(rungs[:count]), rungs[count - 1].around
         left = remainder(around, found, around.residual)
-        worse = count > 2 and held[count - 1].total > (1.0 - _NOTHING) * held[count - 2].total
+        most = (1.0 - policy.little_share) * held[count - 2].total
+        worse = count > 2 and held[count - 1].total > most
         if count == 1 or not left or (explained(kept, held, left) and not worse):
             break
         if denied(rungs[count - 1]):
             continue
-        if held[count - 1].total < (1.0 - _NO_GUESS) * held[count - 2].total:
+        if held[count - 1].total < (1.0 - policy.guess_share) * held[count - 2].total:
             break
         if not worse and _clears_orders(found, rungs[count - 2].around, around):
             break
@@ -57,13 +47,14 @@ def denied(rung: Rung) -> str:
     (`Parameter.at_least`).
     """
     around, model = rung.around, rung.fitted.model
+    share = rung.fitted.policy.selection.companion_share
     for effect in model.effects:
         if effect.name not in rung.added[-1:]:
             continue
         values = values_of(effect, model.machine, rung.fitted.values)
         for p in effect.parameters_of(model.machine):
             known = np.any(around.matrix[:, around.place([f"{effect.name}.{p.name}"])])
-            if p.at_least and known and values[p.name] < _COMES_TO * values[p.at_least]:
+            if p.at_least and known and values[p.name] < share * values[p.at_least]:
                 other = f"{p.at_least} of {values[p.at_least]:.2g}"
                 return (
                     f"{effect.name} would take much of what is left, but captures speak against "
@@ -96,16 +87,18 @@ def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Rem
     logarithmic: of an equation that is given up at a million floors it takes half to come to a
     thousand.
     """
+    policy = rungs[0].fitted.policy.selection
     first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(rungs) - 1))
-    if last > _EXPLAINED * first:
+    if last > policy.unexplained_share * first:
         return not left
     signals = sorted({r.signal for r in left})
     before, after = (
         np.array([_excess(rung, {name}) for name in signals]) for rung in (rungs[0], rungs[-1])
     )
-    large = before > LEAST_SHARE * before.sum()
-    taken = bool((after[large] <= (1.0 - LEAST_SHARE) * before[large]).all())
-    return not left or (taken and float(after.sum()) < _EXPLAINED * float(before.sum()))
+    large = before > policy.least_share * before.sum()
+    taken = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
+    most = policy.unexplained_share * float(before.sum())
+    return not left or (taken and float(after.sum()) < most)
 
 
 def _excess(rung: Rung, channels: set[str]) -> float:

@@ -9,11 +9,12 @@ import pytest
 
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import Fitted, floors
 from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.selection.drift import SIZE, slowest, wandering, wanders
+from pipeline.criticism.selection.drift import slowest, wandering, wanders
 from tests.unit.criticism.machines import BASE, log, machine
 
 
@@ -41,7 +42,7 @@ def around(segments):
 
 def test_the_slowest_sines_have_the_variance_of_a_random_walk():
     time = np.linspace(0.0, 1.0, 20_001)
-    sines = slowest(3.0 + 7.0 * time)
+    sines = slowest(3.0 + 7.0 * time, 8)
     assert (sines**2).sum(axis=0) == pytest.approx(time, abs=0.03)
     gram = np.trapezoid(sines[:, None] * sines[None], time)
     assert gram - np.diag(np.diag(gram)) == pytest.approx(np.zeros((8, 8)), abs=1e-6)
@@ -96,7 +97,8 @@ def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
 
 
 def test_a_walk_far_beyond_the_noise_stays_a_remainder():
-    segments = (walked(5, "torque_map", 60 * SIZE), walked(6, "drive", 60 * SIZE))
+    size = DEFAULT.selection.drift_size
+    segments = (walked(5, "torque_map", 60 * size), walked(6, "drive", 60 * size))
     fitted, left = around(segments)
     assert wandering(segments, fitted, left) is None
 

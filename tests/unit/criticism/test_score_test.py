@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
 from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates, score_all, widened
@@ -41,7 +42,9 @@ from tests.unit.criticism.machines import BASE, LIBRARY, curved, fitted, log, ma
 def test_what_an_effect_lacks_is_said(what, told):
     effect = effects()[what.pop("effect", "windage")]
     known = {"fall": 60.0, "share": 0.0, "size": 2.0, "quiet": 0.0, **what}
-    score = Score(Candidate(effect, ()), price=15.0, step={}, moves={}, **known)
+    score = Score(
+        Candidate(effect, ()), price=15.0, step={}, moves={}, policy=DEFAULT.selection, **known
+    )
     assert score.shortfall == told
     assert score.passes == (
         told == "refitted, it does not hold on captures held out, or may be zero"

@@ -11,6 +11,7 @@ import pytest
 from pipeline.criticism.diagnosis import _drop, _ranking
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
 from pipeline.criticism.regression.linearise import Column
@@ -87,7 +88,7 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     monkeypatch.setattr("pipeline.criticism.search.in_common", lambda _, alone: list(alone))
     cut = climbed(Begun((log(),), first.fitted, first.around, ()), {}).cut
     assert list(cut) == ["skin_effect"] * (kept == 1)
-    score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0)
+    score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0, policy=DEFAULT.selection)
     (ranked,) = _ranking((replace(first, scores=(score,)),), held[:1], (), {}, (), cut)
     assert ("speak against" in ranked.shortfall) is (kept == 1)
 
@@ -204,7 +205,14 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
     """From where the others are, if what the score foresees does not pay its price of 10."""
     windage, asked = effects()["windage"], []
     score = Score(
-        Candidate(windage, ()), 30.0, 10.0, {"windage.drag_nm": 0.1}, {"r_ohm": 0.1}, 1.0, 2.0
+        Candidate(windage, ()),
+        30.0,
+        10.0,
+        {"windage.drag_nm": 0.1},
+        {"r_ohm": 0.1},
+        1.0,
+        2.0,
+        policy=DEFAULT.selection,
     )
 
     def gauss_newton(_segments, start, before):

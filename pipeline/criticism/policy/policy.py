@@ -1,0 +1,31 @@
+"""The policy of criticism: every number by which a model is fitted, judged and named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.criticism.policy.selection import OrderScan, Selection
+from pipeline.records.policy import Overrides, overrides, section, with_overrides
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Policy:
+    """Constants of judgement by package; `docs/policy.md` lists them."""
+
+    selection: Selection = section(Selection)
+    order_scan: OrderScan = section(OrderScan)
+
+
+DEFAULT = Policy()
+
+
+def policy_of(changes: Overrides) -> Policy:
+    """The default policy with some of its numbers replaced."""
+    return with_overrides(DEFAULT, changes) if changes else DEFAULT
+
+
+def policy_changes(given: Mapping[str, Any]) -> Overrides:
+    """What `conf/policy/NAME.yaml` replaces; raises UsageError for what is no field or number."""
+    return overrides(DEFAULT, given)
