@@ -24,8 +24,9 @@ from pipeline.records.diagnosis import LadderRung, RungError, ToldParameter
 def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRung:
     """One rung for people: held-out errors and maps; angle maps are those of the fit."""
     residual = np.where(np.isfinite(held.residual), held.residual, rung.around.residual)
+    policy = rung.fitted.policy.validation
     errors = window_errors(found, rung.around, residual)
-    flat = (speed_current_map(one) for one in errors)
+    flat = (speed_current_map(one, policy) for one in errors)
     return LadderRung(
         rung.added,
         held.total,
@@ -36,7 +37,7 @@ def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRu
         },
         parameters_of(rung, held),
         (*(one for one in flat if one is not None), *angle_maps(found, rung.fitted)),
-        histograms(errors),
+        histograms(errors, policy),
     )
 
 

@@ -13,6 +13,7 @@ from pipeline.criticism.data.segments import segments
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.regression.linear_system import own_columns
@@ -97,7 +98,7 @@ def ended(
         if calm is not None:
             ladder, left = calm, calm.large()
             sketch = _sketched(ladder, left, name)
-            notes.append(_DRIFT.format(begun.fitted.policy.selection.drift_size))
+            notes.append(_DRIFT.format(policy_of(model.policy).selection.drift_size))
     if sketch is None:
         sketch = _sketched(ladder, left, name, in_parts=True)
         left = left if sketch else ladder.large()

@@ -13,19 +13,20 @@ from typing import Any
 
 from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
+from pipeline.records.policy import Overrides
 
 Diagnose = Callable[[Campaign, str], dict[str, Any]]
 """Campaign and name of the model in, a document of schema model-diagnosis/1 out."""
 
 
-def product(campaign: Campaign, model: str) -> dict[str, Any]:
-    """What `python -m pipeline diagnose` writes for a campaign."""
+def product(campaign: Campaign, model: str, policy: Overrides = ()) -> dict[str, Any]:
+    """What `python -m pipeline diagnose` writes for a campaign; `policy` overrides some numbers."""
     from pipeline.criticism.diagnosis import diagnose
     from pipeline.execution.start import start_constants
     from pipeline.records.comparison import ModelSpec
 
     document: dict[str, Any] = diagnose(
-        campaign, ModelSpec(model), start_constants(campaign)
+        campaign, ModelSpec(model, policy=policy), start_constants(campaign)
     ).document()
     return document
 

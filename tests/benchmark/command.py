@@ -12,10 +12,11 @@ from pipeline.records.errors import UsageError
 from tests.benchmark.blind import product
 from tests.benchmark.cases import Case
 from tests.benchmark.drawing import cases, small
+from tests.benchmark.policy_sensitivity import measure, page, spread
 from tests.benchmark.running import Book, code_digest, run, share_of
 from tests.benchmark.table import by_effect, table
 
-ACTIONS = ("run", "table", "sensitivity")
+ACTIONS = ("run", "table", "sensitivity", "policy")
 SUBSETS = ("small", "full")
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
@@ -24,7 +25,8 @@ BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 class Options:
     """The keys of the command.
 
-    `action`: run, table (of what has been run), or sensitivity (measure a* anew). `output`: folder
+    `action`: run, table (of what has been run), sensitivity (measure a* anew), or policy (halve and
+    double the chosen numbers `fields`, on `count` cases). `output`: folder
     of sealed truths and results. `subset`: small, of minutes, or full, of hours. `shard`: which
     part of the cases to work on, i/n with i from 1. `seed`: of every random draw. `docs`: Markdown
     page to put the table into, between its marks. `date`: date to write over the table.
@@ -37,6 +39,8 @@ class Options:
     seed: int = 1
     docs: str = ""
     date: str = ""
+    fields: str = ""
+    count: int = 8
 
 
 def options(words: Sequence[str]) -> Options:
@@ -47,9 +51,9 @@ def options(words: Sequence[str]) -> Options:
         key, sign, value = word.partition("=")
         if not sign or key not in known:
             raise UsageError(f"{word!r} is no key=value", f"known keys are {', '.join(known)}")
-        if key == "seed" and not value.isdecimal():
-            raise UsageError(f"{word} is no whole number", "write seed= and a whole number")
-        given[key] = int(value) if key == "seed" else value
+        if known[key] == "int" and not value.isdecimal():
+            raise UsageError(f"{word} is no whole number", f"write {key}= and a whole number")
+        given[key] = int(value) if known[key] == "int" else value
     return Options(**given)
 
 
@@ -68,6 +72,8 @@ def main(chosen: Options) -> str:
     book = Book(output, code_digest())
     drawn = list(cases(chosen.seed, output / "sensitivity"))
     wanted = small(iter(drawn)) if chosen.subset == "small" else drawn
+    if chosen.action == "policy":
+        return _policy(chosen, spread(wanted, chosen.count), book)
     done = 0
     if chosen.action == "run":
         try:
@@ -78,6 +84,16 @@ def main(chosen: Options) -> str:
     text = _table(chosen, book, wanted)
     if chosen.docs:
         _into_page(Path(chosen.docs), text)
+    return f"{done} cases diagnosed\n\n{text}"
+
+
+def _policy(chosen: Options, some: list[Case], book: Book) -> str:
+    """Halves and doubles the fields, and writes the table of all that has been run."""
+    fields = [name for name in chosen.fields.split(",") if name]
+    done = measure(some, book, fields)
+    text = page(some, book, fields, chosen.seed)
+    if chosen.docs:
+        write_whole(Path(chosen.docs), text.encode())
     return f"{done} cases diagnosed\n\n{text}"
 
 

@@ -24,7 +24,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "Tutorials": ("notebooks/*", "tutorial-effect"),
     "How to": ("recorder-forms", "review", "registry", "export", "lots", "fleet"),
     "Explanation": ("criticism", "uncertainty", "simulator", "real-recordings"),
-    "Reference": ("api", "glossary", "gallery"),
+    "Reference": ("api", "glossary", "policy", "gallery"),
     "Project": ("contributing", "changelog", "decisions/index"),
 }
 """The pages of the side bar; those that are in no group are under `REST`."""

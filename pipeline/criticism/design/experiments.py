@@ -18,35 +18,27 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, chndtr
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.design.planned_tests import PLANNED, planned
+from pipeline.criticism.design.planned_tests import PLANNED, planned, planned_words
 from pipeline.criticism.effect import Array, Effect
+from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
 from pipeline.criticism.regression.linearise import Column, linearise
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.selection.score_test import Candidate
 from pipeline.records.diagnosis import Separation
 
-_LEVEL = 0.01
-"""Probability of a false alarm of the test whose power is told."""
-_REPEATS = 4
-"""Recordings of a test that a repeat makes of one: they halve its noise."""
-_CALIBRATED = 2e-3
-"""Standard uncertainty of a calibrated instrument, as a share: as the words below say."""
 _GAIN_WORDS = {
-    "gain_current": "the drive's current sensors calibrated to 0.2 %",
-    "gain_current_bench": "the bench's ammeter calibrated to 0.2 %",
-    "gain_voltage": "the bench's voltmeters calibrated to 0.2 %",
-    "gain_commanded": "the drive's voltage calibrated to 0.2 %",
-    "gain_torque": "the torque transducer calibrated to 0.2 %",
+    "gain_current": "the drive's current sensors calibrated to {:g} %",
+    "gain_current_bench": "the bench's ammeter calibrated to {:g} %",
+    "gain_voltage": "the bench's voltmeters calibrated to {:g} %",
+    "gain_commanded": "the drive's voltage calibrated to {:g} %",
+    "gain_torque": "the torque transducer calibrated to {:g} %",
 }
 _KNOWN_WORDS = {
-    "r_ohm": "the phase resistance known to 0.2 % (four-wire meter)",
-    "psi_wb": "the magnet's flux known to 0.2 % (back-EMF with a calibrated meter)",
+    "r_ohm": "the phase resistance known to {:g} % (four-wire meter)",
+    "psi_wb": "the magnet's flux known to {:g} % (back-EMF with a calibrated meter)",
 }
 _SEED = 20260303
-_MOST, _WORTH = 3, 0.02
-"""Experiments that are told at the most, and the power that one must add. By judgement: a longer
-list is not read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +64,7 @@ def separations(
     together. If no experiment that can be predicted helps, the one in `remedies`, which the effects
     themselves declare, is told without a power.
     """
+    policy = fitted.policy.design
     told: list[Separation] = []
     for other in against:
         columns = _nearest(effect, other, fitted, wide, offered)
@@ -79,24 +72,26 @@ def separations(
             continue
         now, places = _now(effect, columns, fitted, wide)
         freedom = effect.dof(fitted.model.machine)
-        base = _power(_noncentrality(now), freedom)
+        base = _power(_noncentrality(now), freedom, policy)
         ranked = sorted(
             (
-                (_power(_noncentrality(now + plan.normal), freedom), plan.words)
+                (_power(_noncentrality(now + plan.normal), freedom, policy), plan.words)
                 for plan in _plans(effect, places, fitted, wide, segments)
             ),
             key=lambda one: (-one[0], one[1]),
         )
-        better = [(power, words) for power, words in ranked if power > base + _WORTH][:_MOST]
+        better = [(power, words) for power, words in ranked if power > base + policy.least_power][
+            : policy.most_experiments
+        ]
         told += [Separation(other, words, power) for power, words in better]
         if not better and other in remedies:
             told.append(Separation(other, remedies[other], None))
     return tuple(told)
 
 
-def _power(noncentrality: float, freedom: int) -> float:
+def _power(noncentrality: float, freedom: int, policy: Design) -> float:
     """Probability that a χ² test at the 1 % level sees a noncentrality."""
-    limit = float(chdtri(freedom, _LEVEL))
+    limit = float(chdtri(freedom, policy.false_alarm))
     return float(np.clip(1.0 - chndtr(limit, freedom, max(noncentrality, 0.0)), 0.0, 1.0))
 
 
@@ -161,6 +156,7 @@ def _plans(
     segments: Sequence[Segment],
 ) -> Iterator[Plan]:
     """Every experiment whose outcome can be predicted: repeats, tests not done, calibrations."""
+    policy = fitted.policy.design
     amplitudes = _amplitudes(effect, wide.columns, fitted)
     weight = wide.weights(wide.spreads(wide.residual))
     test = np.array([wide.tests[number] for number, _, _ in wide.labels])[wide.group]
@@ -168,17 +164,18 @@ def _plans(
         rows = test == name
         matrix = _stacked(wide.matrix[rows], amplitudes, places)
         once = (matrix * weight[rows, None]).T @ matrix
-        yield Plan(f"{name} recorded {_REPEATS} times", (_REPEATS - 1) * once)
-    for name, words in PLANNED.items():
+        yield Plan(f"{name} recorded {policy.repeats} times", (policy.repeats - 1) * once)
+    for name in PLANNED:
         if name not in wide.tests:
             rows_of = _planned_rows(name, fitted, wide.columns, segments)
             if rows_of is not None:
                 matrix = _stacked(rows_of, amplitudes, places)
-                yield Plan(words, matrix.T @ matrix)
+                yield Plan(planned_words(name, policy), matrix.T @ matrix)
     yield from _calibrations(places, fitted, wide)
 
 
 def _calibrations(places: NDArray[np.int64], fitted: Fitted, wide: System) -> Iterator[Plan]:
+    policy = fitted.policy.design
     for place, column in enumerate(places):
         name = wide.columns[column].name
         if name in _GAIN_WORDS:
@@ -188,8 +185,8 @@ def _calibrations(places: NDArray[np.int64], fitted: Fitted, wide: System) -> It
         else:
             continue
         normal = np.zeros((places.size + 1, places.size + 1))
-        normal[place + 1, place + 1] = (_CALIBRATED * size) ** -2.0 if size > 0.0 else 0.0
-        yield Plan(words, normal)
+        normal[place + 1, place + 1] = (policy.calibrated_u * size) ** -2.0 if size > 0.0 else 0.0
+        yield Plan(words.format(100.0 * policy.calibrated_u), normal)
 
 
 def _planned_rows(

@@ -11,35 +11,29 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment, electrical_orders, slow_orders
 from pipeline.criticism.effect import Array
 from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import Fitted
 from pipeline.numerics.projection import projection, window_starts
 
 PLANNED = {
-    "torque_map": "a torque map at 30 % and 80 % of full speed, in both senses",
+    "torque_map": "a torque map at {} of full speed, in both senses",
     "spin_down": "a spin_down from full speed to a tenth of it",
     "cogging": "a slow turn (cogging) in both directions",
 }
-_SPEEDS = (0.3, 0.8, -0.3, -0.8)
-_ID_LEVELS = (-0.4, 0.0)
-_IQ_LEVELS = (-0.9, -0.45, 0.0, 0.45, 0.9)
-_DWELL = 800
-"""A torque map as benches run it: shares of the largest speed and current, samples a level."""
-_SLOW_RAD_S = 2.0
-_SAMPLES_AN_ORDER = 24
-"""A slow turn: speed [rad/s], and samples a wave of the highest order."""
-_COAST = 1200
-"""Samples of a spin-down. Lengths of all three are by judgement: the power that is told of an
-experiment grows with them."""
 _NOISE = {
-    "id_a": (5e-4, "current_a"),
-    "iq_a": (5e-4, "current_a"),
-    "vd_v": (5e-4, "voltage_v"),
-    "vq_v": (5e-4, "voltage_v"),
-    "torque_shaft_nm": (1e-3, "torque_nm"),
+    "id_a": ("noise_current", "current_a"),
+    "iq_a": ("noise_current", "current_a"),
+    "vd_v": ("noise_voltage", "voltage_v"),
+    "vq_v": ("noise_voltage", "voltage_v"),
+    "torque_shaft_nm": ("noise_torque", "torque_nm"),
 }
-_ANGLE_NOISE_RAD = 2e-5
-"""Noise of sensors that the captures at hand do not tell, as a share of a machine's scale, and of
-the angle [rad]: rounding of an encoder of 17 bits is 1.4e-5."""
+"""Field of the policy with the noise of a sensor that the captures do not show, and its scale."""
+
+
+def planned_words(test: str, policy: Design) -> str:
+    """What one of `PLANNED` is, for people."""
+    speeds = (f"{100.0 * speed:g} %" for speed in policy.map_speeds if speed > 0.0)
+    return PLANNED[test].format(" and ".join(speeds))
 
 
 def planned(test: str, fitted: Fitted, segments: Sequence[Segment]) -> tuple[Segment, ...]:
@@ -64,8 +58,9 @@ def _obeying(segment: Segment, fitted: Fitted) -> Segment:
 
 def _noise(fitted: Fitted, segments: Sequence[Segment]) -> Mapping[str, float]:
     scales = fitted.model.machine.scales
-    found = {name: share * scales[scale] for name, (share, scale) in _NOISE.items()}
-    found["theta_mech_rad"] = _ANGLE_NOISE_RAD
+    policy = fitted.policy.design
+    found = {n: getattr(policy, field) * scales[scale] for n, (field, scale) in _NOISE.items()}
+    found["theta_mech_rad"] = policy.noise_angle_rad
     for segment in segments:
         for name in (*_NOISE, "theta_mech_rad"):
             if segment.noise.get(name, 0.0) > 0.0:
@@ -74,14 +69,14 @@ def _noise(fitted: Fitted, segments: Sequence[Segment]) -> Mapping[str, float]:
 
 
 def _torque_map(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
-    machine = fitted.model.machine
+    machine, policy = fitted.model.machine, fitted.policy.design
     period = machine.scales["period_s"]
-    levels = [(d, q) for d in _ID_LEVELS for q in _IQ_LEVELS]
-    i_d, i_q = (np.repeat([pair[k] for pair in levels], _DWELL) for k in (0, 1))
+    levels = [(d, q) for d in policy.map_id for q in policy.map_iq]
+    i_d, i_q = (np.repeat([pair[k] for pair in levels], policy.map_samples) for k in (0, 1))
     current = machine.scales["current_a"]
-    keep = np.tile(np.arange(_DWELL) > _DWELL // 4, len(levels))
+    keep = np.tile(np.arange(policy.map_samples) > policy.map_samples // 4, len(levels))
     made = []
-    for speed in _SPEEDS:
+    for speed in policy.map_speeds:
         theta = speed * machine.scales["speed_rad_s"] * period * np.arange(i_d.size, dtype=float)
         recorded = {
             "id_a": current * i_d,
@@ -91,7 +86,7 @@ def _torque_map(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
             "theta_mech_rad": theta,
             "torque_shaft_nm": np.zeros(i_d.size),
         }
-        window = _DWELL // 2
+        window = policy.map_samples // 2
         weak = projection(theta, window_starts(keep, window), window, electrical_orders(machine))
         channels = ("vd_v", "vq_v", "torque_shaft_nm")
         made.append(
@@ -137,14 +132,14 @@ def _shaft(
 
 def _spin_down(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     """A coast from full speed under the model's own friction, b ω + T_c."""
-    scales, values = fitted.model.machine.scales, fitted.values
+    scales, values, policy = fitted.model.machine.scales, fitted.values, fitted.policy.design
     top, b = scales["speed_rad_s"], max(values["b_nm_s_rad"], 1e-9)
     dry = max(values.get("coulomb_friction.torque_nm", 0.0), 0.0)
     tau = values["j_kgm2"] / b
     rest = dry / b
     length = tau * math.log((top + rest) / (0.1 * top + rest))
-    period = length / _COAST
-    t = period * np.arange(_COAST)
+    period = length / policy.coast_samples
+    t = period * np.arange(policy.coast_samples)
     theta: Array = (top + rest) * tau * (1.0 - np.exp(-t / tau)) - rest * t
     return [
         _shaft(
@@ -161,10 +156,10 @@ def _spin_down(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
 
 
 def _cogging(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
-    orders = slow_orders(fitted.model.machine)
-    n = _SAMPLES_AN_ORDER * max(orders)
-    period = 2 * math.pi / _SLOW_RAD_S / n
-    theta = _SLOW_RAD_S * period * np.arange(n + 3, dtype=float)
+    orders, policy = slow_orders(fitted.model.machine), fitted.policy.design
+    n = policy.samples_an_order * max(orders)
+    period = 2 * math.pi / policy.slow_rad_s / n
+    theta = policy.slow_rad_s * period * np.arange(n + 3, dtype=float)
     return [
         _shaft(
             f"planned cogging {sign}",

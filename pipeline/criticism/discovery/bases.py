@@ -11,23 +11,11 @@ from typing import Any
 import numpy as np
 
 from pipeline.criticism.effect import Array, Machine, Operating
+from pipeline.criticism.policy.discovery import Discovery
 
 TURN_RAD = 2.0 * math.pi
-_BEND = 1.6
-"""Exponent that crowds the knots near zero, where friction bends most. By judgement: at 1 they are
-even, at 3 the upper half of the range has two."""
-_PIECES = 8
-"""Knots of the smooth curve of one sign. By judgement: fewer miss a bump, each one more costs."""
-_NODES, _TURN_NODES = 40, 48
-"""Hats of one sign, and of a turn (7.5° each). By judgement: hats that are too wide round off what
-a sketch may say, and the cost goes with their number."""
-_WARM_K = (-15.0, 0.0, 10.0, 20.0, 35.0, 55.0, 80.0, 110.0)
-"""Knots over 25 °C [K], from a cold hall to a hot winding: by judgement closer where most
-recordings are."""
 _EDGE = 1e-9
 """First hat, as a share of the range: beside zero and not at it, where friction jumps."""
-LOWEST = tuple(range(1, 9))
-"""Orders a turn that are offered on every machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,19 +104,19 @@ def _turn(column: str, field: str) -> Variable:
     return Variable(column, (column,), "rad", "turn", TURN_RAD, f"x.{field}", attrgetter(field))
 
 
-def coarse(variable: Variable, machine: Machine) -> Basis:
+def coarse(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
     """A few smooth curves, enough to see whether and how something depends on the variable.
 
     A signed variable has a spline for each sign, since friction jumps at zero.
     """
     if variable.kind == "turn":
-        return waves(_orders(variable, machine))
-    nodes = _nodes(variable)
+        return waves(_orders(variable, machine, policy))
+    nodes = _nodes(variable, policy)
     if variable.kind == "warm":
-        mix = _cardinal(np.array(_WARM_K), nodes)
+        mix = _cardinal(np.array(policy.warm_knots_k), nodes)
     else:
         # natural splines of the size itself hold a straight line, which friction has too
-        knots = variable.top * np.linspace(0.0, 1.0, _PIECES) ** _BEND
+        knots = variable.top * np.linspace(0.0, 1.0, policy.knots) ** policy.knot_exponent
         half = _cardinal(knots, np.abs(nodes))
         sides = [nodes > 0.0] if variable.kind == "size" else [nodes < 0.0, nodes > 0.0]
         mix = np.concatenate([half * side[:, None] for side in sides], axis=1)
@@ -136,13 +124,13 @@ def coarse(variable: Variable, machine: Machine) -> Basis:
     return Basis(names, nodes, mix, (), None)
 
 
-def fine(variable: Variable, machine: Machine) -> Basis:
+def fine(variable: Variable, machine: Machine, policy: Discovery) -> Basis:
     """Hats narrow enough for any curve that the sketch may try, and the waves they miss."""
-    nodes = _nodes(variable)
+    nodes = _nodes(variable, policy)
     periodic = variable.kind == "turn"
     high: tuple[float, ...] = ()
     if periodic:
-        high = tuple(k for k in _orders(variable, machine) if k not in LOWEST)
+        high = tuple(k for k in _orders(variable, machine, policy) if k not in _lowest(policy))
     names = tuple(f"k{n}" for n in range(nodes.size)) + _wave_names(high)
     return Basis(names, nodes, np.eye(nodes.size), high, TURN_RAD if periodic else None)
 
@@ -156,21 +144,28 @@ def _wave_names(orders: tuple[float, ...]) -> tuple[str, ...]:
     return tuple(f"{wave}{k}" for k in orders for wave in ("sin", "cos"))
 
 
-def _orders(variable: Variable, machine: Machine) -> tuple[float, ...]:
+def _lowest(policy: Discovery) -> tuple[int, ...]:
+    """Orders a turn that are offered on every machine."""
+    return tuple(range(1, policy.orders + 1))
+
+
+def _orders(variable: Variable, machine: Machine, policy: Discovery) -> tuple[float, ...]:
     if variable.name == "theta_elec_rad":
-        return (*LOWEST, 12)
+        return (*_lowest(policy), 12)
     p = machine.pole_pairs
     slots = {order for order in (machine.slots, machine.cogging_order) if order}
     seen = slots.union(machine.torque_orders, machine.load_orders)
-    return tuple(sorted(seen.union(LOWEST, (p, 2 * p, 6 * p))))
+    return tuple(sorted(seen.union(_lowest(policy), (p, 2 * p, 6 * p))))
 
 
-def _nodes(variable: Variable) -> Array:
+def _nodes(variable: Variable, policy: Discovery) -> Array:
     if variable.kind == "turn":
-        return TURN_RAD * np.arange(_TURN_NODES) / _TURN_NODES
+        return TURN_RAD * np.arange(policy.turn_hats) / policy.turn_hats
     if variable.kind == "warm":
-        return np.linspace(_WARM_K[0], _WARM_K[-1], 2 * _NODES)
-    half = variable.top * np.maximum(np.linspace(0.0, 1.0, _NODES) ** _BEND, _EDGE)
+        return np.linspace(policy.warm_knots_k[0], policy.warm_knots_k[-1], 2 * policy.hats)
+    half = variable.top * np.maximum(
+        np.linspace(0.0, 1.0, policy.hats) ** policy.knot_exponent, _EDGE
+    )
     return half if variable.kind == "size" else np.concatenate([-half[::-1], half])
 
 

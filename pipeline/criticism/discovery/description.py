@@ -11,19 +11,11 @@ from pipeline.criticism.discovery.effect_source import effect_source
 from pipeline.criticism.discovery.matching_pursuit import Expression, Pursuit, curve_about
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.discovery import Discovery
 from pipeline.records.diagnosis import CurvePoint, UnknownStructure
 
 _POINTS, _TURN_POINTS, _DENSE = 17, 48, 2001
 """Points of a curve that is told, of one over a turn, and of one that is looked at."""
-_SURE = 1.96
-"""Standard uncertainties to either side of a band of 95 %."""
-_ONE_SIDED, _SLACK = 0.1, 0.05
-"""Share of a curve's size that it may miss its own mirror image by to be called odd or even, and
-part of the range around zero that is not asked: friction jumps there. By judgement."""
-_INSIDE = 0.97
-_TAIL, _LEVEL = 0.1, 0.02
-"""Part of a range up to which a maximum lies inside it; the last part of a range, and the share of
-a change in it that is none. By judgement: they choose words and nothing else."""
 _WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
 
@@ -44,7 +36,7 @@ def told(
     port = pursuit.port
     carrier = _leading(pursuit, found)
     curve = _curve(pursuit, found, smooth, carrier)
-    shape = _shape(port, curve, found, carrier, others)
+    shape = _shape(pursuit, curve, found, carrier, others)
     size = pursuit.around.around.model.machine.scales["current_a"]
     return UnknownStructure(
         signal=_signal(port, carrier, signals),
@@ -59,7 +51,7 @@ def told(
         times="" if not port.carriers else port.carriers[carrier].words,
         alternatives=tuple(others),
         effect=name,
-        source=effect_source(port, found, name, shape, size),
+        source=effect_source(port, found, name, shape, size, pursuit.policy),
     )
 
 
@@ -96,7 +88,7 @@ def _visited(pursuit: Pursuit) -> tuple[float, float]:
         return 0.0, 2 * np.pi
     hats = pursuit.around.matrix[:, pursuit.own : pursuit.own + basis.nodes.size]
     seen = np.abs(hats).max(axis=0)
-    live = np.flatnonzero(seen > 1e-3 * seen.max())
+    live = np.flatnonzero(seen > pursuit.policy.visited_share * seen.max())
     return float(basis.nodes[live[0]]), float(basis.nodes[live[-1]])
 
 
@@ -115,7 +107,12 @@ def _curve(
         at = np.linspace(low, high, _POINTS)
     value, spread = curve_about(pursuit, found, _smooth_in_hats(pursuit, smooth), at, carrier)
     return tuple(
-        CurvePoint(float(a), float(v), float(v - _SURE * u), float(v + _SURE * u))
+        CurvePoint(
+            float(a),
+            float(v),
+            float(v - pursuit.policy.sure_u * u),
+            float(v + pursuit.policy.sure_u * u),
+        )
         for a, v, u in zip(at, value, spread, strict=True)
     )
 
@@ -159,30 +156,38 @@ def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:
     if best is None:
         return ()
     return tuple(
-        CurvePoint(float(size * a), float(v), float(v - _SURE * u), float(v + _SURE * u))
+        CurvePoint(
+            float(size * a),
+            float(v),
+            float(v - pursuit.policy.sure_u * u),
+            float(v + pursuit.policy.sure_u * u),
+        )
         for a, v, u in zip(at, best[1], best[2], strict=True)
     )
 
 
 def _shape(
-    port: Port,
+    pursuit: Pursuit,
     curve: Sequence[CurvePoint],
     found: Expression,
     carrier: int,
     others: Sequence[tuple[tuple[str, ...], float]],
 ) -> str:
     """The curve in words: parity, where it is largest, and what else would explain as much."""
+    port = pursuit.port
     words = port.effect.words
     variable = port.variable
     if variable is not None and curve:
-        words += f": {_run(port, curve, found, carrier)}"
+        words += f": {_run(port, curve, found, carrier, pursuit.policy)}"
     if others:
         listed = "; ".join(" and ".join(columns) for columns, _ in others)
         words += f"; the captures would be explained nearly as well by {listed}"
     return words
 
 
-def _run(port: Port, curve: Sequence[CurvePoint], found: Expression, carrier: int) -> str:
+def _run(
+    port: Port, curve: Sequence[CurvePoint], found: Expression, carrier: int, policy: Discovery
+) -> str:
     variable = port.variable
     if variable is None:
         raise ValueError("a port without a variable has no curve")
@@ -198,32 +203,34 @@ def _run(port: Port, curve: Sequence[CurvePoint], found: Expression, carrier: in
     place = f"{abs(values[top]):.3g} {port.unit} at {at}"
     if variable.kind == "turn":
         return f"at most {place}"
-    parity = _parity(dense, values) if variable.kind == "signed" else ""
-    return f"{parity}{'largest,' if warm else _ending(dense, np.abs(values))} {place}"
+    parity = _parity(dense, values, policy) if variable.kind == "signed" else ""
+    return f"{parity}{'largest,' if warm else _ending(dense, np.abs(values), policy)} {place}"
 
 
-def _ending(at: Array, size: Array) -> str:
+def _ending(at: Array, size: Array, policy: Discovery) -> str:
     """How a curve's size [n] runs out where its variable is largest."""
     top = int(np.argmax(size))
     end = 0 if abs(at[0]) > abs(at[-1]) or (at[0] < 0.0 and top == 0) else -1
-    before = float(np.interp(at[end] - _TAIL * (at[end] - at[-1 - end]), at, size))
-    level = size[end] <= (1.0 + _LEVEL) * before
-    if level and size[end] >= (1.0 - _LEVEL) * size[top]:
+    before = float(np.interp(at[end] - policy.tail_share * (at[end] - at[-1 - end]), at, size))
+    level = size[end] <= (1.0 + policy.level_share) * before
+    if level and size[end] >= (1.0 - policy.level_share) * size[top]:
         return "level towards the end of the range,"
-    if abs(at[top]) < _INSIDE * abs(at[end]):
+    if abs(at[top]) < policy.inside_share * abs(at[end]):
         return "largest," if top == 0 else "with its maximum"
     return "largest," if level else "still growing at the end of the range,"
 
 
-def _parity(at: Array, values: Array) -> str:
+def _parity(at: Array, values: Array, policy: Discovery) -> str:
     mirrored = np.interp(-at, at, values)
-    both = (np.abs(at) <= min(abs(at[0]), abs(at[-1]))) & (np.abs(at) > _SLACK * np.abs(at).max())
+    both = (np.abs(at) <= min(abs(at[0]), abs(at[-1]))) & (
+        np.abs(at) > policy.jump_share * np.abs(at).max()
+    )
     if at[0] >= 0.0 or at[-1] <= 0.0 or not both.any():
         return ""
     span = float(np.abs(values).max())
-    if float(np.abs(values + mirrored)[both].max()) < _ONE_SIDED * span:
+    if float(np.abs(values + mirrored)[both].max()) < policy.parity_share * span:
         return "odd, "
-    if float(np.abs(values - mirrored)[both].max()) < _ONE_SIDED * span:
+    if float(np.abs(values - mirrored)[both].max()) < policy.parity_share * span:
         return "even, "
     return "neither odd nor even, "
 

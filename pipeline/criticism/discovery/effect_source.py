@@ -8,11 +8,9 @@ from collections.abc import Iterator
 from pipeline.criticism.discovery.dictionary import CENTRED, POWER, Term
 from pipeline.criticism.discovery.matching_pursuit import Expression
 from pipeline.criticism.discovery.residual_inputs import Port
+from pipeline.criticism.policy.discovery import Discovery
 
 _SUFFIX = {"torque": "nm", "drop": "v", "flux": "wb"}
-_REACH, _STEP = 30.0, 0.01
-"""Bounds and negligible size of a sketched parameter, in multiples of the value found. By
-judgement: wide enough for a user's own form, and a hundredth of a drag is nobody's concern."""
 _TESTS = {"torque": "torque_map", "drop": "torque_map", "flux": "torque_map"}
 _HEAD = '''"""{title}
 
@@ -37,12 +35,14 @@ from pipeline.criticism.effect import {imports}
 '''
 
 
-def effect_source(port: Port, found: Expression, name: str, shape: str, current_a: float) -> str:
+def effect_source(
+    port: Port, found: Expression, name: str, shape: str, current_a: float, policy: Discovery
+) -> str:
     """Source of `NAME.py` with one `EFFECT`, which `compare` can use as it stands.
 
     Amplitudes start at zero and scales at what was found, as in every effect.
     """
-    lines = [*_body(port, found, current_a), "", "", *_effect(port, found, name, shape)]
+    lines = [*_body(port, found, current_a), "", "", *_effect(port, found, name, shape, policy)]
     kinds = {"torque": "Array", "drop": "Complex", "flux": "Any"}[port.hook]
     listed = ["Effect", "Operating", "Parameter", "Values"]
     head = _HEAD
@@ -108,7 +108,9 @@ def _centre(port: Port, n: int) -> str:
     return f"centre{n + 1}_{unit.replace('/', '_').lower()}"
 
 
-def _effect(port: Port, found: Expression, name: str, shape: str) -> Iterator[str]:
+def _effect(
+    port: Port, found: Expression, name: str, shape: str, policy: Discovery
+) -> Iterator[str]:
     yield "EFFECT = Effect("
     yield f"    name={_quoted(name)},"
     yield f"    words={_quoted(port.effect.words)},"
@@ -118,32 +120,34 @@ def _effect(port: Port, found: Expression, name: str, shape: str) -> Iterator[st
     yield '    reference="edit: where the formula comes from",'
     yield "    parameters=("
     for n, term in enumerate(found.terms):
-        yield from _parameters(port, n, term, float(found.amplitudes[n]))
+        yield from _parameters(port, n, term, float(found.amplitudes[n]), policy)
     yield "    ),"
     hook = {"torque": "torque", "drop": "drop", "flux": "coenergy"}[port.hook]
     yield f"    {hook}=_value,"
     yield ")"
 
 
-def _parameters(port: Port, n: int, term: Term, amplitude: float) -> Iterator[str]:
+def _parameters(
+    port: Port, n: int, term: Term, amplitude: float, policy: Discovery
+) -> Iterator[str]:
     size = abs(amplitude)
-    reach = _REACH * size
+    reach = policy.bounds_factor * size
     yield (
         f"        Parameter({_quoted(_amplitude(port, n))}, {_quoted(port.unit)}, {size:.4g}, "
-        f"{_STEP * size:.4g}, low=-{reach:.4g}, high={reach:.4g}),"
+        f"{policy.negligible_share * size:.4g}, low=-{reach:.4g}, high={reach:.4g}),"
     )
     if "centre" in term.free:
         turning = term.kind not in CENTRED
         start = term.centre % (2 * math.pi) if turning else term.centre
         least = 0.001 if turning else 0.0
-        low, high = (-7.0, 14.0) if turning else (0.0, _REACH * start)
+        low, high = (-7.0, 14.0) if turning else (0.0, policy.bounds_factor * start)
         unit = "rad" if port.variable is None else port.variable.unit
         yield (
             f"        Parameter({_quoted(_centre(port, n))}, {_quoted(unit)}, 1.0, {least:g}, "
             f"low={low:.4g}, high={high:.4g}, scan=({start:.6g},)),"
         )
     if "scale" in term.free and port.variable is not None:
-        low, high = term.scale / _REACH, term.scale * _REACH
+        low, high = term.scale / policy.bounds_factor, term.scale * policy.bounds_factor
         yield (
             f"        Parameter({_quoted(_scale(port, n))}, {_quoted(port.variable.unit)}, "
             f"{term.scale:.4g}, 0.0, low={low:.4g}, high={high:.4g}, scan=({term.scale:.6g},)),"

@@ -22,23 +22,9 @@ from pipeline.criticism.discovery.bases import Variable
 from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVES, Term
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.regression.linear_system import System
 
-_MOST, _WORTH = 4, 0.01
-"""Groups of terms at the most, and the share of the whole gain that one must add. By judgement: a
-longer formula is the curve once more, and says nothing."""
-_TRIED = 6
-"""Groups whose scales are refined at each step. By judgement: each costs a search."""
-_SCALES = 18
-"""Trial scales from a hundredth to twice the range, a third apart: refining goes on from there."""
-_CENTRES = 24
-_WIDTHS_RAD = (0.15, 0.3, 0.6, 1.2)
-"""Places a turn at which a bump is tried, and its widths [rad]: neighbours overlap."""
-_PARTS = (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9)
-_PARTS_WIDE = (0.03, 0.06, 0.12, 0.25)
-"""Where in its range a variable may have a hump, and how wide it may be, as shares of the range."""
-_ROUNDS, _SETTLED = 12, 0.3
-"""Renewals of the weights at the most, and the change of −2 log L that ends them, as in `grams`."""
 _RIDGE = 1e-9
 """Share of a curve's own information that is added to it: two curves of one shape do not run away,
 and no amplitude moves by more than that."""
@@ -109,6 +95,7 @@ class Pursuit:
     def __init__(self, around: System, own: int, port: Port, weight: Array) -> None:
         self.around, self.own, self.port = around, own, port
         self.weight = weight
+        self.policy = around.policy.discovery
         self.price = math.log(around.size)
         hats = around.matrix[:, own:]
         mine, pull = around.matrix[:, :own], around.pull[:own]
@@ -168,7 +155,7 @@ class Pursuit:
         weight, before = self.weight, np.inf
         step, left, now = np.zeros(matrix.shape[1]), around.residual, np.inf
         places = np.arange(own)
-        for _ in range(_ROUNDS):
+        for _ in range(self.policy.most_rounds):
             weighted = matrix * weight[:, None]
             normal = weighted.T @ matrix + np.diag(penalty)
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
@@ -178,7 +165,7 @@ class Pursuit:
             spreads = around.spreads(left)
             now = around.misfit_of(spreads) + float(around.prior_costs(places, step[:own]).sum())
             weight = around.weights(spreads)
-            if abs(before - now) < _SETTLED:
+            if abs(before - now) < around.policy.fit.settled:
                 break
             before = now
         return step[:own], step[own:], left, now
@@ -192,12 +179,13 @@ def _balanced(normal: Array) -> Array:
 
 def expression(pursuit: Pursuit) -> Expression:
     """The expression at which the Bayesian information criterion [2] stops; four steps at most."""
+    policy = pursuit.policy
     chosen: list[Group] = []
     none = pursuit.curves([])
     best = pursuit.fitted(none)
     start = cost = best[3]
-    offered = list(_dictionary(pursuit.port))
-    for _ in range(_MOST):
+    offered = list(_dictionary(pursuit.port, policy))
+    for _ in range(policy.most_groups):
         flat = [t for group in chosen for t in group]
         tried = [
             (*_judged(pursuit, [*chosen, group]), [*chosen, group])
@@ -207,7 +195,7 @@ def expression(pursuit: Pursuit) -> Expression:
         if not tried:
             break
         now = tried[0][0]
-        if cost - now < max(pursuit.around.policy.selection.tie, _WORTH * (start - now)):
+        if cost - now < max(pursuit.around.policy.selection.tie, policy.least_gain * (start - now)):
             break
         chosen, cost = tried[0][1], now
     return _finished(pursuit, chosen, start)
@@ -225,7 +213,7 @@ def _promising(pursuit: Pursuit, known: Sequence[Term], offered: Sequence[Group]
         if gain > best.get(key, (0.0, group))[0]:
             best[key] = gain, group
     ranked = sorted(best.values(), key=lambda one: -one[0])
-    return [group for _, group in ranked[:_TRIED]]
+    return [group for _, group in ranked[: pursuit.policy.refined]]
 
 
 def _judged(pursuit: Pursuit, groups: Sequence[Group]) -> tuple[float, list[Group]]:
@@ -264,6 +252,7 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
         curves = pursuit.curves([t for group in moved(z) for t in group])
         return -pursuit._fall(curves) / size
 
+    reach = pursuit.policy.refining_reach
     from scipy.optimize import minimize  # dear to import, and seldom asked for
 
     size = max(abs(pursuit._fall(pursuit.curves([t for g in groups for t in g]))), 1e-300)
@@ -271,13 +260,13 @@ def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
         loss,
         np.zeros(len(places)),
         method="L-BFGS-B",
-        bounds=[(-1.2, 1.2)] * len(places),
+        bounds=[(-reach, reach)] * len(places),
         options={"ftol": 1e-14, "gtol": 1e-12},
     )
     return moved(found.x) if found.fun <= loss(np.zeros(len(places))) else list(groups)
 
 
-def _dictionary(port: Port) -> Iterator[Group]:
+def _dictionary(port: Port, policy: Discovery) -> Iterator[Group]:
     """Every group of terms offered for a port, at trial scales."""
     variable, basis = port.variable, port.basis
     if variable is None or basis is None:
@@ -285,29 +274,31 @@ def _dictionary(port: Port) -> Iterator[Group]:
         return
     for carrier in range(len(port.carriers)):
         if variable.kind == "turn":
-            yield from _turning(basis.orders, bool(basis.nodes.size), carrier)
+            yield from _turning(basis.orders, bool(basis.nodes.size), carrier, policy)
         else:
-            yield from _shapes(variable, carrier)
+            yield from _shapes(variable, carrier, policy)
 
 
-def _turning(orders: tuple[float, ...], curved: bool, carrier: int) -> Iterator[Group]:
-    for k in (*(range(1, 9) if curved else ()), *orders):
+def _turning(
+    orders: tuple[float, ...], curved: bool, carrier: int, policy: Discovery
+) -> Iterator[Group]:
+    for k in (*(range(1, policy.orders + 1) if curved else ()), *orders):
         yield Term("sin", carrier, order=k), Term("cos", carrier, order=k)
     if curved:
-        for n in range(_CENTRES):
-            for width in _WIDTHS_RAD:
-                yield (Term("bump", carrier, scale=width, centre=2 * math.pi * n / _CENTRES),)
+        for n in range(policy.centres):
+            for width in policy.widths_rad:
+                yield (Term("bump", carrier, scale=width, centre=2 * math.pi * n / policy.centres),)
         yield (Term("step", carrier),)
 
 
-def _shapes(variable: Variable, carrier: int) -> Iterator[Group]:
+def _shapes(variable: Variable, carrier: int, policy: Discovery) -> Iterator[Group]:
     parities = {"signed": ("odd", "even"), "size": ("even",), "warm": ("plain",)}[variable.kind]
-    trial = variable.top * np.geomspace(0.01, 2.0, _SCALES)
+    trial = variable.top * np.geomspace(0.01, 2.0, policy.scales)
     for parity in parities:
         for shape in SHAPES:
             for scale in trial if shape.scaled else (variable.top,):
                 yield (Term(shape.name, carrier, parity, float(scale)),)
-        for kind, centre, width in product(CENTRED, _PARTS, _PARTS_WIDE):
+        for kind, centre, width in product(CENTRED, policy.humps, policy.hump_widths):
             place, wide = centre * variable.top, width * variable.top
             yield (Term(kind, carrier, parity, wide, centre=place),)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.criticism.discovery.bases import Basis, Variable, coarse, fine, variables
 from pipeline.criticism.effect import Effect, Machine, Operating, Parameter, Values
+from pipeline.criticism.policy.discovery import Discovery
 
 _WIDE = 1e6
 """Bound of a coefficient in machine scales: none, but finite."""
@@ -67,22 +68,24 @@ class Port:
         return tuple(dict.fromkeys(names))
 
 
-def ports(machine: Machine, hooks: Iterable[str] = ("torque", "drop", "flux")) -> tuple[Port, ...]:
+def ports(
+    machine: Machine, policy: Discovery, hooks: Iterable[str] = ("torque", "drop", "flux")
+) -> tuple[Port, ...]:
     """Every port of some hooks for one machine."""
     makers = {"torque": _torque_ports, "drop": _drop_ports, "flux": _flux_ports}
-    return tuple(port for hook in hooks for port in makers[hook](machine))
+    return tuple(port for hook in hooks for port in makers[hook](machine, policy))
 
 
-def refined(port: Port, machine: Machine) -> Port:
+def refined(port: Port, machine: Machine, policy: Discovery) -> Port:
     """The same port with narrow hats instead of a few smooth curves, where it has a curve."""
     if port.variable is None or (port.hook == "flux" and port.variable.kind == "turn"):
         return port
     return _port(
-        port.hook, port.variable, fine(port.variable, machine), port.carriers, port.signals
+        port.hook, port.variable, fine(port.variable, machine, policy), port.carriers, port.signals
     )
 
 
-def _torque_ports(machine: Machine) -> list[Port]:
+def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
     speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
     one = Carrier((), "", "1.0", lambda _: 1.0)
     omega = Carrier(
@@ -120,7 +123,7 @@ def _torque_ports(machine: Machine) -> list[Port]:
     known = variables(machine)
     shaft = ("torque_shaft_nm",)
     return [
-        _port("torque", known[name], coarse(known[name], machine), (carrier,), shaft)
+        _port("torque", known[name], coarse(known[name], machine, policy), (carrier,), shaft)
         for carrier, name in pairs
     ]
 
@@ -133,7 +136,7 @@ def _with_speed(unit: complex, speed_rad_s: float) -> Callable[[Operating], Any]
     return lambda x: unit * x.omega_rad_s / float(f"{speed_rad_s:.6g}")
 
 
-def _drop_ports(machine: Machine) -> list[Port]:
+def _drop_ports(machine: Machine, policy: Discovery) -> list[Port]:
     """Drops of a drive's log: along an axis, along the current, at right angles to the flux."""
     speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
     d, q = (Carrier((), "", code, _constant(unit)) for code, unit in (("1.0", 1.0), ("1j", 1j)))
@@ -166,12 +169,12 @@ def _drop_ports(machine: Machine) -> list[Port]:
     )
     known = variables(machine)
     return [
-        _port("drop", known[name], coarse(known[name], machine), carriers, signals)
+        _port("drop", known[name], coarse(known[name], machine, policy), carriers, signals)
         for carriers, signals, name in pairs
     ]
 
 
-def _flux_ports(machine: Machine) -> list[Port]:
+def _flux_ports(machine: Machine, policy: Discovery) -> list[Port]:
     """Co-energy that turns with the rotor, an inductance that goes with a temperature, any map."""
     d, q = (
         Carrier((), "", "x.id_a", lambda x: x.id_a),
@@ -183,7 +186,7 @@ def _flux_ports(machine: Machine) -> list[Port]:
     stored = tuple(_stored(axis, 2.0 * machine.scales["current_a"]) for axis in ("d", "q"))
     warm = ((stored, known[name]) for name in ("temp_winding_degc", "temp_magnet_degc"))
     return [
-        *(_port("flux", v, coarse(v, machine), pair, both) for pair, v in (turned, *warm)),
+        *(_port("flux", v, coarse(v, machine, policy), pair, both) for pair, v in (turned, *warm)),
         _flux_map(),
     ]
 

@@ -14,25 +14,13 @@ from pipeline.criticism.discovery.description import told
 from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.gauss_newton import clipped
 from pipeline.criticism.regression.goodness import told_groups
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.records.diagnosis import UnknownStructure
 
-_NEAR = 0.05
-"""Share of the best port's evidence within which another does as well. By judgement: at 0 noise
-chooses the variable, at 0.5 most ports are named."""
-_PRIOR = 1.0
-"""Standard deviation of a port's coefficient, in the machine's own scale. By judgement:
-no curve is larger."""
-_CARRIED = 5.0
-"""Growth of a variance without a unit from which on the unit carries the constant alone, as in
-`judge`."""
-_PARTS = 12
-"""Parts that a capture without a second is held out in, as logs are (`segments_log`)."""
-_EFFORT = ((1.0, 0.0), 20)
-"""Exponents of the weights that a descent begins with, and its steps, as for a thorough score."""
 _SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 """Signals of the shaft, to which a torque comes."""
 
@@ -75,13 +63,14 @@ def unknown_structure(
     found, wide = _ranked(segments, fitted, _hooks(signals), before, in_parts)
     if not found:
         return None, 0.0
-    best = _simplest(found, fitted.policy.selection.tie)
+    policy = fitted.policy.discovery
+    best = _simplest(found, fitted.policy)
     others = tuple(
         (one.port.columns, one.held / best.held)
         for one in found
-        if one is not best and one.held > (1.0 - _NEAR) * best.held
+        if one is not best and one.held > (1.0 - policy.near_share) * best.held
     )
-    port = refined(best.port, fitted.model.machine)
+    port = refined(best.port, fitted.model.machine, policy)
     near = _moved(fitted, wide, best.step)
     fine = system(segments, near, effect_columns(port.effect, near.model), wide)
     own = len(own_columns(fitted.model))
@@ -120,7 +109,7 @@ def _ranked(
     in_parts: bool,
 ) -> tuple[list[Found], System]:
     """Every port that is worth its price and helps where it was not fitted, the best first."""
-    offered = ports(fitted.model.machine, hooks)
+    offered = ports(fitted.model.machine, fitted.policy.discovery, hooks)
     columns = [effect_columns(port.effect, fitted.model) for port in offered]
     wide = system(segments, fitted, [c for some in columns for c in some], before)
     own = np.arange(len(own_columns(fitted.model)))
@@ -141,7 +130,7 @@ def _ranked(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        end = wide.grams(chosen).best(*_EFFORT)
+        end = wide.grams(chosen).best(*fitted.policy.selection.thorough)
         after = wide.after(chosen, end.step)
         gain = base - end.misfit - live.size * price
         if gain <= 0.0:
@@ -161,15 +150,16 @@ def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fitted: Fitted) -
         effect = columns[n].effect
         parameter = None if effect is None else effect.parameters_of(machine)[0]
         scales.append(1.0 if parameter is None else machine.scale(parameter))
-    return (_PRIOR * np.array(scales)) ** -2.0
+    return (fitted.policy.discovery.prior_size * np.array(scales)) ** -2.0
 
 
-def _simplest(found: Sequence[Found], tie: float) -> Found:
+def _simplest(found: Sequence[Found], policy: Policy) -> Found:
     """Of the ports that do about as well as the best, the one of fewest variables.
 
     Of several that no evidence parts it is the one listed first, the commonest in machines.
     """
-    enough = found[0].held - max(tie, _NEAR * found[0].held)
+    tie = policy.selection.tie
+    enough = found[0].held - max(tie, policy.discovery.near_share * found[0].held)
     close = [one for one in found if one.held >= enough]
     fewest = min(len(one.port.columns) for one in close)
     simple = [one for one in close if len(one.port.columns) == fewest]
@@ -197,9 +187,9 @@ def _units(
     if missed is not None:
         last = np.zeros(len(around.tests), dtype=np.int64)
         np.maximum.at(last, segment, around.window)
-        part = _PARTS * around.window // (last[segment] + 1)
-        inner = np.isin(segment, missed) & (part > 0) & (part < _PARTS - 1)
-        units = np.where(inner, _PARTS * segment + part, -1)
+        part = around.policy.discovery.parts * around.window // (last[segment] + 1)
+        inner = np.isin(segment, missed) & (part > 0) & (part < around.policy.discovery.parts - 1)
+        units = np.where(inner, around.policy.discovery.parts * segment + part, -1)
     carried = np.isin(units, _carrying(around, own, left, units))
     return np.where(carried, -1, units)
 
@@ -208,6 +198,7 @@ def _carrying(
     around: System, own: NDArray[np.int64], left: Array, units: NDArray[np.int64]
 ) -> list[int]:
     """Units without which some constant of the model is lost."""
+    policy = around.policy.goodness
     weight = around.weights(around.spreads(left))
     live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
     matrix = around.matrix[:, live]
@@ -221,7 +212,8 @@ def _carrying(
         less = normal - (rows * weight[mine, None]).T @ rows
         inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
-        if grown.max() > _CARRIED or (np.diag(less) < 1e-5 * np.diag(normal)).any():
+        lost = np.diag(less) < policy.lost_share * np.diag(normal)
+        if grown.max() > policy.carried_growth or lost.any():
             carrying.append(number)
     return carrying
 

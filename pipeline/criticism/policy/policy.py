@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.criticism.policy.design import Design
+from pipeline.criticism.policy.discovery import Discovery
+from pipeline.criticism.policy.regression import Fit, Goodness, MainsHum, NoiseFloors
 from pipeline.criticism.policy.selection import OrderScan, Selection
+from pipeline.criticism.policy.validation import Validation
 from pipeline.records.policy import Overrides, overrides, section, with_overrides
 
 
@@ -16,6 +20,13 @@ class Policy:
 
     selection: Selection = section(Selection)
     order_scan: OrderScan = section(OrderScan)
+    fit: Fit = section(Fit)
+    noise_floors: NoiseFloors = section(NoiseFloors)
+    goodness: Goodness = section(Goodness)
+    mains_hum: MainsHum = section(MainsHum)
+    discovery: Discovery = section(Discovery)
+    validation: Validation = section(Validation)
+    design: Design = section(Design)
 
 
 DEFAULT = Policy()

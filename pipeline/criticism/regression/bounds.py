@@ -18,9 +18,6 @@ from pipeline.criticism.regression.linearise import Column
 
 _AT = 1e-9
 """Share of its own size by which a value that stands at a bound may miss it by rounding."""
-_LEAST_INERTIA = 1e-3
-"""Least inertia, in the machine's order of magnitude for it: by judgement, far below any motor's.
-At zero a coasting shaft's equation divides by nothing."""
 
 
 def limits_of(model: Model) -> dict[str, tuple[float, float]]:
@@ -30,7 +27,10 @@ def limits_of(model: Model) -> dict[str, tuple[float, float]]:
     that is not in the model.
     """
     limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
-    limits["j_kgm2"] = (_LEAST_INERTIA * base_scales(model.machine)["j_kgm2"], np.inf)
+    limits["j_kgm2"] = (
+        model.policy.fit.least_inertia * base_scales(model.machine)["j_kgm2"],
+        np.inf,
+    )
     for name, (_, p) in model.parameters().items():
         scale = model.machine.scale(p)
         limits[name] = (p.low * scale, p.high * scale)

@@ -21,22 +21,6 @@ from pipeline.criticism.regression.linear_system import Fitted, System, floors, 
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import rough_floor
 
-_ITERATIONS, _HALVINGS = 12, 3
-"""Steps of a fit at the most, and how often one that does harm is shortened. By judgement: a bound
-of the cost, since a fit ends by itself."""
-_LEAST = 0.1
-"""Reach of a step, as a share of the constant's order of magnitude, at the least: a constant that
-a rough fit left at nothing comes back (viscous friction did not)."""
-_SHORT = 8
-"""Segments up to which a programme is short, and is begun from either side as well. By judgement:
-two fits more, which a long programme does not need."""
-_SILENT = 1e4
-"""Times its noise floor that an equation counts with while it is set aside."""
-_CONVERGED = 1.0
-"""Fall of −2 log L that is not worth a step: a twelfth of what parts two explanations (`TIE`)."""
-_KEPT = 0.9
-"""Share of its promise that a step must keep for its columns to stay. By judgement: at 1 columns
-are made anew at every step; much lower, and steps along stale columns gain little."""
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
@@ -64,7 +48,6 @@ def clipped(model: Model, values: dict[str, float]) -> dict[str, float]:
 def gauss_newton(
     segments: Sequence[Segment],
     fitted: Fitted,
-    iterations: int = _ITERATIONS,
     before: System | None = None,
 ) -> tuple[Fitted, System]:
     """Fits a model's own parameters; returns the fit and the system around it.
@@ -72,17 +55,18 @@ def gauss_newton(
     A step that makes the misfit worse is shortened. Columns stay as they are while steps do about
     what they promise [2]; a fit is at its end where columns made anew promise nothing.
     """
+    policy = fitted.policy.fit
     around, fresh = system(segments, fitted, before=before), True
-    for _ in range(iterations):
+    for _ in range(policy.iterations):
         step = bounded_step(_damped(fitted, around), around.columns, fitted.model, fitted.values)
-        if around.misfit - around.foreseen(step) >= _CONVERGED:
-            halvings = _HALVINGS if fresh else 1
+        if around.misfit - around.foreseen(step) >= policy.converged:
+            halvings = policy.halvings if fresh else 1
             moved, tried, promised = _tried(segments, fitted, around, step, halvings)
             gain = around.misfit - tried.misfit
             if gain > 0:
                 fitted, around = moved, tried
             fresh = fresh and gain <= 0
-            if gain >= max(_KEPT * promised, _CONVERGED):
+            if gain >= max(policy.kept_share * promised, policy.converged):
                 continue
         if fresh:
             break
@@ -96,13 +80,14 @@ def _tried(
     """The fit after a step, shortened until it does no harm; the system there, with the columns of
     the start; and the fall of misfit that these columns promised.
     """
+    policy = fitted.policy.fit
     for _ in range(halvings):
         moved = _moved(fitted, around.columns, step)
         tried = system(segments, moved, before=around, chord=True)
         promised = around.misfit - around.foreseen(step)
-        if tried.misfit < around.misfit + _CONVERGED:
+        if tried.misfit < around.misfit + policy.converged:
             break
-        step = 0.3 * step
+        step = policy.shortening * step
     return moved, tried, promised
 
 
@@ -120,12 +105,16 @@ def _ridge(fitted: Fitted, columns: Sequence[Column]) -> Array:
     near their tangent [1]. A constant next to zero still has some reach: a missing effect may have
     brought it there, as an encoder off its centre does J.
     """
-    machine = fitted.model.machine
+    machine, policy = fitted.model.machine, fitted.policy.fit
     scales = base_scales(machine)
-    reach = {name: max(abs(fitted.values[name]), _LEAST * scales[name]) for name in PHYSICAL}
+    reach = {
+        name: max(abs(fitted.values[name]), policy.least_reach * scales[name]) for name in PHYSICAL
+    }
     for name, (_, p) in fitted.model.parameters().items():
         if p.amplitude:
-            reach[name] = 3.0 * max(abs(fitted.values[name]), p.typical * machine.scale(p))
+            reach[name] = policy.effect_reach * max(
+                abs(fitted.values[name]), p.typical * machine.scale(p)
+            )
     spans = np.array([reach.get(column.name, np.inf) for column in columns])
     ridge: Array = np.maximum(spans, 1e-30) ** -2
     return ridge
@@ -156,7 +145,7 @@ def first_fit(segments: Sequence[Segment], near: Fitted) -> tuple[Fitted, System
     floor = floors(segments, near.model, near.values)
     begun = replace(near, sigma=floor, near=near.values)
     ends = [gauss_newton(segments, begun)]
-    if len(segments) <= _SHORT:
+    if len(segments) <= near.policy.fit.short_programme:
         ends += [_one_side_first(segments, begun, side) for side in _SIDES]
     return min(ends, key=lambda end: end[1].misfit)
 
@@ -181,8 +170,9 @@ def _one_side_first(
     In a short programme few captures hold the equations together. Where these contradict each
     other, which of them is given up must not depend on where the fit began.
     """
+    silent = near.policy.fit.silent
     alone = tuple(
-        np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, _SILENT * sigma)
+        np.where([channel in side for channel, _ in row_index(segment)[3]], sigma, silent * sigma)
         for segment, sigma in zip(segments, near.sigma, strict=True)
     )
     begun, _ = gauss_newton(segments, replace(near, sigma=alone))

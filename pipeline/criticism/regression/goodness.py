@@ -13,21 +13,13 @@ from scipy.special import chdtri, ndtr
 
 from pipeline.criticism.data.segment import Segment, told_signal
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.linear_system import System
 from pipeline.criticism.regression.noise_floors import channel_scale
 from pipeline.records.diagnosis import Remainder
 
-_GROWTH = 5.0
-"""Growth of a variance without a capture from which on the capture carries the constant alone."""
 _MOST_BLOCKS = 10_000
 """More than the blocks of any capture, so that every block has a number of its own."""
-_OVER = 1.0
-"""Excess of χ²/n that is told: a floor from the recording itself is good to a factor of two."""
-_CHANCE = float(ndtr(-5.0))
-"""Probability that chance alone may have of what is told: of five standard deviations, one side."""
-_MATERIAL, _MATERIAL_BENCH, _MATERIAL_READING = 5e-4, 1e-2, 5e-3
-"""Error that matters: of the machine's own scale, of a bench meter's largest reading, and of the
-largest voltage of a log, which is less than the machine's at standstill."""
 _VOLTS = ("vd_v", "vq_v")
 """Channels whose reading is little beside the machine's voltage at standstill."""
 
@@ -59,6 +51,7 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
     Of `segments` that are parted in blocks, every block is predicted from all else. This is to
     first order: noise floors, weights and shapes stay those of the full fit.
     """
+    policy = around.policy.goodness
     places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
     weight = around.weights(around.spreads(around.residual))
     matrix = around.matrix[:, places]
@@ -75,7 +68,11 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
         scale = np.sqrt(np.diag(normal))
         inverse = np.linalg.pinv(less / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         grown = np.diag(inverse) / np.maximum(spread, 1e-300)
-        if not np.isfinite(grown).all() or grown.max() > _GROWTH or _lost(less, normal):
+        if (
+            not np.isfinite(grown).all()
+            or grown.max() > policy.carried_growth
+            or _lost(less, normal, policy)
+        ):
             continue
         step = -(inverse @ ((slope - weighted[mine].T @ around.residual[mine]) / scale)) / scale
         left[mine] = around.residual[mine] + matrix[mine] @ step
@@ -131,9 +128,9 @@ def _unit(normal: Array) -> Array:
     return unit
 
 
-def _lost(less: Array, normal: Array) -> bool:
-    """Whether some constant keeps less than 1e-5 of its information."""
-    return bool((np.diag(less) < 1e-5 * np.diag(normal)).any())
+def _lost(less: Array, normal: Array, policy: Goodness) -> bool:
+    """Whether some constant keeps next to nothing of its information."""
+    return bool((np.diag(less) < policy.lost_share * np.diag(normal)).any())
 
 
 def signal_errors(segments: Sequence[Segment], around: System, residual: Array) -> dict[str, float]:
@@ -202,10 +199,11 @@ def _over(
     """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is
     `soft` [R] of the scale that rows are divided by.
     """
+    policy = around.policy.goodness
     spreads, counts = around.spreads(residual / soft), around.counts
     for place, (number, channel, _) in enumerate(around.labels):
         n, q = counts[place], spreads[place]
-        if n == 0 or q <= max(1.0 + _OVER, _highest_by_chance(n)):
+        if n == 0 or q <= max(1.0 + policy.over, _highest_by_chance(n, policy.chance)):
             continue
         mine = around.group == place
         unit = float(((around.unit * soft)[mine] ** 2).mean())
@@ -216,12 +214,12 @@ def _over(
 
 
 @cache
-def _highest_by_chance(n: float) -> float:
-    """χ²/n of n samples that chance passes as seldom as five standard deviations.
+def _highest_by_chance(n: float, sigmas: float) -> float:
+    """χ²/n of n samples that chance passes as seldom as so many standard deviations.
 
     The tail of χ² itself is used: of four samples, 1 + 5 √(2/n) is passed one time in a thousand.
     """
-    return float(chdtri(n, _CHANCE)) / n
+    return float(chdtri(n, ndtr(-sigmas))) / n
 
 
 def material_size(segment: Segment, channel: str, around: System, large: bool = False) -> float:
@@ -230,10 +228,10 @@ def material_size(segment: Segment, channel: str, around: System, large: bool = 
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
     """
     bench = segment.kind in ("terminal", "lcr", "flux_map", "standing")
-    fitted = around.around
+    fitted, policy = around.around, around.policy.goodness
     scale = channel_scale(segment, channel, fitted.model, fitted.values)
-    size = (_MATERIAL_BENCH if bench else _MATERIAL) * scale
+    size = (policy.material_bench if bench else policy.material) * scale
     if segment.kind == "dq" and channel in _VOLTS and not large:
         reading = max(float(np.abs(segment.recorded[name]).max()) for name in _VOLTS)
-        size = min(size, _MATERIAL_READING * reading)
+        size = min(size, policy.material_reading * reading)
     return size

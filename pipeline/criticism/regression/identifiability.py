@@ -12,6 +12,7 @@ from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
 from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
+from pipeline.criticism.policy.regression import Fit
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
@@ -29,16 +30,8 @@ from pipeline.records.comparison import KnownCombination, ModelParameter
 
 POSITIVE = ("psi_wb", "j_kgm2", "r_ohm", "ld_h", "lq_h")
 """Constants that no motor is without, in the order in which others are told over them."""
-_WALK = math.log(2.0)
-"""How far a direction without information is walked to see that nothing changes: everything in it
-is doubled or halved, or moves by as much of its size."""
 _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
-_HARDLY = 1e-3
-"""Information, over that of a prior, below which rounding may have made it."""
-_RISE = 1.0
-"""Change of −2 log L on such a walk that is still none: a quarter of what two standard
-uncertainties make."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +128,7 @@ def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, 
     model, own = fitted.model, own_columns(fitted.model)
     fit = known(around, held, len(own))
     u = dict(zip((c.name for c in own), fit.u.tolist(), strict=True))
-    told = within(_beyond(fit.u, around.penalty[: len(own)]), fit.found.sizes)
+    told = within(_beyond(fit.u, around.penalty[: len(own)], fitted.policy.fit), fit.found.sizes)
     sized = dict(zip(u, told.tolist(), strict=True))
     limits = limits_of(model)
     made = {}
@@ -154,12 +147,12 @@ def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, 
     return made
 
 
-def _beyond(u: Array, penalty: Array) -> Array:
+def _beyond(u: Array, penalty: Array, policy: Fit) -> Array:
     """Standard uncertainties [P] without the priors of inverse variance `penalty` [P], infinite
     where nothing else tells: what handbooks say is not measured.
     """
     information = np.maximum(u, 1e-300) ** -2.0 - penalty
-    told = information > _HARDLY * penalty
+    told = information > policy.least_information * penalty
     alone: Array = np.where(told, np.maximum(information, 1e-300) ** -0.5, math.inf)
     return alone
 
@@ -183,6 +176,7 @@ def combinations_told(
     A matrix speaks of where the fit stands. So the directions without information are walked: what
     is told must be all there is to know far from here as well.
     """
+    policy = fitted.policy.fit
     names = [c.name for c in around.columns[: len(own_columns(fitted.model))]]
     fit = known(around, held, len(names))
     found = fit.found
@@ -194,10 +188,10 @@ def combinations_told(
     positive = [names.index(name) for name in POSITIVE if fitted.values[name] > 0.0]
     made = known_combinations(found, values, places, positive)
     moving = np.zeros(len(names), dtype=bool)
-    for moved, there in walked(found, values, made, _WALK) if made else ():
+    for moved, there in walked(found, values, made, math.log(policy.walk_factor)) if made else ():
         at = replace(fitted, values=fitted.values | dict(zip(names, there.tolist(), strict=True)))
         misfit = system(segments, at, before=around, chord=True).misfit
-        if not abs(misfit - around.misfit) < _RISE:
+        if not abs(misfit - around.misfit) < policy.walk_rise:
             moving |= moved
     wide = [(one, fit.u_of(one.gradient, bent=one.product)) for one in made]
     return tuple(

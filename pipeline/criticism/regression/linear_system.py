@@ -14,6 +14,7 @@ from pipeline.criticism.effect import Array, Effect, Values
 from pipeline.criticism.equations.residuals import over_inertia
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import Policy
+from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.linearise import (
     Column,
     Rows,
@@ -27,12 +28,8 @@ from pipeline.criticism.regression.normal_equations import Grams, misfit_of, pse
 from pipeline.criticism.regression.parallel import on_each
 
 _SEED = 20260302
-_STEADY = {"psi_wb": 0.05, "ld_h": 0.05, "lq_h": 0.05, "r_ohm": 0.05}
-_HEAVIER, _OTHER = 0.05, 0.05
-"""Share of itself that a constant may move by before columns are computed anew, J before its own
-is, since a coasting shaft goes by 1/J, and an effect's parameter (or of its typical size, if that
-is larger) before columns of sensors and shapes are. By judgement: a stale column costs steps and
-no accuracy (`_kept`)."""
+_STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm")
+"""Constants that every column goes with."""
 _CURRENTS = frozenset({"id_a", "iq_a", "i_pair_a"})
 """Signals whose noise is in the equations times a constant of the fit."""
 ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
@@ -171,6 +168,7 @@ class System:
             self.penalty[along],
             self.pull[along],
             float(elsewhere.sum()),
+            self.policy.fit,
         )
 
     def along(self, places: Sequence[int]) -> System:
@@ -302,22 +300,30 @@ def _with_known(
     kept = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
     segment = np.array([number for number, _, _ in now.labels])[now.group]
     counts = np.bincount(segment, minlength=len(segments)).tolist()
-    now.matrix[:, places] = _over(segments, kept, before.whiten, now.whiten, counts)
+    now.matrix[:, places] = _over(
+        segments, kept, (before.whiten, now.whiten), counts, now.policy.noise_floors
+    )
     made_at = {**now.made_at, **{key: before.made_at[key] for key in known}}
     return replace(now, made_at=made_at)
 
 
 def _over(
-    segments: Sequence[Segment], kept: Array, before: Array, now: Array, counts: Sequence[int]
+    segments: Sequence[Segment],
+    kept: Array,
+    weights: tuple[Array, Array],
+    counts: Sequence[int],
+    policy: NoiseFloors,
 ) -> Array:
-    """Columns [R, P] that were whitened by `before` [R], whitened by `now` [R] instead; `counts`
-    are the rows of each segment.
+    """Columns [R, P] that were whitened by the first of the `weights` [R], whitened by the second
+    instead; `counts` are the rows of each segment.
     """
+    before, now = weights
     if np.array_equal(before, now):
         return kept
     edges = np.cumsum(counts)[:-1]
-    each = zip(*(np.split(one, edges) for one in (kept, before, now)), strict=True)
-    whole: Array = np.concatenate(on_each(whitened_anew, segments, list(each)))
+    parts = zip(*(np.split(one, edges) for one in (kept, before, now)), strict=True)
+    each = [(*part, policy) for part in parts]
+    whole: Array = np.concatenate(on_each(whitened_anew, segments, each))
     return whole
 
 
@@ -350,19 +356,23 @@ def _kept(
 
 
 def _holds(column: Column, made_at: Values, fitted: Fitted) -> bool:
-    """Whether a column is near what it would be at a fit."""
-    model, now = fitted.model, fitted.values
-    if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n, far in _STEADY.items()):
+    """Whether a column is near what it would be at a fit.
+
+    It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; those of
+    sensors and shapes with other effects' parameters, by their typical sizes if these are larger.
+    """
+    model, now, far = fitted.model, fitted.values, fitted.policy.fit.stale_share
+    if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
         return False
     if column.name == "j_kgm2":
-        return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < _HEAVIER
+        return abs(now["j_kgm2"] / made_at["j_kgm2"] - 1.0) < far
     if _linear(column, model):
         return True
     parameters = model.parameters()
     gone = any(value and "." in name and name not in parameters for name, value in made_at.items())
     return not gone and all(
         abs(now[name] - made_at.get(name, 0.0))
-        <= _OTHER * max(abs(now[name]), p.typical * model.machine.scale(p))
+        <= far * max(abs(now[name]), p.typical * model.machine.scale(p))
         for name, (_, p) in parameters.items()
     )
 

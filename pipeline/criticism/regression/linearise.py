@@ -35,6 +35,7 @@ from pipeline.criticism.machine.model import (
     values_of,
     zero,
 )
+from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.noise_floors import (
     offsets,
     reading_error,
@@ -103,7 +104,7 @@ def linearise(
     whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
     kept = _weak_columns(segment, sampler, columns, valid)
     both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * whiten[:, None]
-    absorb(both, offsets(segment, valid, whiten))
+    absorb(both, offsets(segment, valid, whiten, model.policy.noise_floors))
     unit = told_unit(segment, values) / (whiten * window_gain(segment))
     soft = floor * whiten
     return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
@@ -140,16 +141,18 @@ def absorb(rows: Array, unknown: Sequence[Array]) -> None:
         rows -= (axes * lost) @ (axes.T @ rows)
 
 
-def whitened_anew(segment: Segment, rows: Array, before: Array, after: Array) -> Array:
+def whitened_anew(
+    segment: Segment, rows: Array, before: Array, after: Array, policy: NoiseFloors
+) -> Array:
     """Rows [R, P] of one segment, whitened by `after` [R] instead of `before` [R].
 
     Disturbances are absorbed anew as well: beside a louder noise an offset is absorbed less.
     """
     _, _, valid, _ = row_index(segment)
     bare = rows.copy()
-    _restore(bare, offsets(segment, valid, before))
+    _restore(bare, offsets(segment, valid, before, policy))
     bare *= (after / before)[:, None]
-    absorb(bare, offsets(segment, valid, after))
+    absorb(bare, offsets(segment, valid, after, policy))
     return bare
 
 

@@ -23,37 +23,17 @@ from pipeline.criticism.data.segment import PAIR_RAD, Segment, clock
 from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.equations.residuals import disturbed, residual
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.regression import MainsHum
 
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 """Mains of 50 and 60 Hz, and their second and third harmonics."""
 _BESIDE = (-11, -9, -7, -5, 5, 7, 9, 11)
 """Bins at either side that a line is held against: from the fifth on, clear of two Hann windows."""
-_CYCLES = 8.0
-"""Cycles that a recording must have of a line for bins to be there at either side of it."""
 _LOBE = 3
 """Bins from a peak to where the skirt of a Hann window is low: in 200 ms, 50 and 60 Hz are two."""
-_CYCLES_EACH = 2.0
-"""Cycles of 50 Hz that a run must hold for its own mean to be free of the line. By judgement."""
-_STANDS_OUT = 20.0
-"""Power over that beside it: of white noise, one bin in e^14 has as much."""
-_SEEN = 4.0
-"""Median of that ratio over a signal's captures, from which on the signal has the line: less than
-what proves the mains, since that they are there is known by then. By judgement."""
-_CAPTURES = 3
-"""Captures that must have a line: what one or two tests are like there is their own."""
-_SLIDE = 0.03
-"""Share of its mean that a speed may vary by while orders of the turn are lines."""
-_PARTS = 8
-"""Parts of a recording that a line must be alike in: of eight, chance gives one sine an eighth."""
 _FINER = 2
 """Points of the spectrum a bin, by zeros behind the record: between bins a Hann window's line
 loses up to 1.4 dB, between these 0.35 dB."""
-_STEADY = 0.5
-"""Of the share that one sine of that power has: below, its phase or size changed on the way."""
-_LARGEST = 0.01
-"""Of the machine's voltage or torque: more is no pick-up in a station that anybody would use."""
-_EVEN = 0.02
-"""Share that the time between two steps of a test may vary by while their rate makes lines."""
 _LINE_RAD = {"vab_v": PAIR_RAD["ab"], "vbc_v": PAIR_RAD["bc"], "vca_v": PAIR_RAD["ca"]}
 """Where each line voltage of an open winding stands [rad, electrical]."""
 
@@ -78,34 +58,35 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
     A signal then has the line if it stands out there in half of the captures that can show it. A
     capture cannot if an order of its turning shaft, or the rate of a map's levels, is too near.
     """
+    policy = model.policy.mains_hum
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
     clear: dict[float, set[str]] = defaultdict(set)
     for segment in segments:
-        spectrum = _Spectrum.of(segment)
+        spectrum = _Spectrum.of(segment, policy)
         if segment.weak is None or not spectrum.weight.any():
             continue
         lines = [
             f
             for f in LINES_HZ
-            if spectrum.duration_s * f >= _CYCLES
-            and 2.2 * f * segment.ts_s < 1.0
-            and not _turns_at(segment, f)
+            if spectrum.duration_s * f >= policy.cycles
+            and policy.samples * f * segment.ts_s < 1.0
+            and not _turns_at(segment, f, policy)
             and not spectrum.repeats_at(f)
         ]
         for channel, one in _as_sensed(segment, model, values).items():
-            most = (_LARGEST * _whole(channel, model.machine)) ** 2
+            most = (policy.largest * _whole(channel, model.machine)) ** 2
             for freq, seen in zip(lines, spectrum.lines(one, lines, most), strict=True):
                 powers[segment.kind, channel, freq].append(seen)
-                if seen[0] > _STANDS_OUT * seen[1]:
+                if seen[0] > policy.stands_out * seen[1]:
                     clear[freq].add(segment.capture)
     ratios = {
         key: np.array([line / beside for line, beside in seen]) for key, seen in powers.items()
     }
-    there = {freq for freq, captures in clear.items() if len(captures) >= _CAPTURES}
+    there = {freq for freq, captures in clear.items() if len(captures) >= policy.captures}
     return tuple(
         Hum(*key, math.sqrt(float(np.median([line for line, _ in powers[key]]))))
         for key, ratio in ratios.items()
-        if key[-1] in there and float(np.median(ratio)) > _SEEN
+        if key[-1] in there and float(np.median(ratio)) > policy.seen
     )
 
 
@@ -195,9 +176,10 @@ class _Spectrum:
     runs: tuple[slice, ...]
     place: NDArray[np.int64]
     weight: Array
+    policy: MainsHum
 
     @classmethod
-    def of(cls, segment: Segment) -> _Spectrum:
+    def of(cls, segment: Segment, policy: MainsHum) -> _Spectrum:
         """Of the segment's own clock; what is beside a gap is of no equation, and hardly counts."""
         time = clock(segment)
         place = np.rint((time - time[0]) / segment.ts_s).astype(np.int64)
@@ -207,7 +189,7 @@ class _Spectrum:
             weight[first:last] = np.hanning(last - first + 2)[1:-1]
         runs = tuple(slice(*both) for both in pairwise(ends))
         weight *= np.hanning(int(place[-1]) + 3)[1:-1][place]
-        return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight)
+        return cls(segment.ts_s, int(place[-1]) + 1, runs, place, weight, policy)
 
     @property
     def duration_s(self) -> float:
@@ -219,14 +201,14 @@ class _Spectrum:
         every step of a test makes a line there.
         """
         starts = self.place[[run.start for run in self.runs]]
-        if starts.size < _CAPTURES:
+        if starts.size < self.policy.captures:
             return False
         gaps = np.diff(starts)
         usual = float(np.median(gaps))
-        if np.mean(np.abs(gaps - usual) < _EVEN * usual) < 0.5:
+        if np.mean(np.abs(gaps - usual) < self.policy.even_share * usual) < 0.5:
             return False
         cycles = freq_hz * usual * self.ts_s
-        return abs(cycles - round(cycles)) * starts.size < 2.0
+        return abs(cycles - round(cycles)) * starts.size < self.policy.near_bins
 
     def lines(
         self, signal: Array, freqs_hz: Sequence[float], most: float
@@ -249,9 +231,12 @@ class _Spectrum:
             first = middle - _FINER
             top = first + int(np.argmax(power[first : middle + _FINER + 1]))
             line = float(power[top])
-            one_sine = line / (line + _PARTS * level)
+            one_sine = line / (line + self.policy.parts * level)
             skirt = power[max(middle - _LOBE * _FINER, 0) : middle + _LOBE * _FINER + 1].max()
-            if skirt > min(line, most) or self._share(flat, top) < _STEADY * one_sine:
+            if (
+                skirt > min(line, most)
+                or self._share(flat, top) < self.policy.steady_share * one_sine
+            ):
                 line = level
             told.append((line, level))
         return told
@@ -262,7 +247,7 @@ class _Spectrum:
         """
         level = np.full_like(signal, float(np.average(signal, weights=self.weight)))
         for run in self.runs:
-            if (run.stop - run.start) * self.ts_s * LINES_HZ[0] > _CYCLES_EACH:
+            if (run.stop - run.start) * self.ts_s * LINES_HZ[0] > self.policy.cycles_a_run:
                 level[run] = float(np.average(signal[run], weights=self.weight[run] + 1e-12))
         return signal - level
 
@@ -272,9 +257,11 @@ class _Spectrum:
         About line / (line + 8 level) where there is one, an eighth where there is none.
         """
         wave = flat * np.exp(-2j * np.pi * line / (_FINER * self.bins) * self.place)
-        part = np.minimum(self.place * _PARTS // self.bins, _PARTS - 1)
-        size = np.bincount(part, self.weight, _PARTS)
-        seen = np.bincount(part, wave.real, _PARTS) + 1j * np.bincount(part, wave.imag, _PARTS)
+        part = np.minimum(self.place * self.policy.parts // self.bins, self.policy.parts - 1)
+        size = np.bincount(part, self.weight, self.policy.parts)
+        seen = np.bincount(part, wave.real, self.policy.parts) + 1j * np.bincount(
+            part, wave.imag, self.policy.parts
+        )
         there = size > 0.0
         power = float((np.abs(seen[there]) ** 2 / size[there]).sum())
         return float(np.abs(seen.sum()) ** 2 / size.sum()) / max(power, 1e-300)
@@ -286,7 +273,7 @@ def _whole(channel: str, machine: Machine) -> float:
     return machine.scales.get(scale, math.inf)
 
 
-def _turns_at(segment: Segment, freq_hz: float) -> bool:
+def _turns_at(segment: Segment, freq_hz: float, policy: MainsHum) -> bool:
     """Whether an order of a steadily turning shaft may make a line of this frequency."""
     theta = segment.recorded.get("theta_mech_rad")
     if theta is None or segment.kind in ("terminal", "lcr"):
@@ -295,7 +282,10 @@ def _turns_at(segment: Segment, freq_hz: float) -> bool:
     speed = np.gradient(theta, time) / (2.0 * math.pi)
     mean = float(np.abs(speed.mean()))
     duration = float(time[-1] - time[0])
-    if mean * duration < 0.5 or float(speed.std()) > _SLIDE * mean:
+    if mean * duration < 0.5 or float(speed.std()) > policy.speed_share * mean:
         return False
     order = freq_hz / mean
-    return abs(order - round(order)) * mean * duration < 2.0 and order < 100.0
+    return (
+        abs(order - round(order)) * mean * duration < policy.near_bins
+        and order < policy.highest_order
+    )

@@ -15,38 +15,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Values
 from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.equations.true_signals import operate
 from pipeline.criticism.machine.model import Model, evaluate, zero
-
-_REPLICATES, _POOLED = 2, 128
-"""Times that noise is added at the least, and weak samples of a group that are then pooled: a floor
-is known to some 6 %, the root of 1/(2·128). Fewer make a floor of chance, more cost time."""
-_SHIFTS = 16
-"""Shifts of a coarse signal at the least: all its rounding can do depends on the shift."""
-_ALLOWANCE, _MODEL_DRIVE, _MODEL_BENCH = 5e-5, 1e-4, 2e-5
-"""Of the reading, and of the machine's own scale under a drive and on a bench: what no sensor and
-no equation is better than, by judgement. Smaller, and structure of no concern names effects;
-larger, and effects hide: half of the reference captures' floors is this allowance."""
-_OFFSET = 0.5
-"""Prior of a sensor's offset in one capture, in standard deviations of its noise. By judgement:
-a larger one lets offsets explain a drag, with none an offset passes for an effect."""
-_ZERO = 2e-3
-"""Prior of a terminal voltage's offset, as a share of its largest reading. By judgement: with
-none, the zero of a bench's voltmeter passes for a drop."""
-_ROUGH = 0.05
-"""Of the machine's own scale, how far equations may be off in a rough fit. By judgement: smaller,
-and equations far off are given up before the constants are near."""
-FORM = 0.02
-"""Of what an effect does, what its formula may be wrong by. By judgement: smaller, and the tail of
-a wrong form is named as a further effect; larger, and small effects beside it are lost."""
-_LINE = 0.03
-"""Steps of the encoder that a harmonic of its rounding has: 1/(10 π), the tenth of a saw-tooth."""
-_JUMP = 8.0
-"""Standard deviations of its noise from which on a bend of the voltage is a jump. White
-noise comes to 6 in a log of 1e5 samples."""
-_WHEN = 0.25
-"""Sample periods that a jump's instant is known to: 1/√12 = 0.29 for one that may be anywhere
-in between. With none, seven of the benchmark's twenty ties were named wrong, with this two."""
-_CREEPS, _REST_S = 1e-3, 5e-3
-"""Share of the machine's largest speed below which, for so long, friction may hold the shaft."""
+from pipeline.criticism.policy.regression import NoiseFloors
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -56,13 +25,14 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     pooled over the windows of one (channel, order). The noise is white, of each sensor's own level;
     an angle that is rounded, and signals that are coarse, are rounded anew besides.
     """
+    policy = model.policy.noise_floors
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
-    wanted = _POOLED // max(int(valid.sum()) // max(len(groups), 1), 1)
-    replicates = min(max(wanted, _REPLICATES), _POOLED)
+    wanted = policy.pooled // max(int(valid.sum()) // max(len(groups), 1), 1)
+    replicates = min(max(wanted, policy.replicates), policy.pooled)
     if segment.steps:
-        replicates = max(replicates, _SHIFTS)
+        replicates = max(replicates, policy.shifts)
     shifts = _shifts(segment, replicates, seed)
     smooth = {name: unrounded(segment.recorded[name], q) for name, q in segment.steps.items()}
     for replicate in range(replicates):
@@ -104,7 +74,12 @@ def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
     """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
     _, _, _, groups = row_index(segment)
     scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
-    floor: Array = _ROUGH * window_gain(segment) / told_unit(segment, values) * np.array(scales)
+    floor: Array = (
+        model.policy.noise_floors.rough
+        * window_gain(segment)
+        / told_unit(segment, values)
+        * np.array(scales)
+    )
     return floor
 
 
@@ -113,11 +88,12 @@ def form_tolerance(
     model: Model,
     values: Values,
     added: Sequence[Effect],
-    share: float = FORM,
+    share: float | None = None,
 ) -> Array:
     """What the forms of the effects that were added may be wrong by [groups], as weak samples.
 
-    No formula of an effect is right to better than a fiftieth of what the effect does (`share`).
+    No formula of an effect is right to better than a `share` of what the effect does, without one
+    the policy's.
     Where a found effect acts, an error below that is one of its form, and names no further effect.
     """
     group, _, valid, groups = row_index(segment)
@@ -128,7 +104,8 @@ def form_tolerance(
         power = projected(segment, without - here)[valid] ** 2
         count = np.bincount(group[valid], minlength=len(groups))
         total += np.bincount(group[valid], power, minlength=len(groups)) / np.maximum(count, 1)
-    floor: Array = share * np.sqrt(total)
+    wrong = model.policy.noise_floors.form if share is None else share
+    floor: Array = wrong * np.sqrt(total)
     return floor
 
 
@@ -142,7 +119,7 @@ def reading_error(
     between samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. An
     effect that hides in this is nobody's concern, and smaller structure names nothing.
     """
-    weak = segment.weak
+    weak, policy = segment.weak, model.policy.noise_floors
     if weak is None:
         return np.zeros((len(segment.channels), segment.size, 1))
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
@@ -157,25 +134,25 @@ def reading_error(
         else:
             sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
     reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
-    reading[:, :, 0] = _ALLOWANCE * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
-    part = _MODEL_DRIVE if segment.kind in ("dq", "q", "motion") else _MODEL_BENCH
+    reading[:, :, 0] = policy.reading * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
+    part = policy.model_drive if segment.kind in ("dq", "q", "motion") else policy.model_bench
     scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
     own = part * window_gain(segment) / told_unit(segment, values) * np.array(scales)[:, None, None]
     both: Array = np.hypot(reading, own)
     if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
-        both[place] = np.hypot(both[place], _encoder_lines(segment, values))
+        both[place] = np.hypot(both[place], _encoder_lines(segment, values, policy))
         x = operate(segment, segment.recorded, model, values) if state is None else state
         both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values, x))
     if segment.kind == "dq":
-        jumps = _jumps(segment)[:, None]
+        jumps = _jumps(segment, policy)[:, None]
         for place, channel in enumerate(segment.channels):
             if channel in ("vd_v", "vq_v"):
                 both[place] = np.hypot(both[place], jumps)
     return both
 
 
-def _jumps(segment: Segment) -> Array:
+def _jumps(segment: Segment, policy: NoiseFloors) -> Array:
     """Error [W] that a jump of the voltage may make, as weak samples: a quarter of it for a sample.
 
     A log says what the voltage was at its samples, not when within a period it changed.
@@ -188,9 +165,9 @@ def _jumps(segment: Segment) -> Array:
     bend = np.zeros(voltage.size)
     # a jump bends the line twice, there and back
     bend[1:-1] = np.abs(np.diff(voltage, 2)) / math.sqrt(2.0)
-    bend[bend < _JUMP * noise] = 0.0
+    bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
-    error: Array = _WHEN * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
+    error: Array = policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
     return error
 
 
@@ -203,8 +180,9 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
     weak = segment.weak
     if weak is None:
         return np.zeros(segment.size)
-    slow = _CREEPS * model.machine.scales["speed_rad_s"]
-    creeping = np.flatnonzero(_lasting(np.abs(x.omega_rad_s) < slow, round(_REST_S / x.ts_s)))
+    policy = model.policy.noise_floors
+    slow = policy.creep * model.machine.scales["speed_rad_s"]
+    creeping = np.flatnonzero(_lasting(np.abs(x.omega_rad_s) < slow, round(policy.rest_s / x.ts_s)))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
     known = dict(values)
@@ -230,7 +208,7 @@ def _lasting(which: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
     return lasting
 
 
-def _encoder_lines(segment: Segment, values: Values) -> Array:
+def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Array:
     """Torque [W, M] that a line of the encoder's own error makes on an order k, as weak samples.
 
     Rounding at steady speed is periodic in the angle, and some of its harmonics beat with the
@@ -244,7 +222,7 @@ def _encoder_lines(segment: Segment, values: Values) -> Array:
     span = (weak.length - 1) * segment.ts_s
     omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
     step = math.sqrt(12.0) * segment.noise["theta_mech_rad"]
-    wave = window_gain(segment) / math.sqrt(2.0) * _LINE * step * values["j_kgm2"]
+    wave = window_gain(segment) / math.sqrt(2.0) * policy.encoder_line * step * values["j_kgm2"]
     lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
     return lines
 
@@ -264,7 +242,9 @@ def channel_scale(segment: Segment, channel: str, model: Model, values: Values) 
     return max(float(np.abs(segment.recorded[name]).max()) for name in beside)
 
 
-def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[Array]:
+def offsets(
+    segment: Segment, valid: NDArray[np.bool_], whiten: Array, policy: NoiseFloors
+) -> list[Array]:
     """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
     offset of each channel's sensor, mains lines and wander.
     """
@@ -276,9 +256,11 @@ def offsets(segment: Segment, valid: NDArray[np.bool_], whiten: Array) -> list[A
         return []
     for place, channel in enumerate(segment.channels):
         names = ("vab_v",) if segment.kind == "open" else (channel,)
-        prior = _OFFSET * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
+        prior = policy.offset * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
         if segment.kind == "terminal":
-            prior = math.hypot(prior, _ZERO * float(np.abs(segment.recorded[channel]).max()))
+            prior = math.hypot(
+                prior, policy.terminal_offset * float(np.abs(segment.recorded[channel]).max())
+            )
         if segment.kind == "open" or prior == 0.0:
             continue
         constant = np.zeros((len(segment.channels), segment.size))

@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.regression import Fit
 
 _TIE = 1e-11
 """Share of the largest information below which a direction has none, far above the rounding of
 doubles (1e-16). Larger, and constants that captures barely tell are held; smaller, and rounding
 moves them."""
-_ROUNDS, _SETTLED = 30, 0.3
-"""Renewals of the weights at the most, and the change of −2 log L that ends them: a fortieth of
-what parts two explanations (`TIE`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +48,7 @@ class Grams:
     penalty: Array
     pull: Array
     elsewhere: float
+    policy: Fit
 
     @classmethod
     def of(
@@ -61,6 +60,7 @@ class Grams:
         penalty: Array,
         pull: Array,
         elsewhere: float,
+        policy: Fit,
     ) -> Grams:
         """From columns [R, k] and residual [R] of rows whose groups are numbered below `count`."""
         order = np.argsort(group, kind="stable")
@@ -79,6 +79,7 @@ class Grams:
             penalty,
             pull,
             elsewhere,
+            policy,
         )
 
     def along(self, places: NDArray[np.int64]) -> Grams:
@@ -92,6 +93,7 @@ class Grams:
             self.penalty[places],
             self.pull[places],
             self.elsewhere + float(_costs(self.pull[out], self.penalty[out]).sum()),
+            self.policy,
         )
 
     def moved(self, places: NDArray[np.int64], step: Array) -> Grams:
@@ -105,7 +107,7 @@ class Grams:
         cost = float(_costs(self.pull, self.penalty).sum()) + self.elsewhere
         return misfit_of(self.counts, self._spreads(self.power)) + cost
 
-    def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int = _ROUNDS) -> Descent:
+    def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int | None = None) -> Descent:
         """The step of least misfit.
 
         Weighted least squares, the weights renewed until the misfit stays. There may be more than
@@ -113,7 +115,7 @@ class Grams:
         each power in `starts`, with the weights of the residual at hand to that power.
         """
         now = np.maximum(self._spreads(self.power), 1.0)
-        ends = [self._descended(now**power, rounds) for power in starts]
+        ends = [self._descended(now**power, rounds or self.policy.most_rounds) for power in starts]
         return min(ends, key=lambda end: end.misfit)
 
     def _descended(self, spreads: Array, rounds: int) -> Descent:
@@ -125,7 +127,7 @@ class Grams:
             spreads = self._spreads(_after(self.power, self.slope, self.normal, step))
             cost = float(_costs(self.pull + self.penalty * step, self.penalty).sum())
             now = misfit_of(self.counts, spreads) + cost + self.elsewhere
-            if abs(before - now) < _SETTLED:
+            if abs(before - now) < self.policy.settled:
                 break
             before = now
         return Descent(step, spreads, now)

@@ -13,18 +13,13 @@ from pipeline.criticism.data.segment import Segment, slow_orders, told_signal
 from pipeline.criticism.effect import Array
 from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.validation import Validation
 from pipeline.criticism.regression.linear_system import Fitted, System
 from pipeline.numerics.cell_means import cell_means, visits_of
 from pipeline.physics.glossary import suffix_of
 from pipeline.physics.units import SUFFIX_UNITS
 from pipeline.records.error_map import Bins, ErrorMap, Histogram
 
-_SPEED_CELLS, _CURRENT_CELLS, _CURVE_CELLS = 16, 12, 12
-_ANGLE_CELLS, _MOST_ANGLE_CELLS = 36, 512
-_HISTOGRAM_REACH, _HISTOGRAM_CELLS = 8.0, 64
-"""Cells of maps and curves, of an electrical turn (10° each) and at the most of a mechanical one;
-reach of a histogram [noise floors] and its cells. By judgement, for people to look at: more cells
-hold fewer visits each, and fewer blur where an error is."""
 CURVES = (
     "omega_mech_rad_s",
     "iq_a",
@@ -118,7 +113,7 @@ def window_variables(segment: Segment) -> dict[str, Array]:
     return values
 
 
-def speed_current_map(errors: Errors) -> ErrorMap | None:
+def speed_current_map(errors: Errors, policy: Validation) -> ErrorMap | None:
     """Mean error over cells of speed and q current; None where a capture tells only one."""
     if "iq_a" not in errors.at or "omega_mech_rad_s" not in errors.at:
         return None
@@ -126,21 +121,21 @@ def speed_current_map(errors: Errors) -> ErrorMap | None:
     inside = np.isfinite(speed) & np.isfinite(current)
     if inside.sum() < 2:
         return None
-    x = Bins("omega_mech_rad_s", _even(speed[inside], _SPEED_CELLS))
-    y = Bins("iq_a", _even(current[inside], _CURRENT_CELLS))
+    x = Bins("omega_mech_rad_s", _even(speed[inside], policy.speed_cells))
+    y = Bins("iq_a", _even(current[inside], policy.current_cells))
     cell = _place(current[inside], y) * x.count + _place(speed[inside], x)
     return _window_map(errors, inside, cell, x, y)
 
 
-def curve(errors: Errors, variable: str) -> ErrorMap | None:
-    """Mean error over twelve ranges of one variable that hold equal shares of the windows."""
+def curve(errors: Errors, variable: str, policy: Validation) -> ErrorMap | None:
+    """Mean error over ranges of one variable that hold equal shares of the windows."""
     value = errors.at.get(variable)
     if value is None:
         return None
     inside = np.isfinite(value)
     if inside.sum() < 2 or np.ptp(value[inside]) <= 1e-9 * np.abs(value[inside]).max():
         return None
-    edges = np.unique(np.quantile(value[inside], np.linspace(0.0, 1.0, _CURVE_CELLS + 1)))
+    edges = np.unique(np.quantile(value[inside], np.linspace(0.0, 1.0, policy.curve_cells + 1)))
     x = Bins(variable, tuple(float(edge) for edge in edges))
     return _window_map(errors, inside, _place(value[inside], x), x, None)
 
@@ -209,7 +204,7 @@ def angle_maps(found: Sequence[Segment], fitted: Fitted) -> tuple[ErrorMap, ...]
     """
     parts: dict[tuple[str, str], list[tuple[Array, Array, Array, Array]]] = {}
     cells = {
-        "theta_elec_rad": _ANGLE_CELLS,
+        "theta_elec_rad": fitted.policy.validation.angle_cells,
         "theta_mech_rad": _mechanical_cells(fitted.model),
     }
     first = 0
@@ -238,7 +233,7 @@ def _turns(segment: Segment) -> bool:
 def _mechanical_cells(model: Model) -> int:
     """Four cells a wave of the highest order that a slow turn is looked at in."""
     highest = math.ceil(max(slow_orders(model.machine), default=1))
-    return min(max(4 * highest, 72), _MOST_ANGLE_CELLS)
+    return min(max(4 * highest, 72), model.policy.validation.most_angle_cells)
 
 
 def _by_angle(
@@ -279,9 +274,9 @@ def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:
     return np.array(kept, dtype=np.int64)
 
 
-def histograms(errors: Sequence[Errors]) -> tuple[Histogram, ...]:
+def histograms(errors: Sequence[Errors], policy: Validation) -> tuple[Histogram, ...]:
     """How each signal's window errors, over their noise floor, are spread."""
-    edges = np.linspace(-_HISTOGRAM_REACH, _HISTOGRAM_REACH, _HISTOGRAM_CELLS + 1)
+    edges = np.linspace(-policy.histogram_reach, policy.histogram_reach, policy.histogram_cells + 1)
     made = []
     for one in errors:
         inside = np.clip(one.error / one.sigma, edges[0], np.nextafter(edges[-1], 0.0))
@@ -296,7 +291,7 @@ def all_maps(
     """Every map of every signal: speed and current, angles, and one curve a variable."""
     made: list[ErrorMap | None] = []
     for errors in window_errors(found, around, residual_over_floor):
-        made.append(speed_current_map(errors))
-        made.extend(curve(errors, variable) for variable in CURVES)
+        made.append(speed_current_map(errors, fitted.policy.validation))
+        made.extend(curve(errors, variable, fitted.policy.validation) for variable in CURVES)
         made.append(direction(errors))
     return (*(one for one in made if one is not None), *angle_maps(found, fitted))

@@ -21,7 +21,6 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex, Values
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.validation.trajectories import (
-    ROUNDS,
     Batch,
     Jacobian,
     batch_of,
@@ -33,11 +32,6 @@ from pipeline.numerics.projection import bump
 ELECTRICAL = ("torque_map", "drive")
 MECHANICAL = ("spin_down",)
 SPEED = "omega_mech_rad_s"
-_REPLICATES, _POOLED = 2, 96
-"""Times that noise is added at the least, and window means that are then pooled: a floor is known
-to 7 %, the root of 1/(2·96)."""
-_OFFSET = 0.5
-"""Prior of a sensor's offset in standard deviations of its noise, as in `floors`."""
 _OFFSETS = ("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
 """Signals whose sensors may have an offset."""
 _SEED = 20261121
@@ -94,7 +88,9 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
         return None
     recorded = batch.segment.recorded
     jacobian = jacobian_of(batch, model, values)
-    found, settled = settle(batch, recorded, recorded, model, values, jacobian, ROUNDS)
+    found, settled = settle(
+        batch, recorded, recorded, model, values, jacobian, model.policy.validation.most_rounds
+    )
     if 2 * settled.sum() < batch.windows:
         return None
     names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
@@ -158,8 +154,11 @@ def _floor(response: _Response) -> dict[str, float]:
     """
     batch = response.batch
     noise = batch.segment.noise
+    policy = response.model.policy.validation
     total: dict[str, list[Array]] = {name: [] for name in response.names}
-    for replicate in range(max(_REPLICATES, -(-_POOLED // int(response.settled.sum())))):
+    for replicate in range(
+        max(policy.run_replicates, -(-policy.run_pooled // int(response.settled.sum())))
+    ):
         rng = np.random.default_rng([_SEED, replicate])
         added = {
             name: rng.normal(0.0, sigma, batch.segment.size)
@@ -172,10 +171,11 @@ def _floor(response: _Response) -> dict[str, float]:
 
 
 def _drift(response: _Response) -> dict[str, Array]:
-    """Moves [K, W] of the window means with an offset of each sensor, of half its noise."""
+    """Moves [K, W] of the window means with an offset of each sensor, of its prior size."""
     noise = response.batch.segment.noise
+    prior = response.model.policy.noise_floors.offset
     offsets = [name for name in _OFFSETS if noise.get(name, 0.0) > 0.0]
-    moves = [response.to({name: _OFFSET * noise[name]}) for name in offsets]
+    moves = [response.to({name: prior * noise[name]}) for name in offsets]
     return {name: np.array([move[name] for move in moves]) for name in response.names}
 
 

@@ -21,9 +21,6 @@ from pipeline.criticism.validation.free_run import Run, free_run
 from pipeline.records.comparison import SignalError, Trace
 
 Split = Literal["fit", "held_out"]
-_LOOK_S = 0.001
-"""Length of the means that pictures show [s]: shorter, and noise covers the torque; longer, and
-the currents' steps are rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +110,7 @@ def _equations(segment: Segment, fitted: Fitted, one: Simulated) -> Iterator[Tra
     if weak is None:
         return
     left = residual(segment, fitted.model, one.values)
-    width = max(2 * round(_LOOK_S / segment.ts_s / 2) + 1, 1)
+    width = max(2 * round(fitted.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):

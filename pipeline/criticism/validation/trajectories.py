@@ -25,19 +25,11 @@ from pipeline.criticism.machine.model import Model, air_gap_torque, evaluate
 from pipeline.criticism.regression.noise_floors import reading_error
 from pipeline.criticism.validation.error_maps import disjoint
 
-ROUNDS = 15
-"""Newton's steps at the most: what has not settled by then does not."""
 _STATE = ("id_a", "iq_a", "theta_mech_rad")
 _PAD = 23
 """Samples kept around a window: one less than a thinned log has there (`traces.PAD`)."""
 _START_S = 0.002
 """Length [s] of the straight line that tells the first speed, as of `true_signals._SPEED_S`."""
-_SHORTEST = 32
-"""Samples of a window that is worth a run; by judgement."""
-_SETTLED, _LOST = 1e-4, 30.0
-"""Last correction of a window that has settled, and one from which on it never will: in the
-machine's largest current and in electrical turns. By judgement: the first is what drives are
-modelled to (`noise_floors._MODEL_DRIVE`), the second beyond any machine."""
 _PROBE = 1e-3
 """Step of the finite differences, as a share of the machine's scale [A, rad/s], and in electrical
 radians: small against what bends the equations, large against rounding."""
@@ -82,7 +74,7 @@ def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
     starts = disjoint(weak.starts[inside], weak.length)
     pad = max(_PAD, round(_START_S / segment.ts_s / 2) + 3)
     length = weak.length + 2 * (_PAD - pad)
-    if starts.size == 0 or length < _SHORTEST:
+    if starts.size == 0 or length < model.policy.validation.shortest:
         return None
     rows = (starts[:, None] + np.arange(-_PAD, weak.length + _PAD)[None, :]).ravel()
     cut = {name: column[rows] for name, column in segment.recorded.items()}
@@ -219,8 +211,9 @@ def settle(
     """Signals [n] whose currents and angle obey the equations under `given` voltage and load.
 
     `extra` adds to each window's voltage [W] and torque [W]. Also returns which windows [W]
-    settled: those whose last correction was below 1e-4 of the machine's current.
+    settled: those whose last correction was below what drives are modelled to.
     """
+    policy = model.policy
     names = [name for name in _STATE if name in given]
     now = dict(given)
     for name in names:
@@ -237,14 +230,16 @@ def settle(
         speed = begin - _central_speed(batch, now["theta_mech_rad"])
         current, angle = _corrected(batch, jacobian, voltage, torque, values["j_kgm2"], speed)
         size = np.maximum(np.abs(current) / limits[0], np.abs(angle) / limits[1]).max(axis=1)
-        sound &= size < _LOST
+        sound &= size < policy.validation.lost
         current[~sound], angle[~sound] = 0.0, 0.0
         for name, change in zip(_STATE, (current.real, current.imag, angle), strict=True):
             if name in names:
                 now[name] = now[name] + change.ravel()
-        if not (size[sound] > _SETTLED).any():
+        if not (size[sound] > policy.noise_floors.model_drive).any():
             break
-    return now, sound & ((size < _SETTLED) | (rounds < ROUNDS))
+    return now, sound & (
+        (size < policy.noise_floors.model_drive) | (rounds < policy.validation.most_rounds)
+    )
 
 
 def _first_speed(batch: Batch, theta: Array) -> Array:

@@ -9,6 +9,7 @@ from pipeline.criticism.discovery.description import _run
 from pipeline.criticism.discovery.dictionary import Term
 from pipeline.criticism.discovery.matching_pursuit import Expression
 from pipeline.criticism.discovery.residual_inputs import ports
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.diagnosis import CurvePoint
 from tests.unit.criticism.machines import machine
 
@@ -17,7 +18,7 @@ def words(variable: str, low: float, high: float, *terms: tuple[float, Term]) ->
     """What is said of a drag on one variable that is visited from low to high."""
     port = next(
         p
-        for p in ports(machine(), ("torque",))
+        for p in ports(machine(), DEFAULT.discovery, ("torque",))
         if p.variable.name == variable and not p.carriers[0].words
     )
     amplitudes = np.array([size for size, _ in terms])
@@ -26,7 +27,7 @@ def words(variable: str, low: float, high: float, *terms: tuple[float, Term]) ->
         tuple(term for _, term in terms), amplitudes, (), np.eye(0), 1.0, nothing, nothing
     )
     curve = tuple(CurvePoint(float(at), 0.0, 0.0, 0.0) for at in np.linspace(low, high, 17))
-    return _run(port, curve, found, 0)
+    return _run(port, curve, found, 0, DEFAULT.discovery)
 
 
 SPEED = "omega_mech_rad_s"

@@ -11,6 +11,7 @@ import pytest
 from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, floors, system
 from pipeline.criticism.validation.error_maps import (
     Errors,
@@ -45,7 +46,7 @@ def scattered(planted: float, seed: int = 2) -> Errors:
 
 
 def test_a_planted_error_is_found_in_its_corner():
-    one = speed_current_map(scattered(0.05))
+    one = speed_current_map(scattered(0.05), DEFAULT.validation)
     assert one is not None
     assert one.y is not None
     assert int(one.count.sum()) == N
@@ -62,10 +63,11 @@ def test_a_planted_error_is_found_in_its_corner():
 
 def test_noise_marks_no_cell_and_depends_on_nothing():
     errors = scattered(0.0)
-    one = speed_current_map(errors)
+    one = speed_current_map(errors, DEFAULT.validation)
     assert one is not None
     assert np.nanmin(one.p_value) * one.p_value.size > 0.01
-    for told in (one, curve(errors, "t_s"), curve(errors, "iq_a"), direction(errors)):
+    curves = (curve(errors, name, DEFAULT.validation) for name in ("t_s", "iq_a"))
+    for told in (one, *curves, direction(errors)):
         assert told is not None
         assert told.p_map > 1e-3
         assert told.explained < 0.1
@@ -73,7 +75,7 @@ def test_noise_marks_no_cell_and_depends_on_nothing():
 
 def test_cells_of_one_variable_hold_equal_shares_and_the_sense_has_two():
     errors = scattered(0.0)
-    one, sense = curve(errors, "omega_mech_rad_s"), direction(errors)
+    one, sense = curve(errors, "omega_mech_rad_s", DEFAULT.validation), direction(errors)
     assert one is not None
     assert sense is not None
     assert np.ptp(one.count) <= 2
@@ -81,7 +83,7 @@ def test_cells_of_one_variable_hold_equal_shares_and_the_sense_has_two():
         int((errors.at["omega_mech_rad_s"] < 0).sum()),
         int((errors.at["omega_mech_rad_s"] > 0).sum()),
     ]
-    assert curve(errors, "temp_magnet_degc") is None
+    assert curve(errors, "temp_magnet_degc", DEFAULT.validation) is None
 
 
 def test_a_map_of_a_fit_knows_speed_and_current_of_its_windows():
@@ -100,7 +102,7 @@ def test_a_map_of_a_fit_knows_speed_and_current_of_its_windows():
     # a sensor's offset is absorbed as far as its prior goes
     assert one.error == pytest.approx(means, abs=0.5 * 0.01)
     assert np.corrcoef(one.error, means)[0, 1] > 0.99
-    for spread in histograms(tuple(errors.values())):
+    for spread in histograms(tuple(errors.values()), DEFAULT.validation):
         assert sum(spread.count) == segment.weak.starts.size
 
 

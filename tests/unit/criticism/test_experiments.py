@@ -16,6 +16,7 @@ from pipeline.criticism.effect import Parameter
 from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, floors
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.selection.score_test import candidates, widened
@@ -54,8 +55,10 @@ def test_power_is_that_of_a_chi_square_test_at_one_per_cent():
     limit = ncx2.ppf(0.99, 2, 1e-12)
     for noncentrality in (0.5, 4.0, 20.0):
         expected = ncx2.sf(limit, 2, noncentrality)
-        assert experiments._power(noncentrality, 2) == pytest.approx(expected, rel=1e-4)
-    assert experiments._power(0.0, 1) == pytest.approx(0.01, rel=1e-6)
+        assert experiments._power(noncentrality, 2, DEFAULT.design) == pytest.approx(
+            expected, rel=1e-4
+        )
+    assert experiments._power(0.0, 1, DEFAULT.design) == pytest.approx(0.01, rel=1e-6)
 
 
 def test_what_the_others_leave_of_a_vector_is_its_part_off_their_plane():

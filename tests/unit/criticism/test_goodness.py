@@ -42,7 +42,7 @@ def captures(levels: list[float], seed: int = 4) -> System:
         labels=tuple((n, "vq_v", 0) for n in range(len(levels))),
         penalty=np.zeros(1),
         pull=np.zeros(1),
-        around=Fitted(None, {}, (), {}),  # type: ignore[arg-type]
+        around=Fitted(Model(machine(), ()), {}, (), {}),
         tests=("drive",) * len(levels),
         made_at={},
     )

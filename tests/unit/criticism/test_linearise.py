@@ -11,6 +11,7 @@ from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, _kept, floors, own_columns, system
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
@@ -28,9 +29,11 @@ def test_rows_over_another_noise_have_their_offsets_absorbed_by_that():
     bare = 1.0 + rng.normal(size=(count, 3))
     before, after = 300.0 * rng.uniform(1.0, 9.0, (2, count))
     was, expected = bare * before[:, None], bare * after[:, None]
-    absorb(was, offsets(one, valid, before))
-    absorb(expected, offsets(one, valid, after))
-    assert whitened_anew(one, was, before, after) == pytest.approx(expected, rel=1e-9)
+    absorb(was, offsets(one, valid, before, DEFAULT.noise_floors))
+    absorb(expected, offsets(one, valid, after, DEFAULT.noise_floors))
+    assert whitened_anew(one, was, before, after, DEFAULT.noise_floors) == pytest.approx(
+        expected, rel=1e-9
+    )
     assert not np.allclose(was * (after / before)[:, None], expected, rtol=0.1)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.normal_equations import Grams
 
 GROUP = np.repeat([0, 1, 2], [40, 60, 30])
@@ -18,7 +19,7 @@ def rows(bad=1.0):
 
 
 def grams(matrix, residual, penalty=NOTHING, pull=NOTHING):
-    return Grams.of(matrix, residual, GROUP, 3, penalty, pull, 0.0)
+    return Grams.of(matrix, residual, GROUP, 3, penalty, pull, 0.0, DEFAULT.fit)
 
 
 def test_groups_at_their_floor_make_an_ordinary_least_squares_fit():
@@ -67,6 +68,7 @@ def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
         np.zeros(2),
         np.zeros(2),
         0.0,
+        DEFAULT.fit,
     ).best()
     assert some.step == pytest.approx(again.step)
     assert some.misfit == pytest.approx(again.misfit)

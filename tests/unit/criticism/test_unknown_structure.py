@@ -16,6 +16,7 @@ from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect, Parameter
 from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import Fitted, floors, system
@@ -202,7 +203,7 @@ def _slowly_warmed(seed):
 def test_smooth_curves_lie_in_the_hats(name):
     """What a few smooth curves say, narrow hats can say as well."""
     variable = variables(machine())[name]
-    few, many = coarse(variable, machine()), fine(variable, machine())
+    few, many = (made(variable, machine(), DEFAULT.discovery) for made in (coarse, fine))
     if not few.nodes.size:
         return
     weights = np.random.default_rng(2).normal(size=len(few.names))
@@ -237,7 +238,7 @@ def test_the_python_of_a_term_with_a_centre_is_the_term(kind, parity):
 def test_a_straight_line_is_a_smooth_curve_of_speed():
     """Viscous friction must be nothing that a port knows and the model does not."""
     variable = variables(machine())["omega_mech_rad_s"]
-    basis = coarse(variable, machine())
+    basis = coarse(variable, machine(), DEFAULT.discovery)
     at = np.linspace(-240.0, 240.0, 97)
     columns = np.stack([basis.curve(at, row) for row in np.eye(len(basis.names))], axis=1)
     fit = np.linalg.lstsq(columns, at, rcond=None)[0]
@@ -246,10 +247,10 @@ def test_a_straight_line_is_a_smooth_curve_of_speed():
 
 def test_every_port_is_zero_at_zero_and_has_a_name_of_its_own():
     x = replace(operating(), psi_wb=np.full(60, 0.01 + 0j), torque_em_nm=np.ones(60))
-    offered = ports(machine())
+    offered = ports(machine(), DEFAULT.discovery)
     assert len({port.effect.name for port in offered}) == len(offered)
     for port in offered:
-        fine_port = refined(port, machine())
+        fine_port = refined(port, machine(), DEFAULT.discovery)
         for one in (port, fine_port):
             q = {p.name: 0.0 for p in one.effect.parameters}
             hook = one.effect.coenergy or one.effect.drop or one.effect.torque

@@ -1,0 +1,181 @@
+"""Constants of judgement of `discovery`: what an unknown structure depends on, and its formula."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.records.policy import chosen, derived
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Discovery:
+    """Bases, inputs, matching pursuit, and the description of what was found."""
+
+    near_share: float = chosen(
+        0.05,
+        unit="1",
+        meaning="share of the best input's evidence that another may be short of and do as well",
+        why="at 0 noise chooses the variable, at 0.5 most inputs are named",
+    )
+    prior_size: float = chosen(
+        1.0,
+        unit="machine scales",
+        meaning="standard deviation of a coefficient of an input's curve",
+        why="no curve is larger",
+    )
+    parts: int = chosen(
+        12,
+        unit="1",
+        meaning="parts that a capture without a second one is held out in",
+        why="as many as drive logs are held out in",
+    )
+    knot_exponent: float = chosen(
+        1.6,
+        unit="1",
+        meaning="exponent that crowds the knots of a curve near zero, where friction bends most",
+        why="at 1 they are even, at 3 the upper half of the range has two",
+    )
+    knots: int = chosen(
+        8,
+        unit="1",
+        meaning="knots of the smooth curve of one sign",
+        why="fewer miss a bump, each one more costs",
+    )
+    hats: int = chosen(
+        40,
+        unit="1",
+        meaning="narrow hats of one sign in which formulas are fitted",
+        why="wide hats round a formula off, and the cost goes with their number",
+    )
+    turn_hats: int = chosen(
+        48,
+        unit="1",
+        meaning="narrow hats of a turn, 7.5° each",
+        why="wide hats round a formula off, and the cost goes with their number",
+    )
+    warm_knots_k: tuple[float, ...] = chosen(
+        (-15.0, 0.0, 10.0, 20.0, 35.0, 55.0, 80.0, 110.0),
+        unit="K",
+        meaning="knots of a curve of a temperature, over 25 °C",
+        why="from a cold hall to a hot winding, closer where most recordings are",
+    )
+    orders: int = chosen(
+        8,
+        unit="1",
+        meaning="lowest orders a turn that are offered on every machine, from 1 on",
+        why="eccentricity and what couplings and few poles do",
+    )
+    most_groups: int = chosen(
+        4,
+        unit="1",
+        meaning="groups of terms of a formula at the most",
+        why="a longer formula is the curve once more, and says nothing",
+    )
+    least_gain: float = chosen(
+        0.01,
+        unit="1",
+        meaning="share of the whole gain that a group of terms must add",
+        why="a longer formula is the curve once more, and says nothing",
+    )
+    refined: int = chosen(
+        6,
+        unit="1",
+        meaning="groups whose scales are refined at each step",
+        why="each costs a search",
+    )
+    scales: int = chosen(
+        18,
+        unit="1",
+        meaning="trial scales of a shape, from a hundredth to twice the range",
+        why="a third apart: refining goes on from there",
+    )
+    centres: int = chosen(
+        24,
+        unit="1",
+        meaning="places a turn at which a bump is tried",
+        why="neighbours overlap",
+    )
+    widths_rad: tuple[float, ...] = chosen(
+        (0.15, 0.3, 0.6, 1.2),
+        unit="rad",
+        meaning="widths of a bump of the angle that are tried",
+        why="neighbours overlap",
+    )
+    humps: tuple[float, ...] = chosen(
+        (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9),
+        unit="1",
+        meaning="places in its range at which a variable may have a hump",
+        why="a tenth of the range apart: refining goes on from there",
+    )
+    hump_widths: tuple[float, ...] = chosen(
+        (0.03, 0.06, 0.12, 0.25),
+        unit="1",
+        meaning="widths of a hump as shares of the range",
+        why="an octave apart: refining goes on from there",
+    )
+    refining_reach: float = chosen(
+        1.2,
+        unit="1",
+        meaning="logarithm of how far refining moves a scale [of an angle: rad]",
+        why="four trial scales to either side",
+    )
+    most_rounds: int = chosen(
+        12,
+        unit="1",
+        meaning="renewals of the weights at the most while a formula is fitted",
+        why="a bound of the cost: most end before, by `fit.settled`",
+    )
+    sure_u: float = derived(
+        1.96,
+        unit="standard uncertainties",
+        meaning="half width of the band about a reported curve",
+        source="95 % of a normal distribution",
+    )
+    parity_share: float = chosen(
+        0.1,
+        unit="1",
+        meaning="share of its size that a curve may miss its mirror image by to be odd or even",
+        why="it chooses words and nothing else",
+    )
+    jump_share: float = chosen(
+        0.05,
+        unit="1",
+        meaning="part of the range around zero in which parity is not judged",
+        why="friction jumps there",
+    )
+    inside_share: float = chosen(
+        0.97,
+        unit="1",
+        meaning="part of the range up to which a maximum lies inside it",
+        why="it chooses words and nothing else",
+    )
+    tail_share: float = chosen(
+        0.1,
+        unit="1",
+        meaning="last part of a range, in which a curve is level or still grows",
+        why="it chooses words and nothing else",
+    )
+    level_share: float = chosen(
+        0.02,
+        unit="1",
+        meaning="change over that part, as a share, that is none",
+        why="it chooses words and nothing else",
+    )
+    visited_share: float = chosen(
+        1e-3,
+        unit="1",
+        meaning="share of the best visited hat's size from which on a place counts as visited",
+        why="a curve is not reported where captures hardly were",
+    )
+    bounds_factor: float = chosen(
+        30.0,
+        unit="1",
+        meaning="bounds of a parameter in the written effect, over the value found",
+        why="wide enough for a user's own form",
+    )
+    negligible_share: float = chosen(
+        0.01,
+        unit="1",
+        meaning="negligible size of a parameter in the written effect, over the value found",
+        why="a hundredth of a drag is nobody's concern",
+    )

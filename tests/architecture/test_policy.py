@@ -1,0 +1,63 @@
+"""Constants of judgement are in the policy: what modules of criticism still hold is arithmetic."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+CRITICISM = Path(__file__).resolve().parents[2] / "pipeline" / "criticism"
+IN_POLICY = ("selection", "regression", "discovery", "validation", "design")
+ARITHMETIC = {
+    "discovery/bases.py": {"TURN_RAD", "_EDGE"},  # a turn; beside zero and not at it
+    "discovery/description.py": {"_POINTS", "_TURN_POINTS", "_DENSE"},  # points of a picture
+    "discovery/dictionary.py": {"SHAPES", "_ABOVE_DEGC"},  # formulas; the model's temperature
+    "discovery/matching_pursuit.py": {"_RIDGE"},  # against rounding
+    "discovery/residual_inputs.py": {"_WIDE"},  # no bound
+    "regression/bounds.py": {"_AT"},  # rounding
+    "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
+    "regression/identifiability.py": {"_EDGE"},  # rounding
+    "regression/linear_system.py": {"_SEED"},
+    "regression/linearise.py": {"_CHUNK", "_NOTHING", "_FINE"},  # the cache; rounding; differences
+    "regression/mains_hum.py": {"LINES_HZ", "_BESIDE", "_LOBE", "_FINER"},  # mains; Hann's window
+    "regression/normal_equations.py": {"_TIE"},  # rounding
+    "regression/parallel.py": {"_THREADS"},  # how work is run
+    "validation/free_run.py": {"_SEED"},
+    "validation/signature.py": {"_CELLS", "_FEWEST", "_TURN"},  # cells of a picture; a turn
+    "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
+    "design/experiments.py": {"_SEED"},
+}
+"""Numbers that are no judgement: rounding, seeds, formulas, pictures, how work is run."""
+
+
+def numbers(tree: ast.Module) -> Iterator[str]:
+    """Names at the top of a module that hold a number."""
+    for node in tree.body:
+        if not isinstance(node, (ast.Assign, ast.AnnAssign)) or node.value is None:
+            continue
+        held = (n.value for n in ast.walk(node.value) if isinstance(n, ast.Constant))
+        if any(isinstance(one, (int, float)) and not isinstance(one, bool) for one in held):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            for target in targets:
+                yield from (n.id for n in ast.walk(target) if isinstance(n, ast.Name))
+
+
+def modules() -> list[str]:
+    found = [path for part in IN_POLICY for path in (CRITICISM / part).glob("*.py")]
+    found += [path for path in CRITICISM.glob("*.py") if path.name != "effect.py"]
+    return sorted(path.relative_to(CRITICISM).as_posix() for path in found)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_a_number_at_the_top_of_a_module_is_no_judgement(name: str) -> None:
+    left = set(numbers(ast.parse((CRITICISM / name).read_text(encoding="utf-8"))))
+    known = ARITHMETIC.get(name, set())
+    assert left - known == set(), "make it a field of pipeline/criticism/policy"
+    assert known - left == set(), "no longer there"
+
+
+def test_a_threshold_is_seen() -> None:
+    tree = ast.parse("_SHARE, _MOST = 0.5, 3\nNAMES = ('a',)\n_LEAST: float = 1e-3\n")
+    assert set(numbers(tree)) == {"_SHARE", "_MOST", "_LEAST"}

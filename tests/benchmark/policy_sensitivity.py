@@ -1,0 +1,128 @@
+"""How names and silence move when a constant of judgement is halved and doubled.
+
+Every variant is a run of the same sealed cases under another policy, kept like any run, so that a
+command that was stopped goes on. Rows that have not been run say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from pipeline.criticism.policy.policy import DEFAULT, policy_of
+from pipeline.records.errors import UsageError
+from pipeline.records.policy import Entry, Number, Overrides, entries, policy_digest
+from tests.benchmark.blind import product
+from tests.benchmark.cases import Case
+from tests.benchmark.running import Book, run
+from tests.benchmark.scoring import judged
+
+FACTORS = (0.5, 2.0)
+HEAD = """# What moves when a constant of judgement is halved or doubled
+
+`python -m tests.benchmark action=policy fields=NAME,... count=N docs=docs/policy-sensitivity.md`
+runs {count} cases of the small blind benchmark ([benchmark.md](benchmark.md)) at the default policy
+and with one chosen number halved and doubled. *right*, *wrong* and *silent* count the cases' marks
+(silent: nothing named with confidence where something is hidden); *moved* counts cases whose
+verdict or names differ from the default's. A share of few cases says little: no row here calibrates
+a number. Rows without figures have not been run. [policy.md](policy.md) says what each number is.
+
+Cases: {cases}. Code {code}, seed {seed}.
+"""
+_COLUMNS = "right | wrong | silent | moved"
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A field, and the factor by which it is multiplied; None is the default policy."""
+
+    entry: Entry | None = None
+    factor: float = 1.0
+
+    @property
+    def changes(self) -> Overrides:
+        """The override that it is; none where a whole number stays as it is."""
+        if self.entry is None:
+            return ()
+        value = scaled(self.entry.value, self.factor)
+        return () if value == self.entry.value else ((self.entry.name, value),)
+
+
+def scaled(value: Number, factor: float) -> Number:
+    """A number or row of numbers times a factor; whole numbers stay whole and at least one."""
+    if isinstance(value, tuple):
+        return tuple(factor * one for one in value)
+    return max(round(factor * value), 1) if isinstance(value, int) else factor * value
+
+
+def chosen_entries(fields: Sequence[str]) -> list[Entry]:
+    """Every number that somebody has chosen, those of `fields` first; raises UsageError."""
+    found = {entry.name: entry for entry in entries(DEFAULT) if entry.origin.kind == "chosen"}
+    for name in fields:
+        if name not in found:
+            raise UsageError(f"no chosen number {name!r}", "docs/policy.md lists them")
+    return [*(found[name] for name in fields), *(e for n, e in found.items() if n not in fields)]
+
+
+def spread(cases: Sequence[Case], count: int) -> list[Case]:
+    """So many of the cases, evenly over their list and so over families and lines."""
+    step = max(len(cases) / max(count, 1), 1.0)
+    return [cases[int(n * step)] for n in range(min(count, len(cases)))]
+
+
+def book_of(book: Book, variant: Variant) -> Book:
+    """Where the results of a variant are kept: the code's own place is the default policy's."""
+    if not variant.changes:
+        return book
+    return Book(book.folder, f"{book.code}-{policy_digest(policy_of(variant.changes))[:12]}")
+
+
+def measure(cases: Sequence[Case], book: Book, fields: Sequence[str]) -> int:
+    """Runs the default and the variants of some fields; returns how many cases it diagnosed."""
+    wanted = [Variant()]
+    some = chosen_entries(fields)[: len(fields)]
+    wanted += [Variant(entry, factor) for entry in some for factor in FACTORS]
+    return sum(
+        run(list(cases), book_of(book, one), partial(product, policy=one.changes)) for one in wanted
+    )
+
+
+def page(cases: Sequence[Case], book: Book, fields: Sequence[str], seed: int) -> str:
+    """The table of all chosen numbers, as far as they have been run."""
+    listed = ", ".join(f"{case.family} {case.line} ({case.motor})" for case in cases)
+    lines = [HEAD.format(count=len(cases), cases=listed, code=book.code, seed=seed)]
+    lines += [f"| field | value | halved: {_COLUMNS} | doubled: {_COLUMNS} |"]
+    lines += ["| --- | --- |" + " --- |" * 8]
+    lines.append(f"| *default* | | {_marks(cases, book, Variant())} | | | | |")
+    for entry in chosen_entries(fields):
+        both = (_marks(cases, book, Variant(entry, factor)) for factor in FACTORS)
+        value = entry.value if not isinstance(entry.value, tuple) else "row"
+        lines.append(f"| `{entry.name}` | {value} | {' | '.join(both)} |")
+    return "\n".join([*lines, ""])
+
+
+def _marks(cases: Sequence[Case], book: Book, variant: Variant) -> str:
+    """Right, wrong, silent and moved as cells; empty cells where a case has no result yet."""
+    pairs = list(_pairs(cases, book, variant))
+    if len(pairs) < len(cases):
+        return " | | | "
+    marks = [judged(case, document).mark for case, document, _ in pairs]
+    silent = sum(mark in ("unknown", "missed") for mark in marks)
+    moved = sum(_told(document) != _told(plain) for _, document, plain in pairs)
+    right = sum(mark in ("right", "tie") for mark in marks)
+    return f"{right} | {marks.count('wrong')} | {silent} | {moved}"
+
+
+def _pairs(
+    cases: Sequence[Case], book: Book, variant: Variant
+) -> Iterator[tuple[Case, Mapping[str, Any], Mapping[str, Any]]]:
+    for case in cases:
+        document, plain = book_of(book, variant).document(case), book.document(case)
+        if document is not None and plain is not None:
+            yield case, document, plain
+
+
+def _told(document: Mapping[str, Any]) -> tuple[Any, ...]:
+    return document.get("verdict"), tuple(document.get("missing", ()))

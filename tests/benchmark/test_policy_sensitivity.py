@@ -1,0 +1,76 @@
+"""The table of halved and doubled numbers: what is run, what is counted, what is left open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.io.storage.publish import canonical_json, write_whole
+from pipeline.records.errors import UsageError
+from pipeline.records.policy import entries
+from tests.benchmark.cases import Case
+from tests.benchmark.drawing import cases
+from tests.benchmark.policy_sensitivity import (
+    Variant,
+    book_of,
+    chosen_entries,
+    page,
+    scaled,
+    spread,
+)
+from tests.benchmark.running import Book
+
+
+@pytest.fixture(scope="module")
+def nulls(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
+    drawn = cases(3, tmp_path_factory.mktemp("sensitivity"))
+    return [case for case in drawn if case.family == "null"][:2]
+
+
+def keep(book: Book, case: Case, *missing: str) -> None:
+    document = {"verdict": "missing" if missing else "adequate", "missing": missing, "ranking": []}
+    write_whole(book.result(case), canonical_json(document))
+
+
+def test_numbers_are_scaled_and_whole_ones_stay_whole():
+    assert scaled(12.0, 0.5) == 6.0
+    assert (scaled(3, 0.5), scaled(3, 2.0), scaled(1, 0.5)) == (2, 6, 1)
+    assert scaled((1.0, 0.5), 2.0) == (2.0, 1.0)
+
+
+def test_only_chosen_numbers_are_moved_and_the_wanted_ones_come_first():
+    found = chosen_entries(["selection.tie"])
+    assert found[0].name == "selection.tie"
+    assert {entry.origin.kind for entry in found} == {"chosen"}
+    assert len(found) == sum(entry.origin.kind == "chosen" for entry in entries(DEFAULT))
+    for name in ("selection.tei", "fit.settled"):  # one that is none, one that is derived
+        with pytest.raises(UsageError):
+            chosen_entries([name])
+
+
+def test_cases_are_spread_over_the_list(nulls: list[Case]) -> None:
+    many = [replace(nulls[0], number=n) for n in range(10)]
+    assert [case.number for case in spread(many, 5)] == [0, 2, 4, 6, 8]
+    assert len(spread(many, 50)) == 10
+
+
+def test_a_row_counts_what_was_run_and_is_empty_where_it_was_not(
+    nulls: list[Case], tmp_path: Path
+) -> None:
+    """Two captures of sound motors: one is named wrongly once the tie is halved."""
+    book, tie = Book(tmp_path, "code"), chosen_entries(["selection.tie"])[0]
+    half = book_of(book, Variant(tie, 0.5))
+    assert half.code != book.code
+    for case in nulls:
+        keep(book, case)
+    keep(half, nulls[0], "windage")
+    rows = page(nulls, book, ["selection.tie"], 3).splitlines()
+    (row,) = (row for row in rows if "`selection.tie`" in row)
+    assert row == "| `selection.tie` | 12.0 |  | | |  |  | | |  |"
+    keep(half, nulls[1])
+    rows = page(nulls, book, ["selection.tie"], 3).splitlines()
+    (row,) = (row for row in rows if "`selection.tie`" in row)
+    assert row == "| `selection.tie` | 12.0 | 1 | 1 | 0 | 1 |  | | |  |"
