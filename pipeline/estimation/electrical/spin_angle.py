@@ -14,13 +14,10 @@ from pipeline.estimation.electrical.back_emf import (
     StretchFlux,
     electrical_per_mechanical,
 )
-from pipeline.estimation.uncertainty.instruments import budget_of
+from pipeline.estimation.method import Method
 from pipeline.physics.conventions import pole_pairs_from
 from pipeline.records.capture import Capture
-from pipeline.records.estimate import Estimate, not_identifiable
-from pipeline.records.uncertainty import Contribution
-
-METHOD = "open_circuit"
+from pipeline.records.estimate import Estimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +31,7 @@ class Group:
     temp_degc: float
 
 
-def count_pole_pairs(groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
+def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
     """P and the phase order from electrical over mechanical speed of each capture."""
     ratios: list[float] = []
     words = ""
@@ -50,8 +47,7 @@ def count_pole_pairs(groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
         "record theta_mech_rad or omega_mech_rad_s in the open_circuit capture, or a hand_turn"
     )
     if not ratios:
-        absent = [not_identifiable(n, "1", METHOD, missing) for n in ("pole_pairs", "phase_order")]
-        return absent[0], absent[1]
+        return method.missing("pole_pairs", missing), method.missing("phase_order", missing)
     counts = [pole_pairs_from(abs(r), 1.0).number for r in ratios]
     found = ", ".join(f"{abs(r):.5f}" for r in ratios)
     if counts[0] is None or len(set(counts)) > 1:
@@ -59,25 +55,20 @@ def count_pole_pairs(groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
             f"electrical cycles a turn of {words} are {found}: no whole number within 0.02; check "
             "for a gear or slip between motor and angle sensor, then repeat the open_circuit"
         )
-        pairs = not_identifiable("pole_pairs", "1", METHOD, note)
+        pairs = method.missing("pole_pairs", note)
     else:
         worst = max(abs(abs(r) - counts[0]) for r in ratios)
         note = f"electrical cycles a turn of {words}: {found}; {worst:.1g} from the whole number"
-        pairs = Estimate(
-            "pole_pairs", counts[0], "1", "measured", METHOD, captures=tuple(paths), note=note
-        )
+        pairs = method.measured("pole_pairs", counts[0], captures=paths, notes=note)
     senses = {1 if r > 0.0 else -1 for r in ratios}
     if len(senses) > 1:
         note = "captures disagree on the phase order; check which leads were exchanged"
-        return pairs, not_identifiable("phase_order", "1", METHOD, note)
-    order = Estimate(
-        "phase_order", senses.pop(), "1", "measured", METHOD, captures=tuple(paths), note=words
-    )
-    return pairs, order
+        return pairs, method.missing("phase_order", note)
+    return pairs, method.measured("phase_order", senses.pop(), captures=paths, notes=words)
 
 
 def angle_offset(
-    groups: Sequence[Group], pairs: Estimate, order: Estimate, used: Sequence[Capture]
+    method: Method, groups: Sequence[Group], pairs: Estimate, order: Estimate
 ) -> Estimate:
     """Circular mean over all speeds of the d axis less s p theta, both senses of rotation alike.
 
@@ -87,8 +78,7 @@ def angle_offset(
     name = "angle_offset_elec_rad"
     own = [g for g in groups if g.spin.theta_rad is not None]
     if not own or not pairs.known or not order.known:
-        note = "record theta_mech_rad in the open_circuit capture"
-        return not_identifiable(name, "rad", METHOD, note)
+        return method.missing(name, "record theta_mech_rad in the open_circuit capture")
     vectors = []
     for group in own:
         theta = group.spin.theta_rad
@@ -102,15 +92,7 @@ def angle_offset(
     apart = np.angle(np.array(vectors) / mean)
     count = len(vectors)
     u = float(np.std(apart, ddof=1)) / math.sqrt(count) if count > 1 else float(math.pi / 100)
-    kind = Contribution(f"scatter:{METHOD}:{name}", u, "A", float(max(count - 1, 1)))
-    return Estimate(
-        name,
-        float(np.angle(mean)),
-        "rad",
-        "measured",
-        METHOD,
-        budget_of([kind]),
-        {},
-        tuple(c.path for c in used),
-        "of the angle sensor as mounted on this bench, not of the motor",
-    )
+    scatter = method.scatter(name, u, float(max(count - 1, 1)))
+    paths = dict.fromkeys(g.capture.path for g in groups)
+    note = "of the angle sensor as mounted on this bench, not of the motor"
+    return method.measured(name, float(np.angle(mean)), [scatter], paths, notes=note)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
-from pipeline.estimation.uncertainty.measured import measured
 from pipeline.numerics.orders import (
     TURN_RAD,
     OrderLine,
@@ -26,15 +26,14 @@ from pipeline.numerics.orders import (
     waveform,
     whole_turns,
 )
-from pipeline.physics.glossary import CONSTANTS
 from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, Order, not_identifiable, not_there
+from pipeline.records.estimate import Estimate, Order
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution
 
-NAME = "cogging"
+METHOD = Method("cogging")
 COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
 GIVES = (*COGGING, "torque_coulomb_nm")
 AIDS = ("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s")
@@ -60,7 +59,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         turns += whole_turns(data["theta_mech_rad"][there], data["torque_shaft_nm"][there])
     if len(turns) < 2:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+        return METHOD.nothing(GIVES, note)
     highest = largest_order(turns, int(options["highest_order"]))
     spec, lines = find_orders(turns, highest, options["level"])
     body, slow = part_orders(lines, known, campaign)
@@ -160,7 +159,7 @@ def _cogging(
     if not lines:
         limit = detection_limit(spec, options["level"])
         note = f"no cogging found; an amplitude above {limit:.2g} N·m would have been; {tested}"
-        return tuple(not_there(n, _unit(n), NAME, note + also) for n in COGGING)
+        return tuple(METHOD.absent(n, note + also) for n in COGGING)
     leading = lines[0]
     sides = phase_modulated(lines, leading.order)
     amplitude = float(np.sqrt(sum(line.amplitude**2 for line in [leading, *sides])))
@@ -169,11 +168,10 @@ def _cogging(
         note += "; sidebands are those of an eccentric encoder and counted to the amplitude"
     peak, u_peak = half_peak_to_peak(peak_orders(lines, spec, _teeth(known, campaign), sides))
     note += "; " * bool(unstated_note(captures, ("torque",))) + unstated_note(captures, ("torque",))
-    paths = tuple(c.path for c in captures)
     dof = min(line.dof for line in lines)
     return (
-        Estimate("cogging_order", leading.order, "1", "measured", NAME, captures=paths, note=note,
-                 bounds=(1.0, float(spec.orders[-1]))),
+        METHOD.measured("cogging_order", leading.order, captures=captures, notes=note,
+                        bounds=(1.0, float(spec.orders[-1]))),
         replace(
             _torque("cogging_amplitude_nm", amplitude, leading.u, leading.dof, captures, note),
             orders=_published(lines),
@@ -199,11 +197,11 @@ def _torque(
     note: str,
     speed_rad_s: float | None = None,
 ) -> Estimate:
-    parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof)]
+    parts = [METHOD.scatter(name, u, dof)]
     gains = instrument_uncertainties(captures, ("torque",))
     parts += [Contribution(source, value * gain, "B") for source, gain in gains.items()]
     at = {} if speed_rad_s is None else {"omega_mech_rad_s": speed_rad_s}
-    return measured(NAME, name, _unit(name), value, parts, captures, at, [note])
+    return METHOD.measured(name, value, parts, captures, at, note)
 
 
 def _friction(
@@ -213,13 +211,13 @@ def _friction(
     forward, backward = spec.means[spec.senses > 0], spec.means[spec.senses < 0]
     if forward.size == 0 or backward.size == 0:
         note = "one sense of rotation only; record the slow turn the other way as well"
-        return not_identifiable(name, _unit(name), NAME, note)
+        return METHOD.missing(name, note)
     value = float(backward.mean() - forward.mean()) / 2.0
     variance, dof = _variance_of_mean(spec, forward, backward)
     u = float(np.sqrt(variance * (1.0 / forward.size + 1.0 / backward.size)) / 2.0)
     if value < -3.0 * u:
         note = "the shaft torque drives the motion; check the sign of torque_shaft_nm"
-        return not_identifiable(name, _unit(name), NAME, note)
+        return METHOD.missing(name, note)
     zero = float(backward.mean() + forward.mean()) / 2.0
     speed = _speed(captures)
     share, words = _viscous_share(speed, known)
@@ -298,23 +296,27 @@ def _evidence(
         where = (at.astype(np.float64) + 0.5) * (TURN_RAD / bins)
         level = float(np.mean(spec.means[spec.senses == sense]))
         series.append(Series(label, where, mean, level + waveform(lines, where)))
-    shown = min(spec.orders.size, 2000, max(4 * max((n.order for n in lines), default=0), 200))
-    heights = np.abs(spec.coefficients.mean(axis=0))[:shown]
-    bars = Series("orders", spec.orders[:shown].astype(float), heights, np.array([]))
+    shown = min(2000, max(4 * max((n.order for n in lines), default=0), 200))
     return (
-        Evidence(NAME, "Zero-current torque over one turn", "theta_mech_rad", "torque_shaft_nm",
-                 "line", tuple(series), caption="half the gap between the directions is friction"),
-        Evidence(NAME, "Cogging spectrum", "cogging_order", "cogging_amplitude_nm", "bars",
-                 (bars,), caption="mean over turns and directions"),
+        METHOD.plot(
+            "Zero-current torque over one turn", ("theta_mech_rad", "torque_shaft_nm"), "line",
+            series, "half the gap between the directions is friction",
+        ),
+        METHOD.plot(
+            "Cogging spectrum", ("cogging_order", "cogging_amplitude_nm"), "bars",
+            (spectrum_bars(spec, shown),), "mean over turns and directions",
+        ),
     )  # fmt: skip
 
 
-def _unit(name: str) -> str:
-    return CONSTANTS[name].unit
+def spectrum_bars(spec: Spectrum, most: int) -> Series:
+    """The mean amplitude of each order a turn, the first `most` of them."""
+    heights = np.abs(spec.coefficients.mean(axis=0))[:most]
+    return Series("orders", spec.orders[:most].astype(float), heights, np.array([]))
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
+    name=METHOD.name,
     gives=GIVES,
     tests=("cogging",),
     experiment=EXPERIMENT,

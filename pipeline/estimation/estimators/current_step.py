@@ -32,17 +32,17 @@ from pipeline.estimation.electrical.step_model import (
     drive_of,
 )
 from pipeline.estimation.electrical.step_record import StepRecord, disagreement, read_step
+from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.uncertainty.instruments import budget_of, unstated_note
+from pipeline.estimation.uncertainty.instruments import unstated_note
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.plateaus import decimated
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Contribution
 
-NAME = "current_step"
+METHOD = Method("current_step")
 GIVES = ("ld_h", "lq_h")
 EXPERIMENT = (
     "record current_step captures with the rotor locked on d and on q (pair ab: theta_elec_deg -30 "
@@ -64,15 +64,14 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     axes = _axes_told(records, options["least_share"])
     odd = disagreement(records)
     if odd or not axes:
-        reason = "; ".join([*notes, odd or EXPERIMENT])
-        return Fit(tuple(not_identifiable(n, "H", NAME, reason) for n in GIVES))
+        return METHOD.nothing(GIVES, "; ".join([*notes, odd or EXPERIMENT]))
     model = StepModel(records)
     solution = solve(model, axes)
     limit = options["most_unexplained"]
     bad = [f"{path} ({x:.0%})" for path, x in unexplained(solution).items() if not x <= limit]
     if bad:
         words = f"the current of {', '.join(bad)} is no step on a locked rotor; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, "H", NAME, words) for n in GIVES))
+        return METHOD.nothing(GIVES, words)
     used = tuple(r.capture for r in records)
     notes.append(unstated_note(used, ("voltage", "current")))
     offers = offers_of(solution, axes, solution.sigmas)
@@ -80,7 +79,7 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     for name in GIVES:
         if name not in axes:
             missing = f"no step with enough current on the {name[1]} axis; {EXPERIMENT}"
-            estimates.append(not_identifiable(name, "H", NAME, missing))
+            estimates.append(METHOD.missing(name, missing))
             continue
         estimates.append(_estimate(name, solution, offers[name], notes, options))
     return Fit(tuple(estimates), tuple(_evidence(solution, axes)))
@@ -125,25 +124,24 @@ def _estimate(
     value = float(solution.parameters[place])
     scatter = math.sqrt(max(float(solution.covariance()[place, place]), 0.0))
     scatter *= birge_ratio(solution)
-    parts = [Contribution(f"scatter:{NAME}:{name}", scatter, "A")]
-    between = between_models(solution, offers)
-    parts.append(Contribution(f"scatter:{NAME}:saturation:{name}", between, "A"))
-    rounding = rounded_levels(name, solution)
-    parts.append(Contribution(f"scatter:{NAME}:rounding:{name}", rounding, "A"))
-    parts += gains(name, solution)
-    parts += rotor_angles(name, solution, math.radians(options["u_theta_elec_deg"]))
+    parts = [
+        METHOD.scatter(name, scatter),
+        METHOD.scatter(f"saturation:{name}", between_models(solution, offers)),
+        METHOD.scatter(f"rounding:{name}", rounded_levels(name, solution)),
+        *gains(name, solution),
+        *rotor_angles(name, solution, math.radians(options["u_theta_elec_deg"])),
+    ]
     largest = max(SPACE * r.largest_a * abs(_share(r, name)) for r in solution.model.records)
     at: dict[str, float | int | str] = {"current_a": 0.0, "current_largest_a": largest}
-    words = [n for n in notes if n]
+    words = [*notes]
     if any(solution.free[list(terms)]):
         ratio = _incremental(name, solution, largest) / value
         words.append(f"incremental {ratio - 1.0:+.1%} at {largest:.3g} A on this axis")
     else:
         words.append(f"no saturation seen up to {largest:.3g} A on this axis")
     bounds = (1e-3 * value, 1e3 * value)
-    paths = tuple(r.capture.path for r in solution.model.records)
-    note = "; ".join(words)
-    return Estimate(name, value, "H", "measured", NAME, budget_of(parts), at, paths, note, bounds)
+    used = [r.capture for r in solution.model.records]
+    return METHOD.measured(name, value, parts, used, at, words, bounds)
 
 
 def _share(record: StepRecord, name: str) -> float:
@@ -173,24 +171,16 @@ def _chord(record: StepRecord, drive: Drive) -> float:
     return 1.0 / float(fit.coefficients[0]) if fit.coefficients[0] != 0.0 else math.nan
 
 
-def _evidence(solution: Solution, axes: Sequence[str]) -> list[Evidence]:
+def _evidence(solution: Solution, told: Sequence[str]) -> list[Evidence]:
     model = solution.model
-    found = [_saturation_plot(solution, axes)]
+    found = [_saturation_plot(solution, told)]
     predicted = model.predict([solution.parameters[None, :]] * len(model.records))
     for record, current in zip(model.records, predicted, strict=True):
         rows = decimated(record.t_s.size)
-        found.append(
-            Evidence(
-                NAME,
-                f"Step response on {record.pair}",
-                "t_s",
-                f"i{record.pair[0]}_a",
-                "line",
-                (Series("current", record.t_s[rows], record.i_a[rows], current[rows, 0]),),
-                record.capture.path,
-                "Current of the locked rotor; the fit is one model for all steps.",
-            )
-        )
+        series = Series("current", record.t_s[rows], record.i_a[rows], current[rows, 0])
+        title, axes = f"Step response on {record.pair}", ("t_s", f"i{record.pair[0]}_a")
+        caption = "Current of the locked rotor; the fit is one model for all steps."
+        found.append(METHOD.plot(title, axes, "line", (series,), caption, record.capture.path))
     return found
 
 
@@ -213,21 +203,16 @@ def _saturation_plot(solution: Solution, axes: Sequence[str]) -> Evidence:
             x.append(peak)
             y.append(_chord(record, drive))
             fitted.append(float(inside.mean()))
-        order = np.argsort(x)
-        series.append(Series(name, np.array(x)[order], np.array(y)[order], np.array(fitted)[order]))
-    return Evidence(
-        NAME,
+        series.append(over_x(name, np.array(x), np.array(y), np.array(fitted)))
+    return METHOD.plot(
         "Inductance between the terminals against the step's largest current",
-        "current_a",
-        "inductance_ll_h",
-        "scatter",
-        tuple(series),
-        caption="Mean over each step by the integrated form, beside the model; twice Ld or Lq.",
-    )
+        ("current_a", "inductance_ll_h"), "scatter", series,
+        "Mean over each step by the integrated form, beside the model; twice Ld or Lq.",
+    )  # fmt: skip
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     GIVES,
     ("current_step",),
     EXPERIMENT,

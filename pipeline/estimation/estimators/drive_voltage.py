@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
-    budget_of,
     contributions,
     current_source,
     instrument_uncertainties,
@@ -33,20 +33,18 @@ from pipeline.estimation.uncertainty.regimes import (
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
-from pipeline.numerics.plateaus import decimated
 from pipeline.numerics.selection import needed_columns
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed, weak_rows
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
-from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
-from pipeline.records.evidence import Evidence, Series
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 
-NAME = "drive_voltage"
+METHOD = Method("drive_voltage")
 GIVES = ("ke_phase_peak_v_s_rad", "r_phase_ohm")
 EXPERIMENT = (
     "record a drive with vq_v, iq_a and theta_mech_rad over a wide range of speed and current, or "
@@ -88,26 +86,24 @@ class VoltageRows:
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """Ke and R of v_q = R i_q + Ke w + L di_q/dt + V_0 sign(i_q) + w_e L_d i_d + lateness.
+    """Ke and R by `q_voltage` over the windows of all drives.
 
     The weak form takes w and di_q/dt without differentiating; w is the angle's own rate, since a
     bench's speed estimate lags. The flux of the d current stands in the equation wherever i_d is
     logged and parts from the speed. Lateness of the voltage against the angle shows as Ke tau dw/dt
     and joins, as a zero error and a turned frame do, where the data demand it. Without
-    temperatures the values hold for those of the log. Reference: Messenger and Bortz 2021 (weak
-    form); dq equations of IEEE Std 1812-2014.
+    temperatures the values hold for those of the log.
     """
     pole_pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     rows = _rows(campaign.of("drive"), pole_pairs)
     if rows is None or rows.voltage_v.size < 20 or float(np.ptp(rows.speed_rad_s)) == 0.0:
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, EXPERIMENT) for n in GIVES))
+        return METHOD.nothing(GIVES, EXPERIMENT)
     magnet, magnet_parts = magnet_coefficient(known)
     chosen = _chosen(rows, magnet, options["level"])
-    design = _design(rows, magnet, chosen, {})
+    design = q_voltage(rows, magnet, chosen, {})
     found = linear_fit(design, rows.voltage_v)
     if not found.full_rank:
-        note = f"speed and current of the log go together; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+        return METHOD.nothing(GIVES, f"speed and current of the log go together; {EXPERIMENT}")
     ones = np.ones(rows.voltage_v.size)
     covariance, dof = cluster_covariance(design, found.residuals, ones, rows.cluster)
     regression = Regression(design, rows.voltage_v, ones, rows.cluster)
@@ -250,9 +246,40 @@ def _gains(rows: VoltageRows, shift: Mapping[str, float]) -> tuple[Array, Array,
     return voltage[rows.capture], current[rows.capture], warmer[rows.capture]
 
 
-def _design(
+def q_voltage(
     rows: VoltageRows, magnet: float, chosen: Sequence[str], shift: Mapping[str, float]
 ) -> Array:
+    """The derivatives of the q voltage's window means by what is fitted: it is linear in all.
+
+    Parameters
+    ----------
+    rows
+        Window means [w] of speed [rad/s], current [A] and of what else stands in the equation.
+    magnet
+        Coefficient of the magnet's flux at 25 degC [1/K].
+    chosen
+        Nuisances that the data demand.
+    shift
+        By how much each instrument is off: gains relative, thermometers [K].
+
+    Returns
+    -------
+    array [w, 4 or more]
+        Columns of Ke [rad/s], R at 25 degC [A], L_q [A/s], V_0 [1], then L_d where i_d was logged
+        and parts from the speed, then the chosen ones.
+
+    Notes
+    -----
+    v_q = Ke (1 + α_m (T_m - 25)) ω + R (1 + α_cu (T_w - 25)) i_q + L_q di_q/dt + V_0 sign(i_q)
+    + p ω L_d i_d. A window's derivative stands for that of the current, so none is taken.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (dq equations).
+    Messenger and Bortz, J. Comput. Phys. 443, 2021, 110525, doi:10.1016/j.jcp.2021.110525 (weak
+    form).
+
+    """
     _, current, warmer = _gains(rows, shift)
     cold = (
         rows.current_a * (1.0 + COPPER_COEFFICIENT_25_1_K * warmer)
@@ -268,7 +295,7 @@ def _design(
 
 
 def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
-    base = _design(rows, magnet, [], {})
+    base = q_voltage(rows, magnet, [], {})
     candidates = {name: rows.columns[name] for name in CANDIDATES if name in rows.columns}
     candidates = {n: c for n, c in candidates.items() if n == "zero" or float(np.ptp(c)) > 0.0}
     sigma = np.ones(rows.voltage_v.size)
@@ -291,12 +318,12 @@ def _estimates(
     def values(shift: Mapping[str, float]) -> Array:
         voltage = _gains(rows, shift)[0] * rows.voltage_v
         warm = magnet + shift.get("magnet", 0.0)
-        return linear_fit(_design(rows, warm, chosen, shift), voltage).coefficients[:2]
+        return linear_fit(q_voltage(rows, warm, chosen, shift), voltage).coefficients[:2]
 
     gains = instrument_uncertainties(rows.captures, ("voltage", "current", "temperature"))
     type_b = contributions(values, gains)
     per_alpha = (values({"magnet": 1e-4}) - values({"magnet": -1e-4})) / 2e-4
-    paths = tuple(sorted(c.path for c in rows.captures))
+    paths = sorted(c.path for c in rows.captures)
     words = [f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left"]
     if chosen:
         words.append(allowed_for(chosen))
@@ -308,14 +335,14 @@ def _estimates(
     for i, name in enumerate(GIVES):
         value, u = float(found.coefficients[i]), float(deviation[i])
         if value <= 2.0 * u:
-            note = f"{value:.3g} ± {u:.2g} {_unit(name)} from this log; {EXPERIMENT}"
-            estimates.append(not_identifiable(name, _unit(name), NAME, note))
+            note = f"{value:.3g} ± {u:.2g} {METHOD.unit(name)} from this log; {EXPERIMENT}"
+            estimates.append(METHOD.missing(name, note))
             continue
-        parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof), *type_b[i]]
+        parts = [METHOD.scatter(name, u, dof), *type_b[i]]
         parts += propagate([(float(per_alpha[i]), magnet_parts)])
-        parts.append(Contribution(f"assumed:{NAME}:nuisances", float(moved[i]), "B"))
+        parts.append(Contribution(f"assumed:{METHOD.name}:nuisances", float(moved[i]), "B"))
         doubt = doubts[i]
-        parts += [] if doubt is None else [doubt.part(f"{NAME}:{name}", value)]
+        parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
         told = [] if doubt is None else [doubt.words("the value")]
         note = "; ".join([*told, *words])
         if not all(c.has(place[name]) for c in rows.captures):
@@ -325,9 +352,7 @@ def _estimates(
         if i == 0:
             parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
         at = {place[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
-        estimates.append(
-            Estimate(name, value, _unit(name), "measured", NAME, budget_of(parts), at, paths, note)
-        )
+        estimates.append(METHOD.measured(name, value, parts, paths, at, note))
     return tuple(estimates)
 
 
@@ -346,34 +371,20 @@ def _moved(
     for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):
         if abs(float(size)) <= most.get(name, 0.0):
             continue
-        design = _design(rows, magnet, [n for n in chosen if n != name], {})
+        design = q_voltage(rows, magnet, [n for n in chosen if n != name], {})
         without = linear_fit(design, rows.voltage_v).coefficients[: len(GIVES)]
         moved = np.maximum(moved, np.abs(without - values[: len(GIVES)]))
     return moved
 
 
 def _evidence(rows: VoltageRows, found: LinearFit) -> tuple[Evidence, ...]:
-    plots = []
-    fitted = rows.voltage_v - found.residuals
-    for index, capture in enumerate(rows.captures):
-        mine = np.flatnonzero(rows.capture == index)
-        mine = mine[decimated(mine.size)]
-        series = Series(capture.path, rows.time_s[mine], rows.voltage_v[mine], fitted[mine])
-        plots.append(
-            Evidence(
-                NAME, "Drive voltage and its parts", "t_s", "vq_v", "line", (series,),
-                capture.path, "window means",
-            )
-        )  # fmt: skip
-    return tuple(plots)
-
-
-def _unit(name: str) -> str:
-    return CONSTANTS[name].unit
+    titles = ["Drive voltage and its parts"] * len(rows.captures)
+    columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - found.residuals
+    return tuple(METHOD.traces(rows.captures, titles, "vq_v", columns, "window means"))
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
+    name=METHOD.name,
     gives=GIVES,
     tests=("drive",),
     experiment=EXPERIMENT,

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from pipeline.estimation.electrical.back_emf import read_spin
 from pipeline.estimation.electrical.hand_turns import Turn, turns_of
 from pipeline.estimation.electrical.terminals import first_temperature
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
 from pipeline.estimation.uncertainty.instruments import (
-    budget_of,
     instrument_uncertainties,
     unstated_note,
     voltage_source,
@@ -23,7 +23,7 @@ from pipeline.numerics.plateaus import decimated
 from pipeline.physics.conventions import POLE_PAIRS_TOLERANCE, pole_pairs_from
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import (
     Contribution,
@@ -33,9 +33,8 @@ from pipeline.records.uncertainty import (
     type_b,
 )
 
-NAME = "hand_turn"
+METHOD = Method("hand_turn")
 GIVES = ("pole_pairs", "psi_pm_wb")
-UNITS = {"pole_pairs": "1", "psi_pm_wb": "Wb"}
 EXPERIMENT = (
     "record a hand_turn: terminals open, shaft turned by hand through exactly one turn from rest "
     "to rest, a line voltage, theta_mech_rad if there is a sensor"
@@ -67,15 +66,14 @@ def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, fl
                 f"{capture.path}: the voltage does not stand out of the noise, or not for a cycle"
             )
     if not turns:
-        reason = "; ".join([*notes, EXPERIMENT])
-        return Fit(tuple(not_identifiable(n, UNITS[n], NAME, reason) for n in GIVES))
+        return METHOD.nothing(GIVES, "; ".join([*notes, EXPERIMENT]))
     pairs = _pole_pairs(turns)
     psi = _flux(turns, known, options)
     return Fit((pairs, psi), (_evidence(turns),))
 
 
 def _pole_pairs(turns: Sequence[tuple[Capture, Turn]]) -> Estimate:
-    paths = tuple(sorted({c.path for c, _ in turns}))
+    paths = sorted({c.path for c, _ in turns})
     cycles = float(np.median([t.cycles for _, t in turns]))
     number = pole_pairs_from(cycles, 1.0).number
     if number is None:
@@ -83,10 +81,10 @@ def _pole_pairs(turns: Sequence[tuple[Capture, Turn]]) -> Estimate:
             f"{cycles:.3f} electrical cycles a turn, no whole number within "
             f"{POLE_PAIRS_TOLERANCE}; repeat the hand_turn, exactly once around, from rest to rest"
         )
-        return not_identifiable("pole_pairs", "1", NAME, note)
+        return METHOD.missing("pole_pairs", note)
     apart = abs(cycles - number)
     note = f"{cycles:.4f} electrical cycles a turn, {apart:.1g} from the whole number"
-    return Estimate("pole_pairs", number, "1", "measured", NAME, captures=paths, note=note)
+    return METHOD.measured("pole_pairs", number, captures=paths, notes=note)
 
 
 def _flux(
@@ -122,7 +120,7 @@ def _flux(
     excess = float(share @ np.array(excesses))
     assumed = type_b(SOURCE, options["u_alpha_assumed_1_k"])
     of_alpha = assumed if coefficient is None else coefficient.budget
-    parts = [Contribution(f"scatter:{NAME}:psi", u, "A", dof)]
+    parts = [METHOD.scatter("psi", u, dof)]
     parts += propagate([(-value * excess, of_alpha)])
     for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
         mine = [voltage_source(c.meta) == source for c, _ in turns]
@@ -130,17 +128,8 @@ def _flux(
     for source, offset in instrument_uncertainties(captures, ("temperature",)).items():
         parts.append(Contribution(source, -value * alpha * offset, "B"))
     notes.append(unstated_note(captures, ("voltage", "temperature")))
-    return Estimate(
-        "psi_pm_wb",
-        value,
-        "Wb",
-        "measured",
-        NAME,
-        budget_of(parts),
-        {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)},
-        tuple(c.path for c in captures),
-        "; ".join(n for n in notes if n),
-    )
+    at = {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)}
+    return METHOD.measured("psi_pm_wb", value, parts, captures, at, notes)
 
 
 def _evidence(turns: Sequence[tuple[Capture, Turn]]) -> Evidence:
@@ -150,19 +139,14 @@ def _evidence(turns: Sequence[tuple[Capture, Turn]]) -> Evidence:
         fitted = turn.fitted_wb[rows] if turn.fitted_wb.size else turn.fitted_wb
         label = f"{capture.path} {turn.channel}"
         series.append(Series(label, turn.t_s[rows], turn.flux_wb[rows], fitted))
-    return Evidence(
-        NAME,
-        "Flux linkage over one turn by hand",
-        "t_s",
-        "psi_pm_wb",
-        "line",
-        tuple(series),
-        caption="Integral of the voltage, phase to star point; each cycle is one pole pair.",
-    )
+    return METHOD.plot(
+        "Flux linkage over one turn by hand", ("t_s", "psi_pm_wb"), "line", series,
+        "Integral of the voltage, phase to star point; each cycle is one pole pair.",
+    )  # fmt: skip
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     GIVES,
     ("hand_turn",),
     EXPERIMENT,

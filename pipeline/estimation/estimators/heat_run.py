@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.heat_record import (
     REFERENCE,
@@ -27,13 +28,12 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
-NAME = "heat_run"
+METHOD = Method("heat_run")
 GIVES = ("temp_coeff_copper_1_k", "r_phase_ohm")
-UNITS = {"temp_coeff_copper_1_k": "1/K", "r_phase_ohm": "ohm"}
 EXPERIMENT = (
     "record a heat_run: steady current on a locked rotor until the winding is 20 K warmer, with "
     "temp_winding_degc, voltage and current"
@@ -56,8 +56,34 @@ class Line:
     fitted: Array
 
 
+def resistance(temp_winding_degc: Array) -> Array:
+    """The derivatives of a winding's resistance by what is fitted: it is linear in both.
+
+    Parameters
+    ----------
+    temp_winding_degc : array [n], degC
+        Winding temperature.
+
+    Returns
+    -------
+    array [n, 2]
+        dR/dR25 [1] and dR/d(slope) [K].
+
+    Notes
+    -----
+    R(T) = R25 + s (T - 25), s = α R25; so α = s / R25.
+
+    References
+    ----------
+    IEEE Std 112-2017, 5.4 (copper's resistance is linear in temperature).
+
+    """
+    excess = temp_winding_degc - 25.0
+    return np.column_stack([np.ones(excess.size), excess])
+
+
 def fit_heat_run(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """Alpha = (dR/dT)/R25, at 25 degC.
+    """Alpha at 25 degC and R25 by `resistance` of every run.
 
     dR/dT is free of whatever the inverter adds at a constant current. R25 is that of the
     resistance test where the voltage is a drive's command, so that the drop does not enter;
@@ -67,7 +93,7 @@ def fit_heat_run(campaign: Campaign, known: Constants, options: Mapping[str, flo
     lines, notes = _lines(campaign, known, options)
     if not lines:
         reason = "; ".join([*notes, EXPERIMENT])
-        return Fit(tuple(not_identifiable(n, UNITS[n], NAME, reason) for n in GIVES))
+        return METHOD.nothing(GIVES, reason)
     line = min(lines, key=lambda one: one.covariance[1, 1] / one.slope_ohm_k**2)
     resistance = _resistance(line, options, notes)
     reference = reference_resistance(line.record, known)
@@ -104,14 +130,12 @@ def _lines(
 def _line(record: HeatRecord) -> Line | None:
     """Straight line of R against T over block means; errors by the residuals' correlation."""
     excess = record.temp_winding_degc - 25.0
-    design = np.column_stack([np.ones(excess.size), excess])
+    design = resistance(record.temp_winding_degc)
     fit = linear_fit(design, record.r_phase_ohm)
     if not fit.full_rank or fit.dof < 10 or fit.coefficients[1] <= 0.0:
         return None
     tau = autocorrelation_time(fit.residuals)
-    rate = linear_fit(
-        np.column_stack([np.ones(excess.size), excess]), np.gradient(excess, record.t_s)
-    )
+    rate = linear_fit(design, np.gradient(excess, record.t_s))
     return Line(
         record,
         float(fit.coefficients[0]),
@@ -131,19 +155,24 @@ def _slope_budget(line: Line, options: Mapping[str, float]) -> Budget:
     A lag tau_l behind a temperature that settles at rate k changes the slope by k tau_l; one
     exponential does not tell it from alpha, so a slow thermometer has to be stated (`u_lag_s`).
     """
-    meta = line.record.capture.meta
     slope = line.slope_ohm_k
     parts = [
-        Contribution(
-            f"scatter:{NAME}:slope", math.sqrt(float(line.covariance[1, 1])), "A", line.dof
-        ),
-        Contribution(voltage_source(meta), slope * meta.instrument_u("u_rel_voltage"), "B"),
-        Contribution(current_source(meta), -slope * meta.instrument_u("u_rel_current"), "B"),
+        METHOD.scatter("slope", math.sqrt(float(line.covariance[1, 1])), line.dof),
+        *_gains(line, slope),
         Contribution(
             "assumed:thermometer_lag", slope * line.rise_rate_1_s * options["u_lag_s"], "B"
         ),
     ]
     return budget_of(parts)
+
+
+def _gains(line: Line, value_ohm: float) -> list[Contribution]:
+    """What the gains of voltage and current make of a resistance, or of its slope [its unit]."""
+    meta = line.record.capture.meta
+    return [
+        Contribution(voltage_source(meta), value_ohm * meta.instrument_u("u_rel_voltage"), "B"),
+        Contribution(current_source(meta), -value_ohm * meta.instrument_u("u_rel_current"), "B"),
+    ]
 
 
 def _alpha_against(
@@ -171,7 +200,7 @@ def _alpha_alone(
         [
             (1.0 / r25, tuple(p for p in _slope_budget(line, options) if p.kind == "B")),
             (-alpha / r25, budget_of(others)),
-            (1.0, budget_of([Contribution(f"scatter:{NAME}:alpha", u, "A", line.dof)])),
+            (1.0, (METHOD.scatter("alpha", u, line.dof),)),
         ]
     )
     return _alpha(line, alpha, budget, (line.record.capture.path,), ["R25 from the run", *notes])
@@ -187,9 +216,8 @@ def _alpha(
         "temp_high_degc": round(float(temps.max()), 2),
         "current_a": round(float(line.record.current_a.mean()), 4),
     }
-    used = (line.record.capture,)
-    note = "; ".join(w for w in [*words, unstated_note(used)] if w)
-    return Estimate(GIVES[0], alpha, "1/K", "measured", NAME, budget, at, paths, note)
+    notes = [*words, unstated_note((line.record.capture,))]
+    return METHOD.measured(GIVES[0], alpha, budget, paths, at, notes)
 
 
 def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) -> Estimate:
@@ -201,9 +229,8 @@ def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) 
     r25 = line.r25_ohm
     scatter = math.sqrt(float(line.covariance[0, 0]))
     parts = [
-        Contribution(f"scatter:{NAME}:r25", scatter, "A", line.dof),
-        Contribution(voltage_source(meta), r25 * meta.instrument_u("u_rel_voltage"), "B"),
-        Contribution(current_source(meta), -r25 * meta.instrument_u("u_rel_current"), "B"),
+        METHOD.scatter("r25", scatter, line.dof),
+        *_gains(line, r25),
         Contribution(
             temperature_source(meta), -line.slope_ohm_k * meta.instrument_u("u_temp_degc"), "B"
         ),
@@ -213,42 +240,22 @@ def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) 
     words = [*notes]
     if commanded:
         words.append(f"commanded voltage: an inverter's drop up to {drop:g} V (k=1) is in u_b")
-    return Estimate(
-        "r_phase_ohm",
-        r25,
-        "ohm",
-        "measured",
-        NAME,
-        budget_of(parts),
-        at,
-        (line.record.capture.path,),
-        "; ".join(words),
-    )
+    return METHOD.measured(GIVES[1], r25, parts, (line.record.capture,), at, words)
 
 
 def _evidence(lines: Sequence[Line]) -> Evidence:
-    series = tuple(
-        Series(
-            line.record.capture.path,
-            line.record.temp_winding_degc,
-            line.record.r_phase_ohm,
-            line.fitted,
-        )
-        for line in lines
-    )
-    return Evidence(
-        NAME,
-        "Resistance against winding temperature",
-        "temp_winding_degc",
-        "r_phase_ohm",
-        "scatter",
-        series,
-        caption="Voltage along the current over current, block means.",
-    )
+    series = [
+        Series(r.capture.path, r.temp_winding_degc, r.r_phase_ohm, line.fitted)
+        for r, line in ((line.record, line) for line in lines)
+    ]
+    return METHOD.plot(
+        "Resistance against winding temperature", ("temp_winding_degc", "r_phase_ohm"), "scatter",
+        series, "Voltage along the current over current, block means.",
+    )  # fmt: skip
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     GIVES,
     ("heat_run",),
     EXPERIMENT,

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.estimators.cogging import name_orders, part_orders
+from pipeline.estimation.estimators.cogging import name_orders, part_orders, spectrum_bars
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
@@ -26,17 +27,16 @@ from pipeline.numerics.orders import (
     waveform,
     whole_turns,
 )
-from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.physics.glossary import Term
 from pipeline.physics.mechanics import cogging_order
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable, not_there
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import propagate, type_a
+from pipeline.records.uncertainty import propagate
 
 Array = NDArray[np.float64]
 
-NAME = "holding_current"
 RESIDUAL = Term(
     "holding_residual_a",
     "A",
@@ -47,6 +47,7 @@ RESIDUAL = Term(
 )
 TORQUES = ("cogging_amplitude_nm", "cogging_peak_nm")
 GIVES = ("cogging_order", *TORQUES, RESIDUAL.name)
+METHOD = Method("holding_current", (RESIDUAL,))
 EXPERIMENT = (
     "hold the rotor at many angles over a whole turn, once forward and once backward, "
     "logging theta_mech_rad and iq_a"
@@ -70,7 +71,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     highest = largest_order(turns, int(options["highest_order"]))
     if len(turns) < 2 or highest < 1:
         note = f"{len(turns)} whole turns recorded; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+        return METHOD.nothing(GIVES, note)
     spec, present = find_orders(turns, highest, options["level"])
     lines, slow = part_orders(present, known, campaign)
     positions = even_positions(turns)
@@ -79,13 +80,12 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     estimates = _cogging(captures, spec, lines, rms_a, positions, known, campaign)
     if left is None or rms_a is None:
         note = f"angles do not cover the turn densely enough to hold sectors out; {EXPERIMENT}"
-        residual = not_identifiable(RESIDUAL.name, "A", NAME, note)
+        residual = METHOD.missing(RESIDUAL.name, note)
     else:
         before = float(np.std(np.concatenate([turn.value for turn in turns])))
         note = f"{before:.3g} A before any order is taken off; half of the turn's sectors held out"
-        paths = tuple(c.path for c in captures)
-        scatter = type_a(f"scatter:{NAME}:{RESIDUAL.name}", _u_rms(left))
-        residual = Estimate(RESIDUAL.name, rms_a, "A", "measured", NAME, scatter, {}, paths, note)
+        scatter = METHOD.scatter(RESIDUAL.name, _u_rms(left))
+        residual = METHOD.measured(RESIDUAL.name, rms_a, [scatter], captures, notes=note)
     return Fit((*estimates, residual), _evidence(turns, spec, lines))
 
 
@@ -139,30 +139,25 @@ def _cogging(
     if not lines:
         limit = detection_limit(spec)
         note = f"no order found; an amplitude above {limit:.2g} A would have been"
-        return tuple(not_there(n, _unit(n), NAME, note) for n in names)
-    paths = tuple(c.path for c in captures)
+        return tuple(METHOD.absent(n, note) for n in names)
     note = f"A by order: {name_orders(lines, known, campaign)}"
     if rms_a is not None:
         note += f"; {rms_a:.3g} A rms left in held-out sectors"
     leading, alias = _true_order(lines[0].order, positions, known, campaign)
     note += alias
-    order = Estimate(
-        names[0], leading, "1", "measured", NAME, captures=paths, note=note,
-        bounds=(1.0, float(spec.orders[-1])),
-    )  # fmt: skip
+    bounds = (1.0, float(spec.orders[-1]))
+    order = METHOD.measured(names[0], leading, captures=captures, notes=note, bounds=bounds)
     kt = torque_constant(known)
     if kt is None:
         why = f"{lines[0].amplitude:.4g} A of order {lines[0].order}; a torque constant is missing"
-        return (order, *(not_identifiable(n, _unit(n), NAME, why) for n in TORQUES))
+        return (order, *(METHOD.missing(n, why) for n in TORQUES))
     peak, u_peak = half_peak_to_peak(lines)
     sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
     torques = []
     for name, (amps, u) in sizes.items():
-        scatter = type_a(f"scatter:{NAME}:{name}", u, lines[0].dof)
-        budget = propagate([(amps, kt.budget), (kt.number, scatter)])
-        torques.append(
-            Estimate(name, amps * kt.number, _unit(name), "measured", NAME, budget, {}, paths, note)
-        )
+        scatter = METHOD.scatter(name, u, lines[0].dof)
+        parts = propagate([(amps, kt.budget), (kt.number, (scatter,))])
+        torques.append(METHOD.measured(name, amps * kt.number, parts, captures, notes=note))
     return (order, *torques)
 
 
@@ -198,22 +193,15 @@ def _evidence(
         label = "forward" if turn.sense > 0 else "backward"
         fitted = spec.means[index] + waveform(lines, angle)
         series.append(Series(f"{label} {index + 1}", angle, turn.value[keep][order], fitted))
-    shown = min(spec.orders.size, 1000)
-    heights: Array = np.abs(spec.coefficients.mean(axis=0))[:shown]
-    bars = Series("orders", spec.orders[:shown].astype(float), heights, np.array([]))
+    bars, title = spectrum_bars(spec, 1000), "Holding current over one turn"
     return (
-        Evidence(NAME, "Holding current over one turn", "theta_mech_rad", "iq_a", "scatter",
-                 tuple(series)),
-        Evidence(NAME, "Holding-current spectrum", "cogging_order", "iq_a", "bars", (bars,)),
-    )  # fmt: skip
-
-
-def _unit(name: str) -> str:
-    return RESIDUAL.unit if name == RESIDUAL.name else CONSTANTS[name].unit
+        METHOD.plot(title, ("theta_mech_rad", "iq_a"), "scatter", series),
+        METHOD.plot("Holding-current spectrum", ("cogging_order", "iq_a"), "bars", (bars,)),
+    )
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
+    name=METHOD.name,
     gives=GIVES,
     tests=("holding_current",),
     experiment=EXPERIMENT,

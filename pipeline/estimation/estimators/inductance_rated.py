@@ -16,6 +16,7 @@ from pipeline.estimation.electrical.flux_pairs import (
     instant_voltage,
 )
 from pipeline.estimation.electrical.operating_points import Point, operating_points, pole_pairs_of
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -23,16 +24,15 @@ from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
     unstated_note,
 )
-from pipeline.estimation.uncertainty.measured import measured
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution
 
 Array = NDArray[np.float64]
 
-NAME = "inductance_rated"
+METHOD = Method("inductance_rated")
 GIVES = ("ld_rated_h", "lq_rated_h")
 EXPERIMENT = (
     "record a torque_map at constant speed with vd_v and vq_v: q current stepped to plus and minus "
@@ -73,8 +73,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     ]
     if pairs is None or not points:
         why = "pole pairs unknown" if points else "no settled points with voltages at speed"
-        note = f"{why}; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, "H", NAME, note) for n in GIVES))
+        return METHOD.nothing(GIVES, f"{why}; {EXPERIMENT}")
     magnet = magnet_coefficient(known)[0]
     points = _without_ripple(points, pairs, magnet, known.best("r_phase_ohm"))
     look = _Look(points, pairs, magnet, captures, *frame_of(points, pairs))
@@ -114,7 +113,7 @@ def _estimate(
     """The inductance of one axis, less what the `other` leaves on it in a turned frame."""
     if found is None:
         why = "no settled pair of plus and minus q current at the currents needed"
-        return not_identifiable(name, "H", NAME, f"{why}; {EXPERIMENT}")
+        return METHOD.missing(name, f"{why}; {EXPERIMENT}")
 
     def value(shift: Mapping[str, float]) -> Array:
         moved = flux_pairs([p.shifted(shift) for p in look.points], look.pole_pairs)
@@ -128,16 +127,16 @@ def _estimate(
     parts += [
         Contribution(HOLD, found.value_h * hold, "B"),
         Contribution(FRAME, across * doubt, "B"),
-        Contribution(f"scatter:{NAME}:{name}", found.u_h, "A"),
+        METHOD.scatter(name, found.u_h),
     ]
     inductance = found.value_h - across * float(np.tan(angle)) ** 2
-    used = {p.capture.path: p.capture for p in look.points}
+    used = {p.capture.path for p in look.points}
     notes = [words, unstated_note(look.captures, ("voltage", "current"))]
     if name == "ld_rated_h":
         fluxes = flux_pairs(look.points, look.pole_pairs)
         notes.append(_other_side(fluxes, look.magnet_1_k, found))
     at = {"id_a": found.id_a, "iq_a": found.iq_a}
-    return measured(NAME, name, "H", inductance, parts, [used[k] for k in sorted(used)], at, notes)
+    return METHOD.measured(name, inductance, parts, sorted(used), at, notes)
 
 
 def _without_ripple(
@@ -284,22 +283,13 @@ def _evidence(
                 line = start + found.value_h * x if axis == "q" or still[0].size else line
             series.append(Series(label, x, y, line))
         title = f"Flux linkage of the {axis} axis at constant speed"
-        plots.append(
-            Evidence(
-                NAME,
-                title,
-                current,
-                flux,
-                "scatter",
-                tuple(series),
-                caption="line: the published apparent inductance",
-            )
-        )
+        caption = "line: the published apparent inductance"
+        plots.append(METHOD.plot(title, (current, flux), "scatter", series, caption))
     return tuple(plots)
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
+    name=METHOD.name,
     gives=GIVES,
     tests=("torque_map",),
     experiment=EXPERIMENT,

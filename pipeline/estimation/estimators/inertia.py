@@ -20,10 +20,10 @@ from pipeline.estimation.mechanical.drag import (
 from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
-    budget_of,
     contributions,
     current_source,
     instrument_uncertainties,
@@ -33,17 +33,15 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.estimation.uncertainty.regimes import Disagreement
 from pipeline.numerics.least_squares import linear_fit
-from pipeline.numerics.plateaus import decimated
-from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import BETWEEN, Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 
-NAME = "inertia"
+METHOD = Method("inertia")
 GIVES = ("j_rotor_kgm2", "torque_coulomb_nm", "b_visc_nm_s_rad")
 EXPERIMENT = (
     "record a drive with iq_a and theta_mech_rad that accelerates and brakes hard in both senses "
@@ -97,12 +95,12 @@ class Doubts:
 
     def parts(self, index: int, value: float, logged: bool) -> list[Contribution]:
         """Contributions to J, T_c or B; T_c and B are scaled by J, and so by its doubts."""
-        share = f"{BETWEEN}{NAME}:unexplained" if logged else "assumed:free_shaft"
+        share = f"{BETWEEN}{METHOD.name}:unexplained" if logged else "assumed:free_shaft"
         parts = [Contribution(share, self.share * value, "B")]
         for k in {0, index}:
             found = self.regimes[k]
             if found is not None:
-                parts.append(found.part(f"{NAME}:{GIVES[k]}", value))
+                parts.append(found.part(f"{METHOD.name}:{GIVES[k]}", value))
         return parts
 
     def words(self, logged: bool) -> list[str]:
@@ -130,29 +128,31 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
         note = f"{missing}; {EXPERIMENT}"
-        return _refused(note)
+        return METHOD.nothing(GIVES, note)
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
     y, driving = rows.acceleration_rad_s2, _driving_nm(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         note = f"the drive log holds no torque; {EXPERIMENT}"
-        return _refused(note)
+        return METHOD.nothing(GIVES, note)
     short = too_short(rows)
     if short:
-        return _refused(f"{short}; {LONGER}")
+        return METHOD.nothing(GIVES, f"{short}; {LONGER}")
     found = drag_of(rows, driving, nuisances, options["level"])
     if not torque_is_parted(found.design, found.sigma):
-        return _refused(f"the drive's torque cannot be told from its friction; {EXPERIMENT}")
+        note = f"the drive's torque cannot be told from its friction; {EXPERIMENT}"
+        return METHOD.nothing(GIVES, note)
     strange = _share_of_no_torque(rows, found)
     if strange > MATERIAL and not _load_logged(rows):
-        return _refused(f"{_of_no_torque(strange)}; {LOAD}")
+        return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
     doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
     estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))
     inertia = estimates[0]
     if inertia.known and inertia.u >= abs(inertia.number):
-        estimates = _refused(
+        estimates = METHOD.nothing(
+            GIVES,
             f"the acceleration does not follow the torque: the inertia came out as "
             f"{inertia.number:.3g} ± {inertia.u:.2g} kg·m²; look at the signs of iq_a and "
-            f"torque_shaft_nm, else {EXPERIMENT}"
+            f"torque_shaft_nm, else {EXPERIMENT}",
         ).estimates
     return Fit(estimates, _evidence(rows, y, found))
 
@@ -201,10 +201,6 @@ def _left_out(rows: ShaftRows, campaign: Campaign) -> tuple[str, ...]:
     if not _load_logged(rows):
         return ()
     return tuple(capture.path for capture in campaign.of("drive") if _loadless(capture))
-
-
-def _refused(note: str) -> Fit:
-    return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
 
 
 def _torque(known: Constants) -> Torque | None:
@@ -265,7 +261,7 @@ def _estimates(
     type_b = contributions(values, gains)
     per_kt, per_rel, per_alpha = _slopes(values, torque)
     constants, scatter = found.constants(found.coefficients), found.scatter()
-    paths = tuple(sorted(c.path for c in rows.captures))
+    paths = sorted(c.path for c in rows.captures)
     logged = _load_logged(rows)
     words = [*_words(rows, torque, found), *_load_words(rows, doubts.share, left_out)]
     note = "; ".join([*doubts.words(logged), *words])
@@ -274,11 +270,10 @@ def _estimates(
     for i, name in enumerate(GIVES):
         reason = found.reasons[i]
         if reason:
-            estimates.append(not_identifiable(name, _unit(name), NAME, reason))
+            estimates.append(METHOD.missing(name, reason))
             continue
         parts = [
-            Contribution(f"scatter:{NAME}:{k}", float(scatter[i, k]), "A", found.dof)
-            for k in range(scatter.shape[1])
+            METHOD.scatter(f"{k}", float(scatter[i, k]), found.dof) for k in range(scatter.shape[1])
         ]
         parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), logged)
@@ -290,10 +285,7 @@ def _estimates(
                 (float(per_alpha[i]), torque.magnet_budget),
             ]
         )
-        value = float(constants[i])
-        estimates.append(
-            Estimate(name, value, _unit(name), "measured", NAME, budget_of(budget), at, paths, note)
-        )
+        estimates.append(METHOD.measured(name, float(constants[i]), budget, paths, at, note))
     return tuple(estimates)
 
 
@@ -333,37 +325,21 @@ def _load_words(rows: ShaftRows, strange: float, left_out: Sequence[str]) -> lis
 
 
 def _evidence(rows: ShaftRows, measured: Array, found: DragFit) -> tuple[Evidence, ...]:
-    fitted = measured - found.residuals
-    plots = []
-    for index, capture in enumerate(rows.captures):
-        mine = np.flatnonzero(rows.capture == index)
-        mine = mine[decimated(mine.size)]
-        word = "coast" if capture.meta.test == "spin_down" else "drive"
-        series = Series(capture.path, rows.time_s[mine], measured[mine], fitted[mine])
-        title = f"Acceleration in the {word}"
-        caption = "window means, no derivative taken"
-        plots.append(
-            Evidence(
-                NAME, title, "t_s", "acceleration_rad_s2", "line", (series,), capture.path, caption
-            )
-        )
-    speed, drag, line = found.curve(rows)
-    curve = Series("drag", speed, drag, line)
-    plots.append(
-        Evidence(
-            NAME, "Drag against speed", "omega_mech_rad_s", "torque_coulomb_nm", "scatter",
-            (curve,), caption="driving torque less J times acceleration; line: Coulomb and viscous",
-        )
+    words = ["coast" if c.meta.test == "spin_down" else "drive" for c in rows.captures]
+    titles = [f"Acceleration in the {word}" for word in words]
+    columns = rows.capture, rows.time_s, measured, measured - found.residuals
+    caption = "window means, no derivative taken"
+    plots = METHOD.traces(rows.captures, titles, "acceleration_rad_s2", columns, caption)
+    curve = METHOD.plot(
+        "Drag against speed", ("omega_mech_rad_s", "torque_coulomb_nm"), "scatter",
+        (Series("drag", *found.curve(rows)),),
+        "driving torque less J times acceleration; line: Coulomb and viscous",
     )  # fmt: skip
-    return tuple(plots)
-
-
-def _unit(name: str) -> str:
-    return CONSTANTS[name].unit
+    return (*plots, curve)
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
+    name=METHOD.name,
     gives=GIVES,
     tests=("drive", "spin_down"),
     experiment=EXPERIMENT,

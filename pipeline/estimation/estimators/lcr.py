@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import PAIRS
+from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
     station,
     unstated_note,
 )
-from pipeline.estimation.uncertainty.measured import measured
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.conventions import (
     PAIR_AXES_RAD,
@@ -25,11 +25,10 @@ from pipeline.physics.conventions import (
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
-from pipeline.records.evidence import Evidence, Series
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution
 
-NAME = "lcr"
 EXPERIMENT = (
     "record an lcr table of lab_h over at least six rotor angles theta_elec_deg across half an "
     "electrical turn, or lab_h, lbc_h and lca_h at one angle"
@@ -48,7 +47,7 @@ TERMS = (
     ),
 )
 GIVES = ("ld_h", "lq_h", *(term.name for term in TERMS))
-UNITS = {"ld_h": "H", "lq_h": "H", "r_lcr_ohm": "ohm", "lcr_angle_offset_deg": "deg"}
+METHOD = Method("lcr", TERMS)
 Array = NDArray[np.float64]
 # Twice what noise alone makes: a swing four of its standard deviations long is one.
 SEEN = 4.0
@@ -68,8 +67,37 @@ class Table:
     row: Array
 
 
+def inductance(theta_rad: Array, axis_rad: Array) -> Array:
+    """The derivatives of the inductance between two terminals by what is fitted.
+
+    Parameters
+    ----------
+    theta_rad : array [n], rad
+        Electrical angle of the rotor, d axis from phase a.
+    axis_rad : array [n], rad
+        Direction of the current of the pair that was read.
+
+    Returns
+    -------
+    array [n, 3]
+        dL/dm, dL/dA, dL/dB [1].
+
+    Notes
+    -----
+    L = m + A cos 2(θ - θ_pair) + B sin 2(θ - θ_pair), with m = L_d + L_q and A = L_d - L_q; B is
+    0 where the angle is read from the d axis, else atan2(B, A)/2 is by how much it is not.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (inductance against rotor position, at standstill).
+
+    """
+    turn = 2.0 * (theta_rad - axis_rad)
+    return np.column_stack([np.ones(turn.size), np.cos(turn), np.sin(turn)])
+
+
 def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """L = m + A cos 2(theta - theta_pair) + B sin 2(theta - theta_pair), then Ld, Lq = (m ± A)/2.
+    """Ld, Lq = (m ± A)/2 by `inductance` of the whole table.
 
     A and B are free, so that a rotor zero that is off is found instead of shrinking the saliency;
     within its own error of zero it is taken as zero, and A alone is fitted. With angles unknown
@@ -83,7 +111,7 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
     else:
         found = _at_unknown_angle(table)
     if found is None:
-        return Fit(tuple(not_identifiable(n, UNITS[n], NAME, EXPERIMENT) for n in GIVES))
+        return METHOD.nothing(GIVES, EXPERIMENT)
     used = tuple(captures[k] for k in sorted({int(k) for k in table.capture}))
     estimates = {
         name: _estimate(name, value, u, dof, found.note, used, options)
@@ -96,10 +124,7 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
         "r_lcr_ohm": "no rab_ohm in the lcr table",
         "lcr_angle_offset_deg": "needs the table over known rotor angles and a salient rotor",
     }
-    results = tuple(
-        estimates.get(n) or not_identifiable(n, UNITS[n], NAME, absent.get(n, EXPERIMENT))
-        for n in GIVES
-    )
+    results = tuple(estimates.get(n) or METHOD.missing(n, absent.get(n, EXPERIMENT)) for n in GIVES)
     return Fit(results, _evidence(table, found))
 
 
@@ -136,8 +161,7 @@ class Found:
 
 def _over_angle(table: Table, options: Mapping[str, float]) -> Found | None:
     known = np.isfinite(table.theta_rad)
-    turn = 2.0 * (table.theta_rad[known] - table.axis_rad[known])
-    design = np.column_stack([np.ones(turn.size), np.cos(turn), np.sin(turn)])
+    design = inductance(table.theta_rad[known], table.axis_rad[known])
     free = linear_fit(design, table.l_h[known])
     if not free.full_rank or free.dof < 2 or np.linalg.cond(design) > 20.0:
         return None
@@ -238,9 +262,9 @@ def _estimate(
     used: Sequence[Capture],
     options: Mapping[str, float],
 ) -> Estimate:
-    parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", dof)] if u > 0.0 else []
+    parts = [METHOD.scatter(name, u, dof)]
     words = [note]
-    if UNITS[name] != "deg":
+    if METHOD.unit(name) != "deg":
         gain, unstated = _gain(used, options)
         parts.append(Contribution(f"lcr@{station(used[0].meta)}", gain * abs(value), "B"))
         words.append(unstated)
@@ -250,7 +274,7 @@ def _estimate(
     at: dict[str, float | int | str] = {"current_a": 0.0}
     if frequencies:
         at["freq_hz"] = float(np.mean(frequencies))
-    return measured(NAME, name, UNITS[name], value, parts, used, at, words)
+    return METHOD.measured(name, value, parts, used, at, words)
 
 
 def _gain(used: Sequence[Capture], options: Mapping[str, float]) -> tuple[float, str]:
@@ -285,32 +309,21 @@ def _resistance(used: Sequence[Capture], options: Mapping[str, float]) -> Estima
 def _evidence(table: Table, found: Found) -> tuple[Evidence, ...]:
     if found.model is None:
         return ()
-    mean, a, b = found.model
     series = []
     for pair in PAIRS:
         mine = (table.axis_rad == PAIR_AXES_RAD[pair]) & np.isfinite(table.theta_rad)
         if not mine.any():
             continue
-        order = np.argsort(table.theta_rad[mine], kind="stable")
-        theta, read = table.theta_rad[mine][order], table.l_h[mine][order]
-        turn = 2.0 * (theta - PAIR_AXES_RAD[pair])
-        fitted = mean + a * np.cos(turn) + b * np.sin(turn)
-        series.append(Series(pair, np.degrees(theta), read, fitted))
-    return (
-        Evidence(
-            NAME,
-            "Inductance between the terminals against rotor angle",
-            "theta_elec_deg",
-            "inductance_ll_h",
-            "scatter",
-            tuple(series),
-            caption="Mean is Ld + Lq, swing Ld - Lq.",
-        ),
-    )
+        theta = table.theta_rad[mine]
+        fitted = inductance(theta, table.axis_rad[mine]) @ found.model
+        series.append(over_x(pair, np.degrees(theta), table.l_h[mine], fitted))
+    title = "Inductance between the terminals against rotor angle"
+    axes, caption = ("theta_elec_deg", "inductance_ll_h"), "Mean is Ld + Lq, swing Ld - Lq."
+    return (METHOD.plot(title, axes, "scatter", series, caption),)
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     GIVES,
     ("lcr",),
     EXPERIMENT,

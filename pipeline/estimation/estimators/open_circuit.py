@@ -14,12 +14,12 @@ from pipeline.estimation.electrical.back_emf import (
     read_spin,
     steady_stretches,
 )
-from pipeline.estimation.electrical.spin_angle import METHOD, Group, angle_offset, count_pole_pairs
+from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
 from pipeline.estimation.electrical.terminals import first_temperature
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
 from pipeline.estimation.uncertainty.instruments import (
-    budget_of,
     instrument_uncertainties,
     temperature_source,
     unstated_note,
@@ -30,11 +30,10 @@ from pipeline.physics.conventions import COUPLINGS, CouplingName, coupling_as
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import Budget, Contribution, propagate
+from pipeline.records.uncertainty import Contribution, propagate
 
-NAME = METHOD
 EXPERIMENT = (
     "record an open_circuit capture: shaft driven at three or more speeds, two line voltages, "
     "theta_mech_rad, temp_magnet_degc"
@@ -52,34 +51,15 @@ Array = NDArray[np.float64]
 
 TERMS = (
     *(
-        Term(
-            f"bemf_harmonic_{k}",
-            "1",
-            f"order {k} of the back-EMF over its fundamental",
-            "constant",
-            0.0,
-            1.0,
-        )
+        Term(f"bemf_harmonic_{k}", "1", f"order {k} of the back-EMF over its fundamental",
+             "constant", 0.0, 1.0)
         for k in ORDERS
     ),
-    Term(
-        "angle_offset_elec_rad",
-        "rad",
-        "d axis less pole pairs times theta_mech_rad",
-        "constant",
-        -math.pi,
-        math.pi,
-    ),
-    Term(
-        "phase_order",
-        "1",
-        "1: positive rotation runs a, b, c; -1: it runs a, c, b",
-        "constant",
-        -1,
-        1,
-        True,
-    ),
-)
+    Term("angle_offset_elec_rad", "rad", "d axis less pole pairs times theta_mech_rad", "constant",
+         -math.pi, math.pi),
+    Term("phase_order", "1", "1: positive rotation runs a, b, c; -1: it runs a, c, b", "constant",
+         -1, 1, True),
+)  # fmt: skip
 GIVES = (
     "psi_pm_wb",
     "temp_coeff_magnet_1_k",
@@ -87,33 +67,56 @@ GIVES = (
     "pole_pairs",
     *(term.name for term in TERMS),
 )
-UNITS = {"psi_pm_wb": "Wb", "temp_coeff_magnet_1_k": "1/K", "angle_offset_elec_rad": "rad"} | {
-    name: COUPLINGS[name].unit for name in KE_NAMES
-}
+METHOD = Method("open_circuit", TERMS)
+
+
+def flux_linkage(temp_degc: Array) -> Array:
+    """The derivatives of the magnet's flux linkage by what is fitted: it is linear in both.
+
+    Parameters
+    ----------
+    temp_degc : array [n], degC
+        Magnet temperature at each steady speed.
+
+    Returns
+    -------
+    array [n, 2]
+        dψ/dψ25 [1] and dψ/d(slope) [K].
+
+    Notes
+    -----
+    ψ = |v| / ω_e of the fundamental, and ψ(T) = ψ25 + s (T - 25) = ψ25 (1 + α (T - 25)), so that
+    α = s / ψ25. Ke and Kv in every convention are p ψ25 times that convention's factor
+    (`conventions.coupling_as`).
+
+    References
+    ----------
+    IEEE Std 1812-2014, 4.2 (open-circuit test).
+
+    """
+    return np.column_stack([np.ones(temp_degc.size), temp_degc - 25.0])
 
 
 def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """Psi = |v|/omega_e of every steady speed of every capture, brought to 25 degC together.
+    """Psi of every steady speed of every capture, brought to 25 degC together (`flux_linkage`).
 
-    psi(T) = psi25 (1 + alpha (T - 25)); alpha is fitted where the magnets were at two
-    temperatures, else assumed with its own uncertainty. Ke in every convention is p psi times
-    that convention's factor (conventions.coupling_as).
+    Alpha is fitted where the magnets were at two temperatures, else assumed with its own
+    uncertainty.
     """
     del known
     captures = campaign.of("open_circuit")
     groups, notes = _groups(captures, options)
     if not groups:
-        reason = "; ".join([*notes, EXPERIMENT])
-        return Fit(tuple(not_identifiable(n, UNITS.get(n, "1"), NAME, reason) for n in GIVES))
+        return METHOD.nothing(GIVES, "; ".join([*notes, EXPERIMENT]))
     used = tuple(c for c in captures if any(g.capture is c for g in groups))
     notes.append(unstated_note(used, ("voltage", "temperature")))
     found = _flux_estimates(groups, used, notes, options)
-    pairs, order = count_pole_pairs(groups)
+    pairs, order = count_pole_pairs(METHOD, groups)
     found["pole_pairs"] = pairs
     found["phase_order"] = order
     found |= _couplings(found["psi_pm_wb"], pairs)
     found |= _harmonics(groups, used)
-    found["angle_offset_elec_rad"] = angle_offset(groups, pairs, order, used)
+    found["angle_offset_elec_rad"] = angle_offset(METHOD, groups, pairs, order)
     return Fit(tuple(found[name] for name in GIVES), tuple(_evidence(groups, found["psi_pm_wb"])))
 
 
@@ -154,8 +157,9 @@ def _flux_estimates(
 ) -> dict[str, Estimate]:
     psi = np.array([g.flux.psi_wb for g in groups])
     sigma = np.array([max(g.flux.u_psi_wb, 1e-9 * g.flux.psi_wb) for g in groups])
-    excess = np.array([g.temp_degc - 25.0 for g in groups])
-    free = linear_fit(np.column_stack([np.ones(psi.size), excess]), psi, sigma)
+    design = flux_linkage(np.array([g.temp_degc for g in groups]))
+    excess = design[:, 1]
+    free = linear_fit(design, psi, sigma)
     alpha, u_alpha = _slope(free)
     wide = float(np.ptp(excess)) >= options["least_span_k"] and free.full_rank
     measured = wide and u_alpha <= options["worst_u_alpha_1_k"]
@@ -167,9 +171,8 @@ def _flux_estimates(
         "speed_elec_low_rad_s": min(abs(g.flux.speed_elec_rad_s) for g in groups),
         "speed_elec_high_rad_s": max(abs(g.flux.speed_elec_rad_s) for g in groups),
     }
-    paths = tuple(c.path for c in used)
     extra: list[Contribution] = []
-    words = [n for n in notes if n]
+    words = [*notes]
     if measured:
         value, chosen = float(free.coefficients[0]), free
     else:
@@ -182,25 +185,17 @@ def _flux_estimates(
         extra = [Contribution(SOURCE, -value * lever * options["u_alpha_assumed_1_k"], "B")]
         words.append(f"magnet coefficient {alpha:g} 1/K assumed to reach 25 degC")
     widened, dof = _birge(chosen)
-    parts = [Contribution(f"scatter:{NAME}:psi", chosen.u(0) * math.sqrt(widened), "A", dof)]
-    parts += extra
+    parts = [METHOD.scatter("psi", chosen.u(0) * math.sqrt(widened), dof), *extra]
     parts += [Contribution(source, value * u, "B") for source, u in shared["voltage"]]
     parts += [Contribution(source, -value * alpha * u, "B") for source, u in shared["temperature"]]
-    note = "; ".join(words)
-    found = {
-        "psi_pm_wb": Estimate(
-            "psi_pm_wb", value, "Wb", "measured", NAME, budget_of(parts), at, paths, note
-        )
-    }
+    psi_25 = METHOD.measured("psi_pm_wb", value, parts, used, at, words)
     name = "temp_coeff_magnet_1_k"
     if not measured:
-        found[name] = not_identifiable(name, "1/K", NAME, WARM)
-        return found
-    scatter = Contribution(f"scatter:{NAME}:alpha", u_alpha * math.sqrt(widened), "A", dof)
+        return {psi_25.name: psi_25, name: METHOD.missing(name, WARM)}
+    scatter = METHOD.scatter("alpha", u_alpha * math.sqrt(widened), dof)
     offset = [Contribution(s, alpha**2 * u, "B") for s, u in shared["temperature"]]
-    budget = budget_of([scatter, *offset])
-    found[name] = Estimate(name, alpha, "1/K", "measured", NAME, budget, at, paths, note)
-    return found
+    coefficient = METHOD.measured(name, alpha, [scatter, *offset], used, at, words)
+    return {psi_25.name: psi_25, name: coefficient}
 
 
 def _slope(fit: LinearFit) -> tuple[float, float]:
@@ -242,17 +237,14 @@ def _instrument_shares(
 def _couplings(psi: Estimate, pairs: Estimate) -> dict[str, Estimate]:
     found: dict[str, Estimate] = {}
     for name in KE_NAMES:
-        unit = COUPLINGS[name].unit
         if not pairs.known:
-            found[name] = not_identifiable(name, unit, NAME, f"needs pole_pairs: {pairs.note}")
+            found[name] = METHOD.missing(name, f"needs pole_pairs: {pairs.note}")
             continue
         k = psi.number * pairs.number
         value = coupling_as(name, k)
         slope = COUPLINGS[name].power * value / psi.number
-        budget: Budget = propagate([(slope, psi.budget)])
-        found[name] = Estimate(
-            name, value, unit, "measured", NAME, budget, psi.at, psi.captures, psi.note
-        )
+        parts = propagate([(slope, psi.budget)])
+        found[name] = METHOD.measured(name, value, parts, psi.captures, psi.at, psi.note)
     return found
 
 
@@ -267,7 +259,7 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
         own = [g for g in groups if order in g.flux.harmonics]
         if not own:
             note = f"repeat the open_circuit at a rate above {3 * order} samples a cycle"
-            found[name] = not_identifiable(name, "1", NAME, note)
+            found[name] = METHOD.missing(name, note)
             continue
         ratios = np.array([g.flux.harmonics[order] for g in own])
         weights = np.array([g.flux.u_harmonic**-2 for g in own])
@@ -277,10 +269,10 @@ def _harmonics(groups: Sequence[Group], used: Sequence[Capture]) -> dict[str, Es
         excess = float(spread.sum()) / max(free, 1)
         u = math.sqrt(max(1.0, excess) / float(weights.sum()))
         dof = float(free) if _beyond_chance(excess, free) else math.inf
-        budget = budget_of([Contribution(f"scatter:{NAME}:{name}", u, "A", dof)])
         note = "" if abs(mean) > 3.0 * u else "within noise of zero"
-        paths = tuple(c.path for c in used)
-        found[name] = Estimate(name, abs(mean), "1", "measured", NAME, budget, {}, paths, note)
+        found[name] = METHOD.measured(
+            name, abs(mean), [METHOD.scatter(name, u, dof)], used, notes=note
+        )
     return found
 
 
@@ -289,8 +281,7 @@ def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:
     temps = np.array([g.temp_degc for g in groups])
     psis = np.array([g.flux.psi_wb for g in groups])
     if psi.at["temp_measured_low_degc"] != psi.at["temp_measured_high_degc"]:
-        line = np.column_stack([np.ones(temps.size), temps - 25.0])
-        alpha = float(linear_fit(line, psis / psi.number).coefficients[1])
+        alpha = float(linear_fit(flux_linkage(temps), psis / psi.number).coefficients[1])
     amplitude, flux = [], []
     for path in dict.fromkeys(g.capture.path for g in groups):
         own = [g for g in groups if g.capture.path == path]
@@ -301,29 +292,20 @@ def _evidence(groups: Sequence[Group], psi: Estimate) -> list[Evidence]:
         amplitude.append(Series(path, speed, volts, model * np.abs(speed)))
         flux.append(Series(path, speed, np.array([g.flux.psi_wb for g in own]), model))
     return [
-        Evidence(
-            NAME,
-            "Back-EMF amplitude against speed",
-            "omega_elec_rad_s",
-            "back_emf_phase_peak_v",
-            "scatter",
-            tuple(amplitude),
-            caption="Fundamental of the phase voltage; the line is psi times electrical speed.",
+        METHOD.plot(
+            "Back-EMF amplitude against speed", ("omega_elec_rad_s", "back_emf_phase_peak_v"),
+            "scatter", amplitude,
+            "Fundamental of the phase voltage; the line is psi times electrical speed.",
         ),
-        Evidence(
-            NAME,
-            "Flux linkage found at each speed",
-            "omega_elec_rad_s",
-            "psi_pm_wb",
-            "scatter",
-            tuple(flux),
-            caption="Flat where amplitude is proportional to speed; the steps are temperature.",
+        METHOD.plot(
+            "Flux linkage found at each speed", ("omega_elec_rad_s", "psi_pm_wb"), "scatter", flux,
+            "Flat where amplitude is proportional to speed; the steps are temperature.",
         ),
-    ]
+    ]  # fmt: skip
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     GIVES,
     ("open_circuit",),
     EXPERIMENT,

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.direct_current import (
-    COPPER_SOURCE,
     POINT_OPTIONS,
     TEST,
-    Columns,
     Point,
     captures_of,
-    columns_of,
     direct_current_points,
-    fit_direct_current,
     shifted,
 )
 from pipeline.estimation.electrical.terminals import PAIRS
+from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
@@ -29,20 +27,24 @@ from pipeline.estimation.uncertainty.instruments import (
     unstated_note,
     voltage_source,
 )
-from pipeline.estimation.uncertainty.measured import measured
-from pipeline.physics.conventions import phase_from_line, phase_resistances_ohm
+from pipeline.numerics.least_squares import linear_fit
+from pipeline.physics.conventions import (
+    COPPER_COEFFICIENT_25_1_K,
+    phase_from_line,
+    phase_resistances_ohm,
+)
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
-from pipeline.records.evidence import Evidence, Series
+from pipeline.records.estimate import Conditions, Estimate
+from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution
 
-NAME = "resistance"
 EXPERIMENT = (
     "record a resistance capture a terminal pair: settled direct-current plateaus of both signs "
     "and at least two levels, with temp_winding_degc"
 )
+COPPER_SOURCE = "assumed:temp_coeff_copper_1_k"
 RANGE_OF_THREE = 3.314 / (1.960 * math.sqrt(2.0))
 Array = NDArray[np.float64]
 
@@ -52,28 +54,188 @@ TERMS = (
         for p in PAIRS
     ),
     *(
-        Term(
-            f"r_{p}_ohm",
-            "ohm",
-            f"wye-equivalent resistance of phase {p}, at 25 degC",
-            "constant",
-            0,
-        )
+        Term(f"r_{p}_ohm", "ohm", f"wye-equivalent resistance of phase {p}, at 25 degC",
+             "constant", 0)
         for p in "abc"
     ),
     Term("voltage_offset_v", "V", "part of the terminal voltage that follows sign(I)", "constant"),
-)
-GIVES = (
-    "r_phase_ohm",
-    "r_ll_ohm",
-    "resistance_imbalance",
-    *(term.name for term in TERMS),
-)
-UNITS = {"resistance_imbalance": "1", "voltage_offset_v": "V"}
+)  # fmt: skip
+GIVES = ("r_phase_ohm", "r_ll_ohm", "resistance_imbalance", *(term.name for term in TERMS))
+METHOD = Method("resistance", TERMS)
 
 
-def _results(columns: Columns, r_pairs: Array) -> dict[str, float]:
-    """The published resistances from those of the measured pairs [k]."""
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """What the coefficients of a fit mean, in their order: R of each pair, the offset of each
+    capture that saw both signs, V0 of each voltage source that saw two levels as well.
+    """
+
+    pairs: tuple[str, ...]
+    offsets: tuple[int, ...]
+    drops: tuple[str, ...]
+
+    @property
+    def drop_start(self) -> int:
+        """Index of the first V0."""
+        return len(self.pairs) + len(self.offsets)
+
+    @property
+    def size(self) -> int:
+        """How many, without the copper coefficient's correction that comes last."""
+        return self.drop_start + len(self.drops)
+
+
+def columns_of(points: Sequence[Point]) -> Columns:
+    """The coefficients that these plateaus can tell apart."""
+    pairs = tuple(p for p in PAIRS if any(point.pair == p for point in points))
+    offsets, drops = [], set()
+    for index in sorted({p.capture for p in points}):
+        own = [p for p in points if p.capture == index]
+        signs = {math.copysign(1.0, p.i_a) for p in own}
+        levels = sorted(abs(p.i_a) for p in own)
+        if len(signs) == 2:
+            offsets.append(index)
+        if len(levels) > len(signs) and levels[-1] > 1.2 * levels[0]:
+            drops.add(voltage_source(own[0].meta))
+    return Columns(pairs, tuple(offsets), tuple(sorted(drops)))
+
+
+def terminal_voltage(point: Point, columns: Columns, alpha_1_k: float) -> Array:
+    """The derivatives of one pair's voltage by what is fitted: it is linear in all but alpha.
+
+    Parameters
+    ----------
+    point
+        Means of a settled plateau: current [A], voltage [V], winding temperature [degC].
+    columns
+        What is fitted.
+    alpha_1_k
+        Coefficient of copper at 25 degC [1/K] about which the voltage is linearised.
+
+    Returns
+    -------
+    array [k + 1]
+        dV/dR25 of each pair [A], dV/dV_off of each capture [1], dV/dV0 of each voltage source [1],
+        and dV by a relative change of alpha of two [V].
+
+    Notes
+    -----
+    V = V_off + V0 sign(I) + R25 (1 + α (T - 25)) I
+
+    dV/dR25 = (1 + α (T - 25)) I, dV/dα = R25 (T - 25) I, in which R25 I is read off the point
+    itself, V / (1 + α (T - 25)); so linearised, a few rounds find alpha.
+
+    References
+    ----------
+    IEEE Std 112-2017, 5.4 (resistance and temperature of copper: R ∝ 234.5 + T).
+
+    """
+    excess = point.temp_degc - 25.0
+    factor = 1.0 + alpha_1_k * excess
+    row = np.zeros(columns.size + 1)
+    row[columns.pairs.index(point.pair)] = factor * point.i_a
+    row[-1] = 2.0 * COPPER_COEFFICIENT_25_1_K * excess * point.v_v / factor
+    if point.capture in columns.offsets:
+        row[len(columns.pairs) + columns.offsets.index(point.capture)] = 1.0
+    if (source := voltage_source(point.meta)) in columns.drops:
+        row[columns.drop_start + columns.drops.index(source)] = math.copysign(1.0, point.i_a)
+    return row
+
+
+@dataclass(frozen=True, slots=True)
+class DirectCurrentFit:
+    """R at 25 degC of each pair and the rest of `Columns` [k], with the covariance of the scatter.
+
+    `alpha_1_k` is the copper coefficient found; `residuals` [n] are those of the points. `dof` is
+    that of the scatter: infinite where it is what the plateaus' own noise makes, else the points'.
+    """
+
+    coefficients: Array
+    covariance: Array
+    alpha_1_k: float
+    u_alpha_1_k: float
+    residuals: Array
+    full_rank: bool
+    dof: float
+
+
+def fit_direct_current(
+    points: Sequence[Point],
+    columns: Columns,
+    u_alpha_rel: float,
+    alpha_rel: float = 0.0,
+) -> DirectCurrentFit:
+    """Weighted least squares of `terminal_voltage` over the plateaus of all pairs.
+
+    Parameters
+    ----------
+    points
+        Plateaus of all captures.
+    columns
+        What is fitted beside the copper coefficient.
+    u_alpha_rel
+        How well copper's 1/259.5 K is known beforehand [1, relative]; inf: not at all.
+    alpha_rel
+        By how much that prior is moved [1, relative].
+
+    Notes
+    -----
+    Weights from both standard errors, u² = u_V² + (R u_I)² (York 1966, for errors small against
+    the span). The covariance holds the scatter alone, widened where the points scatter more than
+    their own noise explains (Birge 1932); the prior's share is for the caller to add.
+
+    References
+    ----------
+    York, Can. J. Phys. 44, 1966, 1079, doi:10.1139/p66-090.
+    Birge, Phys. Rev. 40, 1932, 207, doi:10.1103/PhysRev.40.207.
+
+    """
+    prior = COPPER_COEFFICIENT_25_1_K * (1.0 + alpha_rel)
+    alpha = prior
+    width = columns.size + 1
+    v = np.array([p.v_v for p in points])
+    sigma = np.array([_noise_v(p) for p in points])
+    for _ in range(4):
+        design = np.array([terminal_voltage(p, columns, alpha) for p in points])
+        rows = np.vstack([design, np.eye(1, width, width - 1)])
+        known = np.append(v, 0.5 * (prior - alpha) / COPPER_COEFFICIENT_25_1_K)
+        slack = np.append(sigma, 0.5 * max(u_alpha_rel, 1e-9))
+        fit = linear_fit(rows, known, slack)
+        alpha += 2.0 * float(fit.coefficients[-1]) * COPPER_COEFFICIENT_25_1_K
+    last = fit.covariance[:, -1]
+    scatter = fit.covariance - np.outer(last, last) / slack[-1] ** 2
+    residuals = fit.residuals[:-1]
+    dof = len(points) - fit.rank + (1 if math.isfinite(u_alpha_rel) else 0)
+    factor = _birge(residuals / sigma, dof)
+    scatter = scatter * factor
+    u_alpha = 2.0 * COPPER_COEFFICIENT_25_1_K * math.sqrt(max(float(scatter[-1, -1]), 0.0))
+    size = columns.size
+    return DirectCurrentFit(
+        fit.coefficients[:size],
+        scatter[:size, :size],
+        alpha,
+        u_alpha,
+        residuals,
+        fit.full_rank,
+        float(dof) if factor > 1.0 else math.inf,
+    )
+
+
+def _noise_v(p: Point) -> float:
+    return max(math.hypot(p.u_v, p.v_v / p.i_a * p.u_i), 1e-12 + 1e-9 * abs(p.v_v))
+
+
+def _birge(normalised: Array, dof: int) -> float:
+    """Variance factor of points that scatter more than they should, 1 where chance explains it."""
+    if dof < 3:
+        return 1.0
+    chi2_dof = float(normalised @ normalised) / dof
+    return chi2_dof if chi2_dof > 1.0 + 3.0 * math.sqrt(2.0 / dof) else 1.0
+
+
+def _results(columns: Columns, coefficients: Array) -> dict[str, float]:
+    """The published values from the coefficients [k]; all are linear in these."""
+    r_pairs = coefficients[: len(columns.pairs)]
     by_pair = dict(zip(columns.pairs, (float(r) for r in r_pairs), strict=True))
     r_ll = float(np.mean(r_pairs))
     results = {"r_phase_ohm": phase_from_line(r_ll), "r_ll_ohm": r_ll}
@@ -81,61 +243,50 @@ def _results(columns: Columns, r_pairs: Array) -> dict[str, float]:
     if len(by_pair) == 3:
         phases = phase_resistances_ohm(by_pair["ab"], by_pair["bc"], by_pair["ca"])
         results |= {f"r_{name}_ohm": r for name, r in phases._asdict().items()}
+    if columns.drops:
+        results["voltage_offset_v"] = float(np.mean(coefficients[columns.drop_start :]))
     return results
 
 
 def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """R of each pair by the plateaus of all captures at once, brought to 25 degC by copper's law.
 
-    R(T) = R25 (234.5 + T)/(234.5 + 25), IEEE Std 112-2017. The published values are linear in the
-    pairs' (conventions.phase_resistances_ohm), and so is their scatter.
+    The published values are linear in the pairs' (conventions.phase_resistances_ohm), and so is
+    their scatter.
     """
     del known
     points, notes = direct_current_points(campaign, options)
     if not points:
-        return Fit(_missing(f"no settled plateau with current; {EXPERIMENT}"))
+        return METHOD.nothing(GIVES, f"no settled plateau with current; {EXPERIMENT}")
     columns = columns_of(points)
     fit = fit_direct_current(points, columns, options["u_rel_copper"])
     if not fit.full_rank:
-        return Fit(_missing(f"the plateaus do not part R from the offset; {EXPERIMENT}"))
+        return METHOD.nothing(GIVES, f"the plateaus do not part R from the offset; {EXPERIMENT}")
     used = captures_of(campaign, points)
-    size = len(columns.pairs)
-    names = tuple(_results(columns, fit.coefficients[:size]))
-
-    def published(coefficients: Array) -> Array:
-        values = list(_results(columns, coefficients[:size]).values())
-        if columns.drops:
-            values.append(float(np.mean(coefficients[columns.drop_start :])))
-        return np.array(values)
 
     def evaluate(shift: Shift) -> Array:
         alpha_rel = shift.get(COPPER_SOURCE, 0.0)
         moved = fit_direct_current(
             shifted(points, shift), columns, options["u_rel_copper"], alpha_rel
         )
-        return published(moved.coefficients)
+        return np.array(list(_results(columns, moved.coefficients).values()))
 
     uncertainties = instrument_uncertainties(used) | {COPPER_SOURCE: options["u_rel_copper"]}
     shared = contributions(evaluate, uncertainties)
-    matrix = np.column_stack([published(row) for row in np.eye(columns.size)])
+    matrix = np.column_stack([[*_results(columns, row).values()] for row in np.eye(columns.size)])
     covariance = matrix @ fit.covariance @ matrix.T
-    values = published(fit.coefficients)
-    if columns.drops:
-        names += ("voltage_offset_v",)
-    allowances = _allowances(points, columns, names, matrix, options)
+    values = _results(columns, fit.coefficients)
+    allowances = _allowances(points, columns, tuple(values), matrix, options)
     notes.append(unstated_note(used))
     estimates = {}
-    for k, name in enumerate(names):
+    for k, (name, value) in enumerate(values.items()):
         u = math.sqrt(max(float(covariance[k, k]), 0.0))
-        parts = [Contribution(f"scatter:{NAME}:{name}", u, "A", fit.dof), *shared[k]]
-        parts += allowances[name]
-        estimates[name] = _estimate(name, float(values[k]), parts, points, used, notes)
-    if size == 3:
-        estimates["resistance_imbalance"] = _imbalance(
-            names, values, covariance, fit.dof, points, used
-        )
+        parts = [METHOD.scatter(name, u, fit.dof), *shared[k], *allowances[name]]
+        estimates[name] = METHOD.measured(name, value, parts, used, _conditions(points), notes)
+    if len(columns.pairs) == 3:
+        estimates["resistance_imbalance"] = _imbalance(values, covariance, fit.dof, points, used)
     return Fit(
-        tuple(estimates.get(n) or _absent(n) for n in GIVES), (_evidence(points, fit.residuals),)
+        tuple(estimates.get(n) or _absent(n) for n in GIVES), (_plot(points, fit.residuals),)
     )
 
 
@@ -177,25 +328,16 @@ def _unknown_drop_ohm(
     return drop_v / max(abs(p.i_a) for p in own)
 
 
-def _estimate(
-    name: str,
-    value: float,
-    parts: Sequence[Contribution],
-    points: Sequence[Point],
-    captures: Sequence[Capture],
-    notes: Sequence[str],
-) -> Estimate:
-    at = {
+def _conditions(points: Sequence[Point]) -> Conditions:
+    return {
         "temp_winding_degc": 25.0,
         "current_a": max(abs(p.i_a) for p in points),
         "temp_measured_degc": round(float(np.mean([p.temp_degc for p in points])), 3),
     }
-    return measured(NAME, name, UNITS.get(name, "ohm"), value, parts, captures, at, notes)
 
 
 def _imbalance(
-    names: Sequence[str],
-    values: Array,
+    values: Mapping[str, float],
     covariance: Array,
     dof: float,
     points: Sequence[Point],
@@ -206,16 +348,16 @@ def _imbalance(
     The range of three equal phases exceeds 3.31 of their standard deviations in 5 % of cases, a
     given pair's difference 2.77: their ratio widens u (studentized range, Tukey 1949).
     """
-    rows = [names.index(f"r_{phase}_ohm") for phase in "abc"]
-    phases = values[rows]
+    rows = [list(values).index(f"r_{phase}_ohm") for phase in "abc"]
+    phases = np.array([values[f"r_{phase}_ohm"] for phase in "abc"])
     mean = float(phases.mean())
     top, low = rows[int(phases.argmax())], rows[int(phases.argmin())]
     spread = covariance[top, top] + covariance[low, low] - 2.0 * covariance[top, low]
     u = RANGE_OF_THREE * math.sqrt(max(float(spread), 0.0)) / mean
-    part = Contribution(f"scatter:{NAME}:resistance_imbalance", u, "A", dof)
-    value = float(np.ptp(phases)) / mean
+    name, value = "resistance_imbalance", float(np.ptp(phases)) / mean
     note = "read high by chance where the phases differ by less than u"
-    return _estimate("resistance_imbalance", value, [part], points, captures, [note])
+    parts = [METHOD.scatter(name, u, dof)]
+    return METHOD.measured(name, value, parts, captures, _conditions(points), note)
 
 
 def _absent(name: str) -> Estimate:
@@ -223,36 +365,23 @@ def _absent(name: str) -> Estimate:
         "voltage_offset_v": "needs plateaus of two levels of |I| in one capture",
         "resistance_imbalance": "needs a resistance capture on each of the pairs ab, bc and ca",
     }
-    return not_identifiable(
-        name, UNITS.get(name, "ohm"), NAME, why.get(name, f"pair not measured; {EXPERIMENT}")
-    )
+    return METHOD.missing(name, why.get(name, f"pair not measured; {EXPERIMENT}"))
 
 
-def _missing(note: str) -> tuple[Estimate, ...]:
-    return tuple(not_identifiable(n, UNITS.get(n, "ohm"), NAME, note) for n in GIVES)
-
-
-def _evidence(points: Sequence[Point], residuals: Array) -> Evidence:
+def _plot(points: Sequence[Point], residuals: Array) -> Evidence:
     series = []
     for pair in sorted({p.pair for p in points}):
         rows = [k for k, p in enumerate(points) if p.pair == pair]
-        rows.sort(key=lambda k: points[k].i_a)
-        x = np.array([points[k].i_a for k in rows])
-        y = np.array([points[k].v_v for k in rows])
-        series.append(Series(pair, x, y, y - residuals[rows]))
-    return Evidence(
-        NAME,
-        "Terminal voltage against current",
-        "current_a",
-        "voltage_v",
-        "scatter",
-        tuple(series),
-        caption="Means over settled plateaus; R is the slope, the zero crossing is left out.",
-    )
+        x, y = (np.array([getattr(points[k], n) for k in rows]) for n in ("i_a", "v_v"))
+        series.append(over_x(pair, x, y, y - residuals[rows]))
+    return METHOD.plot(
+        "Terminal voltage against current", ("current_a", "voltage_v"), "scatter", series,
+        "Means over settled plateaus; R is the slope, the zero crossing is left out.",
+    )  # fmt: skip
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     GIVES,
     (TEST,),
     EXPERIMENT,

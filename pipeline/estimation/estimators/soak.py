@@ -10,25 +10,22 @@ from pipeline.estimation.electrical.direct_current import (
     POINT_OPTIONS,
     TEST,
     captures_of,
-    columns_of,
     direct_current_points,
-    fit_direct_current,
     shifted,
 )
+from pipeline.estimation.estimators.resistance import columns_of, fit_direct_current
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
-    budget_of,
     contributions,
     instrument_uncertainties,
     unstated_note,
 )
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
-from pipeline.records.uncertainty import Contribution
 
-NAME = "soak"
+METHOD = Method("soak")
 GIVEN = "temp_coeff_copper_1_k"
 EXPERIMENT = (
     "repeat a resistance capture of one pair with the winding soaked at least 15 K warmer, "
@@ -37,10 +34,14 @@ EXPERIMENT = (
 
 
 def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """Alpha at 25 degC = (dR/dT)/R25 of the pairs that were measured at two temperatures.
+    """Alpha at 25 degC of the pairs that were measured at two temperatures.
 
-    The model is that of `fit_direct_current` without knowledge of copper; instrument gains cancel
-    and a thermometer's offset enters only through R25.
+    Notes
+    -----
+    α = (dR/dT) / R25, fitted with R25 as in `estimators.resistance.terminal_voltage`, without
+    knowledge of copper. Instrument gains cancel, and a thermometer's offset enters only through
+    R25.
+
     """
     del known
     points, notes = direct_current_points(campaign, options)
@@ -50,35 +51,26 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
     }
     points = [p for p in points if spans[p.pair] >= options["least_span_k"]]
     if not points:
-        return Fit((not_identifiable(GIVEN, "1/K", NAME, EXPERIMENT),))
+        return METHOD.nothing((GIVEN,), EXPERIMENT)
     columns = columns_of(points)
     fit = fit_direct_current(points, columns, np.inf)
     if not fit.full_rank or fit.u_alpha_1_k > options["worst_u_rel"] * abs(fit.alpha_1_k):
-        return Fit((not_identifiable(GIVEN, "1/K", NAME, EXPERIMENT),))
+        return METHOD.nothing((GIVEN,), EXPERIMENT)
 
     def evaluate(shift: Shift) -> np.ndarray:
         return np.array([fit_direct_current(shifted(points, shift), columns, np.inf).alpha_1_k])
 
     used = captures_of(campaign, points)
     shared = contributions(evaluate, instrument_uncertainties(used))[0]
-    scatter = Contribution(f"scatter:{NAME}:{GIVEN}", fit.u_alpha_1_k, "A", fit.dof)
+    parts = [METHOD.scatter(GIVEN, fit.u_alpha_1_k, fit.dof), *shared]
     temps = [p.temp_degc for p in points]
-    estimate = Estimate(
-        GIVEN,
-        fit.alpha_1_k,
-        "1/K",
-        "measured",
-        NAME,
-        budget_of([scatter, *shared]),
-        {"temp_winding_degc": 25.0, "temp_low_degc": min(temps), "temp_high_degc": max(temps)},
-        tuple(c.path for c in used),
-        "; ".join(n for n in [*notes, unstated_note(used)] if n),
-    )
-    return Fit((estimate,))
+    at = {"temp_winding_degc": 25.0, "temp_low_degc": min(temps), "temp_high_degc": max(temps)}
+    notes.append(unstated_note(used))
+    return Fit((METHOD.measured(GIVEN, fit.alpha_1_k, parts, used, at, notes),))
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     (GIVEN,),
     (TEST,),
     EXPERIMENT,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.uncertainty.instruments import budget_of
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.coasting import coast_down, coasting_rows
 from pipeline.numerics.integrals import trapezoid
@@ -26,19 +27,20 @@ from pipeline.numerics.weak_rows import LEAST_SAMPLES, smooth_speed
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution
 
 Array = NDArray[np.float64]
 
-NAME = "spin_down"
 TERMS = (
     Term("coast_coulomb_rad_s2", "rad/s²", "Coulomb friction over inertia, from coasting",
          "constant", 0.0, 1e7),
     Term("coast_viscous_1_s", "1/s", "viscous friction over inertia, from coasting", "constant",
          -1e3, 1e6),
 )  # fmt: skip
+METHOD = Method("spin_down", TERMS)
+GIVES = tuple(term.name for term in TERMS)
 EXPERIMENT = (
     "record a spin_down: terminals open, let the shaft coast from full speed to rest with "
     "theta_mech_rad logged, once in each sense"
@@ -66,6 +68,38 @@ class Coast:
     sigma: float
 
 
+def deceleration(
+    omega_rad_s: Array, drag: Array, extras: Sequence[str], fastest_rad_s: float
+) -> Array:
+    """Deceleration of a shaft that coasts [rad/s²].
+
+    Parameters
+    ----------
+    omega_rad_s : array [n], rad/s
+        Speed in the sense of rotation.
+    drag : array [2 + k]
+        T_c/J [rad/s²], B/J [1/s], then what each of `extras` adds at its full height [rad/s²].
+    extras : k names of `DRAG_FORMS`
+        Windage or Stribeck's excess, as functions of ω/ω_max.
+    fastest_rad_s
+        ω_max.
+
+    Notes
+    -----
+    -dω/dt = T_c/J + (B/J) ω + Σ a_k f_k(ω/ω_max). The derivatives by T_c/J, B/J and a_k are 1, ω
+    and f_k; those of the angle follow by integration, and are taken by central differences.
+
+    References
+    ----------
+    IEEE Std 115-2019, 4.4 (retardation test).
+
+    """
+    total: Array = drag[0] + drag[1] * omega_rad_s
+    for value, name in zip(drag[2:], extras, strict=True):
+        total = total + value * DRAG_FORMS[name](omega_rad_s / fastest_rad_s)
+    return total
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
     """The parameters: shared drag first, then start angle, speed and ripple of each coast."""
@@ -84,14 +118,8 @@ class Motion:
         """What the encoder (or tachometer) should read [n]."""
         drag, own = self.of_coast(index, parameters)
         fast = self.fastest_rad_s
-
-        def deceleration(speed: Array) -> Array:
-            total: Array = drag[0] + drag[1] * speed
-            for value, name in zip(drag[2:], self.extras, strict=True):
-                total = total + value * DRAG_FORMS[name](speed / fast)
-            return total
-
-        theta, speed = coast_down(coast.t_s, max(float(own[1]), 1e-6 * fast), deceleration)
+        slowing = partial(deceleration, drag=drag, extras=self.extras, fastest_rad_s=fast)
+        theta, speed = coast_down(coast.t_s, max(float(own[1]), 1e-6 * fast), slowing)
         # A tachometer's zero error looks as T_c/B does, so it is taken as none.
         out = own[0] + theta if coast.of_angle else speed
         for value, name in zip(own[2:], self.ripples, strict=True):
@@ -101,17 +129,18 @@ class Motion:
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """T_c/J and B/J from dw/dt = -T_c/J - (B/J) w, fitted to the angle itself.
+    """T_c/J and B/J by `deceleration`, fitted to the angle itself.
 
     The trajectory is integrated, the record never differentiated; windage, Stribeck's bump and an
     eccentric encoder join where the residuals demand them. J is not in it: that needs a known
-    torque (estimator inertia). Reference: IEEE Std 115-2019, 4.4 (retardation test).
+    torque (estimator inertia).
     """
     del known
     coasts = [c for capture in campaign.of("spin_down") for c in _coasts(capture)]
     if not coasts:
-        note = f"no coast-down of {LEAST_SAMPLES} samples or more; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(t.name, t.unit, NAME, note) for t in TERMS))
+        return METHOD.nothing(
+            GIVES, f"no coast-down of {LEAST_SAMPLES} samples or more; {EXPERIMENT}"
+        )
     fastest = max(c.speed_rad_s for c in coasts)
     motion = Motion((), (), fastest)
     found = _solve(motion, coasts, None)
@@ -125,8 +154,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         found = _solve(wider, coasts, _carry(motion, wider, found.parameters, len(coasts)))
         motion = wider
     if not np.isfinite([found.u(0), found.u(1)]).all():
-        note = f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(t.name, t.unit, NAME, note) for t in TERMS))
+        return METHOD.nothing(
+            GIVES, f"the coasts do not part dry from viscous friction; {EXPERIMENT}"
+        )
     return Fit(_estimates(motion, coasts, found), _evidence(motion, coasts, found))
 
 
@@ -254,7 +284,7 @@ def _estimates(
     joint = found.covariance[:2, :2] * spread * tau
     scale = np.sqrt(np.diag(joint))
     lower = np.linalg.cholesky(joint / np.outer(scale, scale) + 1e-12 * np.eye(2)) * scale[:, None]
-    paths = tuple(sorted({c.path for c in coasts}))
+    paths = sorted({c.path for c in coasts})
     added = [*motion.extras, *motion.ripples]
     note = f"{len(coasts)} coasts; residual {np.sqrt(spread):.2g} times the encoder's own noise"
     note += f"; {allowed_for(added)}" if added else ""
@@ -264,16 +294,11 @@ def _estimates(
         note += "; drag has another form: allowance from the fast and the slow half apart"
     dof = max(free / tau, 1.0)
     estimates = []
-    for i, term in enumerate(TERMS):
-        parts = [Contribution(f"scatter:{NAME}:{k}", float(lower[i, k]), "A", dof) for k in (0, 1)]
+    for i, name in enumerate(GIVES):
+        parts = [METHOD.scatter(f"{k}", float(lower[i, k]), dof) for k in (0, 1)]
         parts.append(Contribution("assumed:drag_form", float(form[i]), "B"))
-        value = float(found.parameters[i])
-        at = {"omega_mech_rad_s": motion.fastest_rad_s}
-        estimates.append(
-            Estimate(
-                term.name, value, term.unit, "measured", NAME, budget_of(parts), at, paths, note
-            )
-        )
+        value, at = float(found.parameters[i]), {"omega_mech_rad_s": motion.fastest_rad_s}
+        estimates.append(METHOD.measured(name, value, parts, paths, at, note))
     return tuple(estimates)
 
 
@@ -318,32 +343,21 @@ def _evidence(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit) -> t
         else:
             seen, modelled = coast.measured[keep], fitted[keep]
         speed = Series(word, t, seen * coast.sense, modelled * coast.sense)
-        plots.append(
-            Evidence(
-                NAME, f"Coast-down {word}", "t_s", "omega_mech_rad_s", "line", (speed,), coast.path,
-                "speed for the eye only; the fit is to the angle",
-            )
-        )  # fmt: skip
+        caption = "speed for the eye only; the fit is to the angle"
+        axes = "t_s", "omega_mech_rad_s"
+        plots.append(METHOD.plot(f"Coast-down {word}", axes, "line", (speed,), caption, coast.path))
         if coast.of_angle:
             angle = Series(word, t, coast.measured[keep], fitted[keep])
+            caption, axes = "angle from the start of the coast", ("t_s", "theta_mech_rad")
             plots.append(
-                Evidence(
-                    NAME,
-                    f"Angle travelled {word}",
-                    "t_s",
-                    "theta_mech_rad",
-                    "line",
-                    (angle,),
-                    coast.path,
-                    "angle from the start of the coast",
-                )
+                METHOD.plot(f"Angle travelled {word}", axes, "line", (angle,), caption, coast.path)
             )
     return tuple(plots)
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
-    gives=tuple(term.name for term in TERMS),
+    name=METHOD.name,
+    gives=GIVES,
     tests=("spin_down",),
     experiment=EXPERIMENT,
     fit=fit,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.method import Method
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.heat_record import (
     REFERENCE,
@@ -19,7 +20,6 @@ from pipeline.estimation.thermal.heat_record import (
     reference_resistance,
 )
 from pipeline.estimation.uncertainty.instruments import (
-    budget_of,
     current_source,
     temperature_source,
     voltage_source,
@@ -35,11 +35,11 @@ from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution, propagate, type_b
 
-NAME = "thermal"
+METHOD = Method("thermal")
 GIVEN = "rth_winding_k_w"
 EXPERIMENT = (
     "record a heat_run of at least three thermal time constants with temp_winding_degc, "
@@ -60,14 +60,45 @@ class Balance:
     words: str
 
 
-def fit_thermal(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """Heat balance in integral form, so that no temperature is differentiated.
+def heat_balance(t_s: Array, losses_w: Array, rise_k: Array) -> Array:
+    """The derivatives of the winding's temperature by what is fitted, for one heat capacity.
 
-    One node:   T_w - T_w0 = (1/C) ∫P - (1/CR) ∫(T_w - T_a)
-    Two nodes:  the winding also gives to a body whose temperature was measured, and that body to
-    ambient; the steady resistance is R_wa beside R_wm + R_ma. P = 1.5 R(T_w) i², from the
-    resistance test, so that an inverter's loss is not counted. Of several runs the best is used.
-    Reference: Boglietti et al., IEEE Trans. Ind. Electron. 56(3), 2009 (lumped networks).
+    Parameters
+    ----------
+    t_s : array [n], s
+        Times.
+    losses_w : array [n], W
+        Copper loss.
+    rise_k : array [n], K
+        Winding over ambient.
+
+    Returns
+    -------
+    array [n, 3]
+        dT/dT0 [1], dT/d(1/C) [J] and dT/d(1/(C R)) [K·s].
+
+    Notes
+    -----
+    C dT/dt = P - (T - T_a)/R in integral form, so that no temperature is differentiated:
+
+    T(t) = T0 + (1/C) ∫P dt - (1/(C R)) ∫(T - T_a) dt, and R = (1/C) / (1/(C R)).
+
+    References
+    ----------
+    Boglietti et al., IEEE Trans. Ind. Electron. 56(3), 2009, 871, doi:10.1109/TIE.2008.2011622
+    (lumped networks).
+
+    """
+    power, outward = trapezoid(t_s, losses_w), -trapezoid(t_s, rise_k)
+    return np.column_stack([np.ones(t_s.size), power, outward])
+
+
+def fit_thermal(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Thermal resistance by `heat_balance`, or by `network` where a second body was measured.
+
+    With two nodes the winding also gives to that body, and it to ambient; the steady resistance
+    is R_wa beside R_wm + R_ma. P = 1.5 R(T_w) i², with R from the resistance test, so that an
+    inverter's loss is not counted. Of several runs the best is used.
     """
     reasons: list[str] = []
     best: tuple[Balance, HeatRecord, Array] | None = None
@@ -87,8 +118,7 @@ def fit_thermal(campaign: Campaign, known: Constants, options: Mapping[str, floa
         elif best is None or balance.u_rth_k_w < best[0].u_rth_k_w:
             best = balance, record, np.array([ambient])
     if best is None:
-        reason = "; ".join([*reasons, EXPERIMENT])
-        return Fit((not_identifiable(GIVEN, "K/W", NAME, reason),))
+        return METHOD.nothing((GIVEN,), "; ".join([*reasons, EXPERIMENT]))
     return Fit((_estimate(*best, known),), (_evidence(*best[:2]),))
 
 
@@ -106,13 +136,14 @@ def _losses_w(record: HeatRecord, known: Constants) -> Array:
 def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | None:
     """The two-node balance where a second body was measured and takes heat, else one node."""
     t, winding = record.t_s, record.temp_winding_degc
-    ones, power = np.ones(t.size), trapezoid(t, losses_w)
-    outward = -trapezoid(t, winding - ambient)
-    single = linear_fit(np.column_stack([ones, power, outward]), winding)
+    balanced = heat_balance(t, losses_w, winding - ambient)
+    outward = balanced[:, 2]
+    single = linear_fit(balanced, winding)
     if record.temp_second_degc is not None and np.isfinite(record.temp_second_degc).all():
         second = record.temp_second_degc
         across = -trapezoid(t, winding - second)
-        double = _winding_fit(np.column_stack([ones, power, across, outward]), winding)
+        ones = balanced[:, 0]
+        double = _winding_fit(np.column_stack([*balanced[:, :2].T, across, outward]), winding)
         body = linear_fit(np.column_stack([ones, -across, -trapezoid(t, second - ambient)]), second)
         start, direct = _start(double, body)
         found = None
@@ -214,10 +245,32 @@ def _two_nodes(
 
 
 def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
-    """Rise over ambient of winding and body [2, m, n] at times [n] under losses [n].
+    """Rise over ambient of two heat capacities, winding and body.
 
-    variants [m, 7]: k, a, b, c, d, first rises. dT_w = k P - a T_w - b (T_w - T_m),
-    dT_m = c (T_w - T_m) - d T_m; exact over each step for the mean loss of its ends.
+    Parameters
+    ----------
+    t_s : array [n], s
+        Times.
+    losses_w : array [n], W
+        Copper loss.
+    variants : array [m, 7]
+        One set of parameters a row: k [K/J], a, b, c, d [1/s], first rise of either [K].
+
+    Returns
+    -------
+    array [2, m, n], K
+        Rise of winding and of body.
+
+    Notes
+    -----
+    dT_w/dt = k P - a T_w - b (T_w - T_m) and dT_m/dt = c (T_w - T_m) - d T_m, rises over ambient;
+    R = k / (a + b d / (c + d)). Exact over each step for the mean loss of its ends, by
+    Sylvester's formula for the exponential of a 2 x 2 matrix.
+
+    References
+    ----------
+    Boglietti et al., IEEE Trans. Ind. Electron. 56(3), 2009, 871, doi:10.1109/TIE.2008.2011622.
+
     """
     k, a, b, c, d = (variants[:, j] for j in range(5))
     matrix = np.empty((variants.shape[0], 2, 2))
@@ -227,7 +280,6 @@ def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
     root = np.sqrt(0.25 * (matrix[:, 0, 0] - matrix[:, 1, 1]) ** 2 + b * c) + 1e-12
     steps = np.diff(t_s)[:, None]
     fast, slow = np.exp((half_trace - root) * steps), np.exp((half_trace + root) * steps)
-    # Sylvester's formula for the exponential of a 2 x 2 matrix with two real rates.
     shifted = matrix - (half_trace - root)[:, None, None] * np.eye(2)
     exponential = (
         fast[..., None, None] * np.eye(2)
@@ -263,7 +315,7 @@ def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Const
     else:
         others = tuple(part for part in resistance.budget if part.source != thermometer)
         loss = propagate([(-2.0 * rth, current), (-rth / resistance.number, others)])
-    parts = [Contribution(f"scatter:{NAME}:{GIVEN}", balance.u_rth_k_w, "A", balance.dof), *loss]
+    parts = [METHOD.scatter(GIVEN, balance.u_rth_k_w, balance.dof), *loss]
     rise = float(record.temp_winding_degc.max()) - float(ambient[0])
     if record.temp_ambient_degc is None and rise > 0.0:
         parts.append(Contribution(thermometer, rth * meta.instrument_u("u_temp_degc") / rise, "B"))
@@ -272,35 +324,20 @@ def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Const
         "temp_ambient_degc": round(float(ambient[0]), 2),
         "temp_high_degc": round(float(record.temp_winding_degc.max()), 2),
     }
-    return Estimate(
-        GIVEN,
-        rth,
-        "K/W",
-        "measured",
-        NAME,
-        budget_of(parts),
-        at,
-        (record.capture.path,),
-        f"steady state by {balance.words}; the motor as mounted on this bench",
-    )
+    note = f"steady state by {balance.words}; the motor as mounted on this bench"
+    return METHOD.measured(GIVEN, rth, parts, (record.capture,), at, note)
 
 
 def _evidence(balance: Balance, record: HeatRecord) -> Evidence:
     series = Series("winding", record.t_s, record.temp_winding_degc, balance.fitted_degc)
-    return Evidence(
-        NAME,
-        "Winding temperature of the heat run",
-        "t_s",
-        "temp_winding_degc",
-        "line",
-        (series,),
-        record.capture.path,
-        f"Heat balance: {balance.words}.",
-    )
+    return METHOD.plot(
+        "Winding temperature of the heat run", ("t_s", "temp_winding_degc"), "line", (series,),
+        f"Heat balance: {balance.words}.", record.capture.path,
+    )  # fmt: skip
 
 
 ESTIMATOR = Estimator(
-    NAME,
+    METHOD.name,
     (GIVEN,),
     ("heat_run",),
     EXPERIMENT,

@@ -17,10 +17,10 @@ from pipeline.estimation.electrical.operating_points import (
 )
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
+from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE, magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
-    budget_of,
     contributions,
     instrument_uncertainties,
     unstated_note,
@@ -28,16 +28,15 @@ from pipeline.estimation.uncertainty.instruments import (
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.selection import needed_columns
-from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import Estimate, not_identifiable
-from pipeline.records.evidence import Evidence, Series
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Budget, Contribution, propagate
 
 Array = NDArray[np.float64]
 
-NAME = "torque_map"
 RELUCTANCE = Term(
     "kt_reluctance_nm_a2",
     "N·m/A²",
@@ -48,6 +47,7 @@ RELUCTANCE = Term(
 )
 DRAG = ("torque_coulomb_nm", "b_visc_nm_s_rad")
 GIVES = ("kt_peak_nm_a", RELUCTANCE.name, *DRAG)
+METHOD = Method("torque_map", (RELUCTANCE,))
 EXPERIMENT = (
     "record a torque_map: the dynamometer holds a speed while positive and negative q currents "
     "are stepped, at two or more d currents, in both senses of rotation"
@@ -88,13 +88,12 @@ class Regression:
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """K, K_rel of T = K(T_m) i_q + K_rel i_d i_q + (odd terms of saturation) + drag of the speed.
+    """K and K_rel by `torque` of the settled points, and drag by the offsets of the speeds.
 
     Each constant-speed stretch, or angle of a locked rotor, has an offset of its own, so friction,
     iron loss at no current, cogging at rest and the transducer's zero never reach K. Points at
     standstill join where those at speed do not suffice. Columns of saturation and of sensor faults
     join only where the data demand them, so K is the slope at small current, 1.5 p psi at 25 degC.
-    Reference: IEEE Std 1812-2014, 4.4 (torque against current).
     """
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "torque_shaft_nm")]
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
@@ -108,7 +107,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if not _enough(points):
         groups = len({p.group for p in points})
         note = f"{len(points)} settled points at {groups} speeds; {EXPERIMENT}"
-        return Fit(tuple(not_identifiable(n, _unit(n), NAME, note) for n in GIVES))
+        return METHOD.nothing(GIVES, note)
     alpha, alpha_parts = magnet_coefficient(known)
     chosen = _chosen(points, alpha, options["level"])
     model = _regress(points, alpha, chosen)
@@ -123,35 +122,44 @@ def _enough(points: Sequence[Point]) -> bool:
     return len(points) >= groups + 3 and bool(np.ptp([p.iq_a for p in points]) != 0.0)
 
 
-def _base(points: Sequence[Point], alpha_1_k: float) -> tuple[list[str], Array]:
+def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The derivatives of the shaft's torque at held speeds by what is fitted.
+
+    Parameters
+    ----------
+    points
+        Settled operating points: currents [A], magnet temperature [degC], speed [rad/s].
+    alpha_1_k
+        Coefficient of the magnet's flux at 25 degC [1/K].
+
+    Returns
+    -------
+    base : dict of array [n]
+        Columns of the offset T0 of each group [1], of K [A] and, where i_d moves, of K_rel [A²].
+    candidates : dict of array [n]
+        Columns that enter where a test asks for them: saturation (odd powers of i_q, even and odd
+        ones of i_d), a frame that is turned (i_d, i_q² - i_d²) or wobbles (an eccentric encoder:
+        i_d cos θ, i_d sin θ), friction in proportion to torque.
+
+    Notes
+    -----
+    T = T0(speed) + K (1 + α (T_m - 25)) i_q + K_rel i_d i_q + ...,
+    K = 1.5 p ψ at 25 degC and K_rel = 1.5 p (L_d - L_q).
+
+    References
+    ----------
+    IEEE Std 1812-2014, 4.4 (torque against current).
+
+    """
     i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
+    group, sense = _column(points, "group"), np.sign(_column(points, "omega_mech_rad_s"))
     warm = 1.0 + alpha_1_k * (_column(points, "temp_magnet_degc") - 25.0)
-    group = _column(points, "group")
-    numbers = sorted({p.group for p in points})
-    names = [f"speed {g}" for g in numbers] + ["iq"]
-    columns = [(group == g).astype(float) for g in numbers] + [i_q * warm]
-    if _has_reluctance(points):
-        names.append("id iq")
-        columns.append(i_d * i_q)
-    return names, np.column_stack(columns)
-
-
-def _has_reluctance(points: Sequence[Point]) -> bool:
-    i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
-    return bool(np.ptp(i_d) > 0.1 * np.ptp(i_q))
-
-
-def _candidates(points: Sequence[Point]) -> dict[str, Array]:
-    """Columns that saturation, cross-saturation, an angle error, iron and load friction make."""
-    i_d, i_q = _column(points, "id_a"), _column(points, "iq_a")
-    sense = np.sign(_column(points, "omega_mech_rad_s"))
-    columns = {
-        "iq^3": i_q**3,
-        "iq^5": i_q**5,
-        "|iq| sense": np.abs(i_q) * sense,
-    }
-    if _has_reluctance(points):
-        columns |= {
+    base = {f"speed {g}": (group == g).astype(float) for g in sorted({p.group for p in points})}
+    base["iq"] = i_q * warm
+    candidates = {"iq^3": i_q**3, "iq^5": i_q**5, "|iq| sense": np.abs(i_q) * sense}
+    if np.ptp(i_d) > 0.1 * np.ptp(i_q):
+        base["id iq"] = i_d * i_q
+        candidates |= {
             "id": i_d,
             "id sense": i_d * sense,
             "id cos": i_d * _column(points, "cos_turn"),
@@ -162,25 +170,23 @@ def _candidates(points: Sequence[Point]) -> dict[str, Array]:
             "id^2 iq^3": i_d**2 * i_q**3,
             "iq^2 - id^2": i_q**2 - i_d**2,
         }
-    return columns
+    return base, candidates
 
 
 def _chosen(points: Sequence[Point], alpha_1_k: float, level: float) -> list[str]:
-    _, base = _base(points, alpha_1_k)
-    return needed_columns(
-        base, _candidates(points), _column(points, "torque_nm"), _sigma(points), level
-    )
+    base, candidates = torque(points, alpha_1_k)
+    design = np.column_stack([*base.values()])
+    return needed_columns(design, candidates, _column(points, "torque_nm"), _sigma(points), level)
 
 
 def _regress(points: Sequence[Point], alpha_1_k: float, chosen: Sequence[str]) -> Regression:
-    names, base = _base(points, alpha_1_k)
-    extra = _candidates(points)
-    design = np.column_stack([base, *(extra[name] for name in chosen)])
+    base, candidates = torque(points, alpha_1_k)
+    design = np.column_stack([*base.values(), *(candidates[name] for name in chosen)])
     sigma = _sigma(points)
     found = linear_fit(design, _column(points, "torque_nm"), sigma)
     scale = max(found.chi2_dof, 0.0) if found.dof > 0 else np.inf
     return Regression(
-        (*names, *chosen), found.coefficients, found.covariance * scale, found.residuals, found.dof
+        (*base, *chosen), found.coefficients, found.covariance * scale, found.residuals, found.dof
     )
 
 
@@ -215,15 +221,13 @@ def _estimates(
     type_b[0] += propagate([(slope, alpha_parts)])
     type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
     note = _note(captures, table, points, chosen)
-    paths = tuple(sorted({p.capture.path for p in points}))
+    paths = sorted({p.capture.path for p in points})
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
 
     def estimate(
         name: str, value: float, u: float, dof: int, parts: Sequence[Contribution]
     ) -> Estimate:
-        scatter = Contribution(f"scatter:{NAME}:{name}", u, "A", dof)
-        budget = budget_of([scatter, *parts])
-        return Estimate(name, value, _unit(name), "measured", NAME, budget, at, paths, note)
+        return METHOD.measured(name, value, [METHOD.scatter(name, u, dof), *parts], paths, at, note)
 
     u = np.sqrt(np.diag(model.covariance))
     found = [estimate(GIVES[0], slope_k.kt_nm_a, slope_k.u_nm_a, slope_k.dof, type_b[0])]
@@ -232,11 +236,11 @@ def _estimates(
         found.append(estimate(GIVES[1], _reluctance(model), u_rel, model.dof, type_b[1]))
     else:
         why = f"d current did not vary enough to show reluctance torque; {EXPERIMENT}"
-        found.append(not_identifiable(GIVES[1], RELUCTANCE.unit, NAME, why))
+        found.append(METHOD.missing(GIVES[1], why))
     drag, covariance, dof, why = _drag(points, model)
     for index, name in enumerate(DRAG):
         if why:
-            found.append(not_identifiable(name, _unit(name), NAME, why))
+            found.append(METHOD.missing(name, why))
         else:
             u_drag = float(np.sqrt(covariance[index, index]))
             form = _untested_form(points, model, index)
@@ -361,31 +365,22 @@ def _evidence(
     series = []
     for number in sorted({p.group for p in points}):
         rows = np.flatnonzero(group == number)
-        rows = rows[np.argsort(i_q[rows], kind="stable")]
-        own = [points[int(k)] for k in rows]
+        own = [points[int(k)] for k in rows[np.argsort(i_q[rows], kind="stable")]]
         speed = float(np.mean([p.omega_mech_rad_s for p in own]))
         label = f"{speed:.0f} rad/s" if speed else f"standstill, angle {number}"
-        series.append(Series(label, i_q[rows], torque[rows], fitted[rows]))
+        series.append(over_x(label, i_q[rows], torque[rows], fitted[rows]))
     extra = f", {', '.join(chosen)}" if chosen else ""
     caption = f"offset a speed, iq, id iq{extra}; magnet coefficient {alpha:.2g} 1/K"
-    return (
-        Evidence(
-            NAME, "Shaft torque against q current", "iq_a", "torque_shaft_nm", "scatter",
-            tuple(series), caption=caption,
-        ),
-    )  # fmt: skip
+    title, axes = "Shaft torque against q current", ("iq_a", "torque_shaft_nm")
+    return (METHOD.plot(title, axes, "scatter", series, caption),)
 
 
 def _column(points: Sequence[Point], name: str) -> Array:
     return np.array([getattr(p, name) for p in points], dtype=np.float64)
 
 
-def _unit(name: str) -> str:
-    return RELUCTANCE.unit if name == RELUCTANCE.name else CONSTANTS[name].unit
-
-
 ESTIMATOR = Estimator(
-    name=NAME,
+    name=METHOD.name,
     gives=GIVES,
     tests=("torque_map",),
     experiment=EXPERIMENT,

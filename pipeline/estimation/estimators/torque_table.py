@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, SOURCE, ripple_share
+from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -19,18 +20,17 @@ from pipeline.estimation.uncertainty.instruments import (
     torque_source,
     unstated_note,
 )
-from pipeline.estimation.uncertainty.measured import measured
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.selection import needed_columns
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
-from pipeline.records.estimate import not_identifiable
-from pipeline.records.evidence import Evidence, Series
+from pipeline.records.evidence import Evidence
 from pipeline.records.uncertainty import Contribution, propagate
 
 Array = NDArray[np.float64]
 
-NAME = "torque_table"
+METHOD = Method("torque_table")
+GIVES = ("kt_peak_nm_a",)
 EXPERIMENT = (
     "record a torque_table: torque against q current in both senses, four levels or more up to "
     "rated current, at several rotor angles"
@@ -79,11 +79,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     Tables of one campaign are one fit with an offset each. Rows at one rotor angle carry the
     torque ripple of that angle (`locked_rotor`).
     """
-    captures = [c for c in campaign.of(NAME) if c.has("iq_a", "torque_shaft_nm")]
+    captures = [c for c in campaign.of(METHOD.name) if c.has("iq_a", "torque_shaft_nm")]
     rows = _Rows.of(captures)
     if rows.iq_a.size < LEAST_ROWS + len(captures) or rows.levels < LEAST_LEVELS:
         note = f"{rows.iq_a.size} rows of {rows.levels} currents; {EXPERIMENT}"
-        return Fit((not_identifiable("kt_peak_nm_a", "N·m/A", NAME, note),))
+        return METHOD.nothing(GIVES, note)
     alpha, alpha_budget = magnet_coefficient(known)
     base, candidates = rows.columns(alpha)
     chosen = needed_columns(
@@ -92,19 +92,19 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     found = _solve(rows, alpha, chosen)
     kt = float(found.coefficients[1])
     if not found.full_rank or found.dof < 1 or kt == 0.0:
-        return Fit((not_identifiable("kt_peak_nm_a", "N·m/A", NAME, EXPERIMENT),))
+        return METHOD.nothing(GIVES, EXPERIMENT)
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     warmer = _solve(rows, alpha + STEP_1_K, chosen).coefficients[1]
     parts = [
         *_instruments(rows, captures, alpha, chosen),
         *propagate([((float(warmer) - kt) / STEP_1_K, alpha_budget)]),
-        Contribution(f"scatter:{NAME}:kt", found.u(1), "A", found.dof),
+        METHOD.scatter("kt", found.u(1), found.dof),
         Contribution(SOURCE, ripple_share(rows.theta_rad, pairs, known) * abs(kt), "B"),
     ]
     sags = "; sags with current" if {"iq^3", "iq^5"} & set(chosen) else ""
     notes = [f"slope at small current{sags}", unstated_note(captures, ("current", "torque"))]
     at = {"iq_a": float(np.max(np.abs(rows.iq_a)))}
-    estimate = measured(NAME, "kt_peak_nm_a", "N·m/A", kt, parts, captures, at, notes)
+    estimate = METHOD.measured(GIVES[0], kt, parts, captures, at, notes)
     return Fit((estimate,), _evidence(captures, rows, rows.torque_nm - found.residuals))
 
 
@@ -183,17 +183,15 @@ def _evidence(captures: Sequence[Capture], rows: _Rows, fitted_nm: Array) -> tup
     series = []
     for number, capture in enumerate(captures):
         mine = np.flatnonzero(rows.table == number)
-        order = mine[np.argsort(rows.iq_a[mine], kind="stable")]
-        points = rows.iq_a[order], rows.torque_nm[order], fitted_nm[order]
-        series.append(Series(capture.path, *points))
+        series.append(over_x(capture.path, rows.iq_a[mine], rows.torque_nm[mine], fitted_nm[mine]))
     title = "Torque of the clamped shaft against q current"
-    return (Evidence(NAME, title, "iq_a", "torque_shaft_nm", "scatter", tuple(series)),)
+    return (METHOD.plot(title, ("iq_a", "torque_shaft_nm"), "scatter", series),)
 
 
 ESTIMATOR = Estimator(
-    name=NAME,
-    gives=("kt_peak_nm_a",),
-    tests=(NAME,),
+    name=METHOD.name,
+    gives=GIVES,
+    tests=(METHOD.name,),
     experiment=EXPERIMENT,
     fit=fit,
     uses=("pole_pairs", "temp_coeff_magnet_1_k", *HARMONICS),

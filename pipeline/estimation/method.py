@@ -1,0 +1,147 @@
+"""What every estimator says, in one form: measured constants, refusals, plots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.protocol import Fit
+from pipeline.estimation.uncertainty.instruments import budget_of
+from pipeline.numerics.plateaus import decimated
+from pipeline.physics.glossary import CONSTANTS, Term
+from pipeline.records.capture import Capture
+from pipeline.records.estimate import Conditions, Estimate, not_identifiable, not_there
+from pipeline.records.evidence import Evidence, PlotKind, Series
+from pipeline.records.uncertainty import Contribution
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """An estimator as the author of results: its name, and the terms that it adds to the glossary.
+
+    Examples
+    --------
+    >>> Method("resistance").missing("r_phase_ohm", "record a resistance").note
+    'record a resistance'
+
+    """
+
+    name: str
+    terms: tuple[Term, ...] = ()
+
+    def unit(self, constant: str) -> str:
+        """The unit of a constant, by this estimator's own terms, else by the glossary."""
+        own = next((term for term in self.terms if term.name == constant), None)
+        return (own or CONSTANTS[constant]).unit
+
+    def scatter(self, of: str, u: float, dof: float = math.inf) -> Contribution:
+        """The scatter of something that this method fits [its unit], type A."""
+        return Contribution(f"scatter:{self.name}:{of}", u, "A", dof)
+
+    def measured(
+        self,
+        constant: str,
+        value: float,
+        parts: Iterable[Contribution] = (),
+        captures: Iterable[Capture | str] = (),
+        at: Conditions | None = None,
+        notes: str | Iterable[str] = (),
+        bounds: tuple[float, float] | None = None,
+    ) -> Estimate:
+        """A measured constant.
+
+        Parameters
+        ----------
+        constant
+            Its name.
+        value
+            In the constant's unit, as all `parts` are.
+        parts
+            Contributions to its uncertainty; those of one source add with their signs.
+        captures
+            What it rests on, or the paths of it.
+        at
+            The conditions it holds for.
+        notes
+            Empty ones are left out.
+        bounds
+            The range that was searched.
+
+        """
+        paths = tuple(c if isinstance(c, str) else c.path for c in captures)
+        note = notes if isinstance(notes, str) else "; ".join(words for words in notes if words)
+        return Estimate(
+            constant, value, self.unit(constant), "measured", self.name,
+            budget_of(parts), at or {}, paths, note, bounds,
+        )  # fmt: skip
+
+    def missing(self, constant: str, note: str) -> Estimate:
+        """A constant that the captures do not determine; `note` names the test that would."""
+        return not_identifiable(constant, self.unit(constant), self.name, note)
+
+    def absent(self, constant: str, note: str) -> Estimate:
+        """A constant that was looked for and is not there; `note` says down to what size."""
+        return not_there(constant, self.unit(constant), self.name, note)
+
+    def nothing(self, constants: Iterable[str], note: str) -> Fit:
+        """The result of an estimator that cannot determine any of its constants."""
+        return Fit(tuple(self.missing(constant, note) for constant in constants))
+
+    def plot(
+        self,
+        title: str,
+        axes: tuple[str, str],
+        kind: PlotKind,
+        series: Iterable[Series],
+        caption: str = "",
+        capture: str | None = None,
+    ) -> Evidence:
+        """A plot of what this method looked at; `axes` are the glossary names of x and y."""
+        return Evidence(self.name, title, *axes, kind, tuple(series), capture, caption)
+
+    def traces(
+        self,
+        captures: Sequence[Capture],
+        titles: Sequence[str],
+        column: str,
+        rows: tuple[NDArray[np.int64], Array, Array, Array],
+        caption: str,
+    ) -> list[Evidence]:
+        """A plot over time a capture, thinned, of regression rows of several captures.
+
+        Parameters
+        ----------
+        captures
+            By number.
+        titles
+            One a capture.
+        column
+            The name of what was measured.
+        rows
+            Number of the capture, time [s], measured and fitted value of each row, all [n].
+        caption
+            Of all plots.
+
+        """
+        number, t_s, measured, fitted = rows
+        plots = []
+        for index, (capture, title) in enumerate(zip(captures, titles, strict=True)):
+            own = np.flatnonzero(number == index)
+            own = own[decimated(own.size)]
+            series = Series(capture.path, t_s[own], measured[own], fitted[own])
+            plots.append(
+                self.plot(title, ("t_s", column), "line", (series,), caption, capture.path)
+            )
+        return plots
+
+
+def over_x(label: str, x: Array, measured: Array, fitted: Array) -> Series:
+    """A series of points [n], sorted by x."""
+    order = np.argsort(x, kind="stable")
+    return Series(label, x[order], measured[order], fitted[order])
