@@ -95,7 +95,7 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
                 replace(r, axis_rad=r.axis_rad + side * u_theta_rad) if _place(r) == place else r
                 for r in records
             ]
-            ends.append(float(lever @ (_weighted(solution, StepModel(turned)) - now)))
+            ends.append(float(lever @ (_weighted(solution, solution.model.of(turned)) - now)))
         odd, even = 0.5 * (ends[1] - ends[0]), 0.5 * (ends[1] + ends[0])
         u = math.copysign(math.hypot(odd, math.sqrt(3.0) * even), odd)
         found.append(Contribution(f"theta_elec:{place[1]:g}@{place[0]}", u, "B"))
@@ -121,7 +121,7 @@ def rounded_levels(name: str, solution: Solution) -> float:
             levels[cells] += rounding
             records = list(model.records)
             records[k] = replace(record, wave=replace(wave, levels_v=levels))
-            moved = _weighted(solution, StepModel(records)) - now
+            moved = _weighted(solution, model.of(records)) - now
             total += float(lever @ moved) ** 2
     return math.sqrt(total)
 

@@ -1,13 +1,7 @@
-"""Current of a locked machine under voltage levels, and its fit to many captures at once.
+"""Simulates the current of locked machines under voltage levels, many captures at once.
 
-    dI/dt = (v - R I)/L(I),  v = e - R_source I
-    L(I)  = 2 [cos²g Ld(i_d) + sin²g Lq(i_q)],  i_d + j i_q = (2/√3) I e^{jg}
-
-g is the angle from the d axis to the pair's current; e and R_source are the supply's. Ld and Lq
-are incremental and saturate with their own flux, L0/(1 + a y + b y² + c y³ + d y⁴) on d, y the flux
-that the current made, L0/(1 + a y² + b |y|³ + c y⁴ + d |y|⁵) on q. So i is a polynomial of y, which
-is how iron bends. Every step of the integration is an exact exponential with L frozen at its
-midpoint: exact for a constant L, else second order.
+The equation is the estimator's (`estimators.current_step`). Every step of the integration is an
+exact exponential with L frozen at its midpoint: exact for a constant L, else second order.
 
 References: IEEE Std 1812-2014, 8 (step response at standstill); Hairer, Norsett and Wanner,
 Solving Ordinary Differential Equations I, II.1 (midpoint rule).
@@ -16,7 +10,7 @@ Solving Ordinary Differential Equations I, II.1 (midpoint rule).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -143,27 +137,6 @@ def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
     return start
 
 
-def axis_inductances(shared: Array, flux_d: Array, flux_q: Array) -> tuple[Array, Array]:
-    """Incremental Ld and Lq [m] at the fluxes [m] made by current; shared [m, 10].
-
-    The q axis begins with y²: both senses are alike, and iron has no corner at zero current.
-    """
-    y = np.abs(flux_q)
-    bend_d = _polynomial(shared[:, LD + 1 : LD + 1 + TERMS], flux_d)
-    bend_q = _polynomial(shared[:, LQ + 1 : LQ + 1 + TERMS], y) * y
-    return shared[:, LD] / np.maximum(1.0 + bend_d, 0.05), shared[:, LQ] / np.maximum(
-        1.0 + bend_q, 0.05
-    )
-
-
-def _polynomial(terms: Array, flux: Array) -> Array:
-    """Polynomial of a flux [m] without a constant."""
-    value = terms[:, 3] * flux
-    for column in (2, 1, 0):
-        value = (value + terms[:, column]) * flux
-    return value
-
-
 def _covered(time: Array) -> Array:
     """Share of the way to its goal [m] after a time [m, in time constants].
 
@@ -171,22 +144,6 @@ def _covered(time: Array) -> Array:
     """
     covered: Array = -np.expm1(-np.maximum(time, -30.0))
     return covered
-
-
-def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
-    """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0."""
-    one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
-    flux_d, flux_q = np.zeros(1), np.zeros(1)
-    found = np.empty(current_a.size)
-    for k in range(current_a.size):
-        l_d, l_q = axis_inductances(one, flux_d, flux_q)
-        found[k] = 2.0 * float(cos_g**2 * l_d[0] + sin_g**2 * l_q[0])
-        if k + 1 < current_a.size:
-            step = SPACE * float(current_a[k + 1] - current_a[k])
-            middle = flux_d + 0.5 * l_d * cos_g * step, flux_q + 0.5 * l_q * sin_g * step
-            l_d, l_q = axis_inductances(one, *middle)
-            flux_d, flux_q = flux_d + l_d * cos_g * step, flux_q + l_q * sin_g * step
-    return found
 
 
 def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
@@ -209,14 +166,23 @@ def _steps(record: StepRecord) -> tuple[NDArray[np.intp], Array, Array]:
     return np.array(segments, dtype=np.intp), np.concatenate(begin), np.concatenate(end)
 
 
+Inductances = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""Incremental Ld and Lq [m, H] of shared parameters [m, 10] and the currents' fluxes [m, Wb]."""
+
+
 class StepModel:
     """Predicts the current of every capture for every variant of the parameters in one sweep."""
 
-    def __init__(self, records: Sequence[StepRecord]) -> None:
+    def __init__(self, records: Sequence[StepRecord], inductances: Inductances) -> None:
         self.records = tuple(records)
+        self.inductances = inductances
         self.layout = layout_of(records)
         self._grids = [_steps(record) for record in records]
         self._count = max(grid[0].size for grid in self._grids)
+
+    def of(self, records: Sequence[StepRecord]) -> StepModel:
+        """The same equation for other records."""
+        return StepModel(records, self.inductances)
 
     def predict(self, variants: Sequence[Array]) -> list[Array]:
         """Currents [n, m] of each capture; variants[c] [m, size] are full parameter vectors."""
@@ -272,10 +238,10 @@ class StepModel:
             goal = volts[k] / r
             if dropping:
                 goal = goal - drop / r * np.clip(current / knee, -1.0, 1.0)
-            l_d, l_q = axis_inductances(shared, flux_d, flux_q)
+            l_d, l_q = self.inductances(shared, flux_d, flux_q)
             here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)
             rise = SPACE * (goal - current) * _covered(0.5 * width[k] * r / here)
-            l_d, l_q = axis_inductances(
+            l_d, l_q = self.inductances(
                 shared, flux_d + l_d * cos_g * rise, flux_q + l_q * sin_g * rise
             )
             here = 2.0 * (cos_g**2 * l_d + sin_g**2 * l_q)

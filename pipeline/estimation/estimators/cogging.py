@@ -47,9 +47,19 @@ EXPERIMENT = (
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Orders of T(theta) that repeat from turn to turn, and the drag that changes with direction.
 
-    T_shaft = T_0 - T_friction sign(omega) - T_cogging(theta). The mean over both directions holds
-    the cogging, half their difference the friction. References: Zhu and Howe, IEEE Trans. Energy
-    Conversion 15(4), 2000 (which orders a motor makes); numerics.orders (the test).
+    Notes
+    -----
+    T_shaft = T_0 - T_c sign(ω) - Σ_k Re(c_k e^{j k θ})
+
+    The coefficients c_k are those of each whole turn (numerics.orders); an order is there where
+    its mean over the turns stands out of what they scatter. The mean over both directions holds
+    the cogging, half their difference the friction.
+
+    References
+    ----------
+    Zhu and Howe, IEEE Trans. Energy Convers. 15(4), 2000, 407, doi:10.1109/60.900501 (which orders
+    a motor makes).
+
     """
     captures = [c for c in campaign.of("cogging") if c.has("theta_mech_rad", "torque_shaft_nm")]
     turns: list[Turn] = []

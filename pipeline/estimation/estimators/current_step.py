@@ -24,11 +24,13 @@ from pipeline.estimation.electrical.step_fit import (
     solve,
 )
 from pipeline.estimation.electrical.step_model import (
+    LD,
+    LQ,
     SHARED,
     SPACE,
+    TERMS,
     Drive,
     StepModel,
-    along_ramp,
     drive_of,
 )
 from pipeline.estimation.electrical.step_record import StepRecord, disagreement, read_step
@@ -51,6 +53,73 @@ EXPERIMENT = (
 Array = NDArray[np.float64]
 
 
+def inductances(shared: Array, flux_d: Array, flux_q: Array) -> tuple[Array, Array]:
+    """Incremental inductances of both axes of a locked machine, as iron bends with the current.
+
+    Parameters
+    ----------
+    shared : array [m, 10]
+        L_d0 [H] and a..d of the d axis, L_q0 [H] and a..d of the q axis [powers of 1/Wb].
+    flux_d, flux_q : array [m], Wb
+        What the currents added to the flux linkage of each axis.
+
+    Returns
+    -------
+    array [m], array [m], H
+        Incremental L_d and L_q.
+
+    Notes
+    -----
+    What is fitted is the current I of a pair under the voltage e - R_source I of a supply,
+
+    dI/dt = (e - (R + R_source) I) / L(I),  L = 2 (cos²γ L_d + sin²γ L_q),
+    i_d + j i_q = (2/√3) I e^{jγ},
+
+    γ from the d axis to the pair's current. Both axes saturate with their own flux y,
+
+    L_d = L_d0 / (1 + a y + b y² + c y³ + d y⁴), L_q = L_q0 / (1 + a y² + b |y|³ + c y⁴ + d |y|⁵),
+
+    so that i is a polynomial of y. The q axis begins with y²: both senses are alike, and iron has
+    no corner at zero current. `electrical.step_model` integrates it and takes its Jacobian by
+    one-sided differences.
+
+    References
+    ----------
+    IEEE Std 1812-2014, 8 (step response at standstill).
+
+    """
+    y = np.abs(flux_q)
+    bend_d = _polynomial(shared[:, LD + 1 : LD + 1 + TERMS], flux_d)
+    bend_q = _polynomial(shared[:, LQ + 1 : LQ + 1 + TERMS], y) * y
+    return shared[:, LD] / np.maximum(1.0 + bend_d, 0.05), shared[:, LQ] / np.maximum(
+        1.0 + bend_q, 0.05
+    )
+
+
+def _polynomial(terms: Array, flux: Array) -> Array:
+    """Polynomial of a flux [m] without a constant."""
+    value = terms[:, 3] * flux
+    for column in (2, 1, 0):
+        value = (value + terms[:, column]) * flux
+    return value
+
+
+def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
+    """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0."""
+    one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
+    flux_d, flux_q = np.zeros(1), np.zeros(1)
+    found = np.empty(current_a.size)
+    for k in range(current_a.size):
+        l_d, l_q = inductances(one, flux_d, flux_q)
+        found[k] = 2.0 * float(cos_g**2 * l_d[0] + sin_g**2 * l_q[0])
+        if k + 1 < current_a.size:
+            step = SPACE * float(current_a[k + 1] - current_a[k])
+            middle = flux_d + 0.5 * l_d * cos_g * step, flux_q + 0.5 * l_q * sin_g * step
+            l_d, l_q = inductances(one, *middle)
+            flux_d, flux_q = flux_d + l_d * cos_g * step, flux_q + l_q * sin_g * step
+    return found
+
+
 def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Least squares of the simulated current on the measured one, all captures together.
 
@@ -65,7 +134,7 @@ def fit_current_step(campaign: Campaign, known: Constants, options: Mapping[str,
     odd = disagreement(records)
     if odd or not axes:
         return METHOD.nothing(GIVES, "; ".join([*notes, odd or EXPERIMENT]))
-    model = StepModel(records)
+    model = StepModel(records, inductances)
     solution = solve(model, axes)
     limit = options["most_unexplained"]
     bad = [f"{path} ({x:.0%})" for path, x in unexplained(solution).items() if not x <= limit]

@@ -276,7 +276,7 @@ def q_voltage(
     References
     ----------
     IEEE Std 1812-2014 (dq equations).
-    Messenger and Bortz, J. Comput. Phys. 443, 2021, 110525, doi:10.1016/j.jcp.2021.110525 (weak
+    Messenger and Bortz, Multiscale Model. Simul. 19(3), 2021, 1474, doi:10.1137/20M1343166 (weak
     form).
 
     """

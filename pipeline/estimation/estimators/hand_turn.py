@@ -46,10 +46,16 @@ Array = NDArray[np.float64]
 def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Flux is the integral of the voltage, so the hand's speed does not enter.
 
+    Notes
+    -----
+    λ(t) = ∫(v - v_0) dt = ψ cos(p θ + φ) + λ_0 of each channel, phase to star point: one whole turn
+    runs through p cycles, and ψ is their amplitude.
+
     Cycles are counted against the angle where there, else by the phase of the flux vector where
     two voltages were read, else by the swings of the one flux; without the angle the capture has
     to be one whole turn. Amplitude by least squares of flux steps on steps of cos(phase), whose
-    noise is white though that of the flux itself is not.
+    noise is white though that of the flux itself is not (`electrical.hand_turns`).
+
     """
     turns: list[tuple[Capture, Turn]] = []
     notes: list[str] = []

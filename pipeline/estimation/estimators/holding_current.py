@@ -59,8 +59,11 @@ REPLICATES = 200
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """Orders of i_q(theta) that both directions share; times Kt they are cogging torque.
 
-    At rest Kt i_q = T_cogging(theta) ± what static friction carries, so orders are sure, and
-    amplitudes as good as friction repeats. Reference: numerics.orders.
+    Notes
+    -----
+    Kt i_q = Σ_k Re(c_k e^{j k θ}) ± T_s at rest, T_s what static friction carries; so orders are
+    sure, and amplitudes as good as friction repeats. The test is that of numerics.orders.
+
     """
     captures = [c for c in campaign.of("holding_current") if c.has("theta_mech_rad", "iq_a")]
     turns: list[Turn] = []

@@ -58,11 +58,17 @@ _Find = Callable[[Sequence[Flux], float], Result | None]
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
     """L_q = psi_q / i_q at i_d = 0 and L_d = (psi_d - psi_d at i_d = 0) / i_d, both at rated.
 
-    psi_d = (v_q+ + v_q-) / 2 w, psi_q = (v_d- - v_d+) / 2 w of points with +i_q and -i_q, so that
-    R and odd inverter errors cancel. The voltage's timing and the angle it is late by are taken
-    out first. Reference: Armando, Bojoi, Guglielmi, Pellegrino, Pastorelli, IEEE Trans. Ind. Appl.
-    49(5), 2013. In a frame turned by e the drop of R is taken off along the pair's own current
-    (`flux_pairs`), which leaves L_other tan² e on each axis; that is taken off here.
+    Notes
+    -----
+    ψ_d = (v_q⁺ + v_q⁻) / (2 ω_e) and ψ_q = (v_d⁻ - v_d⁺) / (2 ω_e) of points with +i_q and -i_q,
+    so that R and odd inverter errors cancel (`flux_pairs`). The voltage's timing and the angle it
+    is late by are taken out first. In a frame turned by ε the drop of R is taken off along the
+    pair's own current, which leaves L_other tan² ε on each axis; that is taken off here.
+
+    References
+    ----------
+    Armando, Bojoi, Guglielmi, Pellegrino and Pastorelli, IEEE Trans. Ind. Appl. 49(5), 2013.
+
     """
     del options
     captures = [c for c in campaign.of("torque_map") if c.has("t_s", "iq_a", "vd_v", "vq_v")]

@@ -115,13 +115,75 @@ class Doubts:
         return words
 
 
+def acceleration(rows: ShaftRows, driving_nm: Array) -> Array:
+    """The derivatives of the shaft's acceleration by what is fitted: it is linear in all three.
+
+    Parameters
+    ----------
+    rows
+        Window means [w] of speed [rad/s] and of its sign.
+    driving_nm : array [w], N·m
+        Torque that drives the shaft, `driving_torque`.
+
+    Returns
+    -------
+    array [w, 3]
+        Columns of 1/J [N·m], T_c/J [1] and B/J [rad/s], as `drag_of` takes them.
+
+    Notes
+    -----
+    J dω/dt = T - T_c sign(ω) - B ω. A window's second derivative stands for that of the angle
+    (weak form), so none is taken of the data.
+
+    References
+    ----------
+    IEEE Std 115-2019, 4.4 (retardation test).
+    Messenger and Bortz, Multiscale Model. Simul. 19(3), 2021, 1474, doi:10.1137/20M1343166.
+
+    """
+    return np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
+
+
+def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> Array:
+    """Electromagnetic less load torque [w, N·m], as it would be with instruments off by `shift`.
+
+    Parameters
+    ----------
+    rows
+        Window means of i_q, i_q (T_m - 25), i_d i_q and of the shaft torque.
+    torque
+        What turns currents into torque.
+    shift
+        Gains of current and torque [1, relative], thermometers [K], and the moves of `kt`
+        [1, relative], `reluctance` [N·m/A²] and `magnet` [1/K].
+
+    Notes
+    -----
+    T = K (1 + α (T_m - 25)) i_q + K_rel i_d i_q - T_load
+
+    """
+    metas = [capture.meta for capture in rows.captures]
+    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
+    load = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
+    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])[rows.capture]
+    kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
+    reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
+    magnet = torque.magnet_1_k + shift.get("magnet", 0.0)
+    warm = rows.warm_current_k_a + rows.q_current_a * warmer
+    driven: Array = (
+        kt * current * (rows.q_current_a + magnet * warm)
+        + reluctance * current**2 * rows.product_a2
+        - load * rows.load_nm
+    )
+    return driven
+
+
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """J, T_c and B of J dw/dt = K i_q + K_rel i_d i_q - T_load - T_c sign(w) - B w.
+    """J, T_c and B by `acceleration` under `driving_torque`.
 
     Rows of drives and coast-downs (`shaft_rows`) are regressed together on g = 1/J, T_c/J, B/J:
     coast-downs fix the ratios, drives the scale. Where drag has another form, J comes from the
-    drag curve left free, T = J (a_driven - a_coasting) at each speed. References: IEEE Std 115-2019
-    4.4 (retardation); Messenger and Bortz 2021 (weak form).
+    drag curve left free, T = J (a_driven - a_coasting) at each speed.
     """
     torque = _torque(known)
     rows = _rows(known, campaign) if torque is not None else None
@@ -130,14 +192,14 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         note = f"{missing}; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
-    y, driving = rows.acceleration_rad_s2, _driving_nm(rows, torque, {})
+    y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         note = f"the drive log holds no torque; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     short = too_short(rows)
     if short:
         return METHOD.nothing(GIVES, f"{short}; {LONGER}")
-    found = drag_of(rows, driving, nuisances, options["level"])
+    found = drag_of(rows, acceleration(rows, driving), nuisances, options["level"])
     if not torque_is_parted(found.design, found.sigma):
         note = f"the drive's torque cannot be told from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
@@ -231,31 +293,13 @@ def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tupl
     return cogging, () if pairs is None else (6 * pairs,)
 
 
-def _driving_nm(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) -> Array:
-    """Electromagnetic less load torque [w], as it would be with instruments off by `shift`."""
-    metas = [capture.meta for capture in rows.captures]
-    current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
-    load = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
-    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])[rows.capture]
-    kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
-    reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
-    magnet = torque.magnet_1_k + shift.get("magnet", 0.0)
-    warm = rows.warm_current_k_a + rows.q_current_a * warmer
-    driven: Array = (
-        kt * current * (rows.q_current_a + magnet * warm)
-        + reluctance * current**2 * rows.product_a2
-        - load * rows.load_nm
-    )
-    return driven
-
-
 def _estimates(
     rows: ShaftRows, torque: Torque, found: DragFit, doubts: Doubts, left_out: Sequence[str]
 ) -> tuple[Estimate, ...]:
     """J, T_c and B with their budgets."""
 
     def values(shift: Mapping[str, float]) -> Array:
-        return found.constants(found.refit(_driving_nm(rows, torque, shift)))
+        return found.constants(found.refit(driving_torque(rows, torque, shift)))
 
     gains = instrument_uncertainties(rows.captures, ("current", "torque", "temperature"))
     type_b = contributions(values, gains)

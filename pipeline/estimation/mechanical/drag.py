@@ -146,16 +146,30 @@ class DragFit:
 _DRAG_NAMES = ("coulomb", "viscous", *FORMS, *CURVE)
 
 
-def drag_of(rows: ShaftRows, driving_nm: Array, nuisances: Sequence[str], level: float) -> DragFit:
+def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float) -> DragFit:
     """Fits the rows: Coulomb and viscous first, then what the data demand, then a free curve.
 
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+    law : array [w, 3]
+        Columns of 1/J, T_c/J and B/J (`estimators.inertia.acceleration`).
+    nuisances
+        Names of columns of the rows that may join.
+    level
+        Chance of a false alarm over all that may join.
+
+    Notes
+    -----
     The rows' noise, and how many of them count as one, are judged on what the richest model
     leaves: what a poor one leaves is large and correlated because it is poor.
+
     """
     y = rows.acceleration_rad_s2
     usable = [n for n in nuisances if float(np.ptp(rows.columns[n])) > 0.0]
     candidates = {name: -rows.columns[name] for name in [*usable, *FORMS]}
-    base = np.column_stack([driving_nm, -rows.sense, -rows.speed_rad_s])
+    base, driving_nm = law, law[:, 0]
     curve_columns = [-rows.columns[n] for n in CURVE]
     rich = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in usable)])
     if rows.disjoint(DRIVE) < rich.shape[1]:

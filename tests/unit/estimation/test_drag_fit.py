@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.estimation.estimators.inertia import acceleration
 from pipeline.estimation.mechanical.drag import (
     CURVE,
     DRAG_FORMS,
@@ -72,7 +73,7 @@ def rows_of(drag, noise_rad_s2: float, seed: int, drives: int = 60) -> tuple[Sha
 
 def fitted(drag, noise_rad_s2: float = 1.0, seed: int = 0) -> tuple[DragFit, ShaftRows]:
     rows, torque = rows_of(drag, noise_rad_s2, seed)
-    return drag_of(rows, torque, (), LEVEL), rows
+    return drag_of(rows, acceleration(rows, torque), (), LEVEL), rows
 
 
 def test_windows_that_share_half_their_samples_count_half() -> None:

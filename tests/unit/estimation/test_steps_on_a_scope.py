@@ -17,10 +17,10 @@ import polars as pl
 import pytest
 
 from pipeline.estimation.electrical.step_fit import row_variance
-from pipeline.estimation.electrical.step_model import axis_inductances
 from pipeline.estimation.electrical.step_record import read_step
 from pipeline.estimation.electrical.step_wave import Noise
 from pipeline.estimation.estimators import current_step
+from pipeline.estimation.estimators.current_step import inductances
 from pipeline.estimation.estimators.derived_electrical import ESTIMATOR as DERIVED
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
@@ -167,7 +167,7 @@ def test_the_samples_of_one_code_are_worth_one_reading_of_its_rounding() -> None
 def test_iron_has_no_corner_at_zero_current_on_q() -> None:
     """Turning the sense of q current mirrors the machine: Lq has no slope at 0, Ld has."""
     shared = np.tile([1.0, 0.5, 0.0, 0.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0], (3, 1))
-    l_d, l_q = axis_inductances(shared, *([np.array([-1e-3, 0.0, 1e-3])] * 2))
+    l_d, l_q = inductances(shared, *([np.array([-1e-3, 0.0, 1e-3])] * 2))
     assert (l_d[2] - l_d[0]) / 2e-3 == pytest.approx(-0.5, rel=1e-3)
     assert l_q[0] == l_q[2]
     assert 1.0 - l_q[2] == pytest.approx(0.5 * 1e-6, rel=1e-3)
