@@ -29,9 +29,12 @@ def check_options(settings: RunSettings) -> None:
         return
     from pipeline.contracts.registry import gates
     from pipeline.crosscheck.registry import rules
+    from pipeline.estimation.policy import changed
     from pipeline.estimation.registry import estimators
 
-    _check("fit", settings.fit, {e.name: e.options for e in estimators()})
+    changed(settings.fit)
+    fits = {name: given for name, given in settings.fit.items() if name != "policy"}
+    _check("fit", fits, {e.name: e.options for e in estimators()})
     _check("gates", settings.gates, {g.name: g.settings() for g in gates()})
     _check("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()})
 

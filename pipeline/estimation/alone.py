@@ -11,11 +11,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.estimation.policy import changed, policy, under
 from pipeline.estimation.registry import fit_all
 from pipeline.records.agreement import Reading, Way
 from pipeline.records.capture import Campaign, Capture
@@ -44,33 +45,6 @@ QUANTITIES: Mapping[str, Quantity] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class ModelSpread:
-    """Relative standard uncertainties [1] that no budget of a single capture holds.
-
-    From one capture to the next the method's own assumptions change: a magnet loses 0.11 % of its
-    flux a kelvin (NdFeB) and copper gains 0.39 %. An unknown temperature counts as twenty kelvin
-    under current and as ten without, a known one as five where the sensor sits elsewhere; iron
-    saturates by per cents between maps of other currents; inductance falls between steps of other
-    heights, of which only like ones are compared; an everyday log is under nobody's control. A
-    commanded voltage lacks what the inverter drops and loses in dead time, some `inverter` of the
-    DC link (a microsecond at 20 kHz is 2 %), which is much of a slow or lightly loaded log's
-    voltage.
-    """
-
-    flux_temperature_known: float = 0.005
-    flux_temperature_unknown: float = 0.02
-    flux_temperature_unpowered: float = 0.01
-    torque: float = 0.01
-    resistance_temperature_known: float = 0.02
-    resistance_temperature_unknown: float = 0.05
-    inductance: float = 0.03
-    log: float = 0.03
-    inverter: float = 0.02
-    count: float = 0.002
-
-
-SPREAD = ModelSpread()
 UNPOWERED = ("open_circuit", "hand_turn", "spin_down")
 LINES = ("ia_a", "ib_a", "ic_a")
 TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
@@ -96,6 +70,11 @@ def readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tu
         Of the estimators, as in `fit_all`.
 
     """
+    with under(changed(options)):
+        return _readings(motor_id, captures, options)
+
+
+def _readings(motor_id: str, captures: Iterable[Capture], options: Options) -> tuple[Reading, ...]:
     found: list[Reading] = []
     for capture in captures:
         constants, _, _ = fit_all(Campaign(motor_id, (capture,)), options)
@@ -139,23 +118,35 @@ def _spread(capture: Capture, quantity: str) -> float:
     """The relative standard uncertainty of the method from one capture to the next [1]."""
     known = any(capture.has(name) for name in TEMPERATURES)
     if quantity == "pole_pairs":
-        return SPREAD.count
+        return policy().capture_spread.count
     if quantity in ("ld_h", "lq_h"):
-        return SPREAD.inductance
+        return policy().capture_spread.inductance
     if quantity == "r_phase_ohm":
         own = (
-            SPREAD.resistance_temperature_known
+            policy().capture_spread.resistance_temperature_known
             if capture.has("temp_winding_degc")
-            else SPREAD.resistance_temperature_unknown
+            else policy().capture_spread.resistance_temperature_unknown
         )
     elif capture.meta.test == "torque_map":
-        own = SPREAD.torque if known else SPREAD.flux_temperature_unknown
+        own = (
+            policy().capture_spread.torque
+            if known
+            else policy().capture_spread.flux_temperature_unknown
+        )
     elif capture.meta.test in UNPOWERED and not known:
         stated = capture.meta.ambient_degc is not None
-        own = SPREAD.flux_temperature_known if stated else SPREAD.flux_temperature_unpowered
+        own = (
+            policy().capture_spread.flux_temperature_known
+            if stated
+            else policy().capture_spread.flux_temperature_unpowered
+        )
     else:
-        own = SPREAD.flux_temperature_known if known else SPREAD.flux_temperature_unknown
-    return max(own, SPREAD.log) if capture.meta.test == "drive" else own
+        own = (
+            policy().capture_spread.flux_temperature_known
+            if known
+            else policy().capture_spread.flux_temperature_unknown
+        )
+    return max(own, policy().capture_spread.log) if capture.meta.test == "drive" else own
 
 
 def _inverter(capture: Capture, estimate: Estimate) -> float:
@@ -167,7 +158,9 @@ def _inverter(capture: Capture, estimate: Estimate) -> float:
     if not by_voltage or not capture.has("vq_v"):
         return 0.0
     link_v = max(_largest(capture, "vdc_v"), capture.meta.vdc_v or 0.0)
-    unknown_v = SPREAD.inverter * max(link_v, math.sqrt(3.0) * _largest(capture, "vq_v"))
+    unknown_v = policy().capture_spread.inverter * max(
+        link_v, math.sqrt(3.0) * _largest(capture, "vq_v")
+    )
     names = ("id_a", "iq_a") if estimate.unit == "ohm" else ("omega_mech_rad_s",)
     reach = max(_largest(capture, name) for name in names)
     if not reach and estimate.unit != "ohm" and capture.has("theta_mech_rad"):

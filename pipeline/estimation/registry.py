@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from graphlib import TopologicalSorter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from pipeline.estimation.policy import changed, under
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.agreement import reconciled
 from pipeline.estimation.uncertainty.instruments import with_clock
@@ -73,16 +74,28 @@ def fit_all(
     An estimator sees those constants alone that it declares to use. Stated constants come after
     all that is measured: they serve where nothing else is known.
 
+    `options` are by estimator; those of `policy` are numbers of judgement, by section.
+
     Returns all estimates in order of preference (rank, then dependency order), the evidence, and
     the estimators that broke on this data: their constants are then not_identifiable.
     """
+    with under(changed(options)) as changes:
+        return _fit_all(campaign, options, changes, recall)
+
+
+def _fit_all(
+    campaign: Campaign,
+    options: Mapping[str, Mapping[str, float]],
+    changes: Mapping[str, Any],
+    recall: Recall | None,
+) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
     found: list[tuple[int, int, Fit]] = []
     failures: list[Failure] = []
     stated = stated_constants(campaign)
     known = Constants(stated)
     for order, estimator in enumerate(estimators()):
         if campaign.of(*estimator.tests):
-            chosen = {**estimator.options, **options.get(estimator.name, {})}
+            chosen = {**estimator.options, **options.get(estimator.name, {}), **changes}
             try:
                 result = _timed(
                     estimator, campaign, _fitted(estimator, campaign, known, chosen, recall)

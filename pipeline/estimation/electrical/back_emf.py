@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import PAIRS, bridged
+from pipeline.estimation.policy import policy
 from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
@@ -25,7 +26,6 @@ from pipeline.records.capture import Capture
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
-LEAST_CYCLES = 3
 TURN = 2.0 * math.pi
 
 
@@ -126,9 +126,9 @@ def steady_stretches(spin: Spin, change: float) -> list[Stretch]:
     Where they hold less than a fifth of the spinning rows, the speed is taken as it comes and
     `change` is widened; ramps are left out where steady speeds are there.
     """
-    for allowed in (change, 5.0 * change, math.inf):
+    for allowed in (change, policy().back_emf.widened * change, math.inf):
         stretches, spinning = _stretches(spin, allowed)
-        if sum(s.rows.size for s in stretches) >= 0.2 * spinning:
+        if sum(s.rows.size for s in stretches) >= policy().back_emf.least_share * spinning:
             break
     steady = [s for s in stretches if s.trend <= 0.5 * change]
     return steady or stretches
@@ -143,7 +143,8 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
     vector = spin.vector_v()
     size = np.abs(vector)
     sigma = math.hypot(white_noise_sigma(vector.real), white_noise_sigma(vector.imag))
-    moving = size > max(6.0 * sigma, 0.02 * float(np.quantile(size, 0.99)))
+    least, share = policy().back_emf.standing_sigmas * sigma, policy().back_emf.standing_share
+    moving = size > max(least, share * float(np.quantile(size, 0.99)))
     stretches: list[Stretch] = []
     for start, stop in _unbroken(spin.t_s, vector, moving):
         unwrapped = np.unwrap(np.angle(vector[start:stop]))
@@ -195,12 +196,12 @@ def _one_way(phase: Array) -> list[tuple[int, int]]:
 
 def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Rows] | None:
     """Phase and its rate [n] from means over whole cycles, and the cycle's number of each row."""
-    if phase.size < 12 or abs(phase[-1] - phase[0]) < TURN * LEAST_CYCLES:
+    if phase.size < 12 or abs(phase[-1] - phase[0]) < TURN * policy().back_emf.least_cycles:
         return None
     sense = math.copysign(1.0, phase[-1] - phase[0])
     cuts = whole_cycles(sense * phase)
     cuts = cuts[np.concatenate([[True], np.diff(cuts) >= 4])]
-    if cuts.size < LEAST_CYCLES + 1:
+    if cuts.size < policy().back_emf.least_cycles + 1:
         return None
     counts = np.diff(cuts)
     mid_t = np.add.reduceat(t_s, cuts[:-1])[: counts.size].copy()
@@ -225,7 +226,7 @@ def _split(rows: Rows, phase: Array, omega: Array, number: Rows, change: float) 
         level = float(speeds[start:stop].mean())
         if stop == cycles or abs(float(speeds[stop]) - level) > change * abs(level):
             first, last = _steady_core(speeds, start, stop)
-            if last - first >= LEAST_CYCLES:
+            if last - first >= policy().back_emf.least_cycles:
                 keep = np.flatnonzero((number >= first) & (number < last))
                 found.append(Stretch(rows[keep], phase[keep], omega[keep]))
             start = stop
@@ -241,7 +242,7 @@ def _steady_core(speeds: Array, start: int, stop: int) -> tuple[int, int]:
     middle = speeds[start + quarter : stop - quarter]
     level = float(np.median(middle))
     limit = 5.0 * 1.4826 * float(np.median(np.abs(middle - level))) + 1e-6 * abs(level)
-    if stop - start < 2 * LEAST_CYCLES + 2:
+    if stop - start < 2 * policy().back_emf.least_cycles + 2:
         return start, stop
     while start < stop and abs(float(speeds[start]) - level) > limit:
         start += 1

@@ -9,10 +9,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 
 from pipeline.estimation.electrical.operating_points import Point
+from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
-
-SAME = 0.03
-SEEN = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +41,9 @@ def _matched(points: Sequence[Point]) -> tuple[list[tuple[Point, Point]], float]
         (one, other)
         for one, other in combinations_with_replacement(points, 2)
         if one.group == other.group
-        and abs(one.id_a - other.id_a) < SAME * largest
-        and abs(one.iq_a + other.iq_a) < SAME * largest
-        and (one is not other or abs(one.iq_a) < SAME * largest)
+        and abs(one.id_a - other.id_a) < policy().flux_pairs.same_current * largest
+        and abs(one.iq_a + other.iq_a) < policy().flux_pairs.same_current * largest
+        and (one is not other or abs(one.iq_a) < policy().flux_pairs.same_current * largest)
     ]
     return matched, largest
 
@@ -61,7 +59,7 @@ def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
     matched, largest = _matched(points)
     offset, late_s, wobble = _lateness(matched, pole_pairs, largest)
     behind_s = current_lag(points, pole_pairs, offset)
-    least = SAME * largest
+    least = policy().flux_pairs.same_current * largest
     fluxes = []
     for one, other in matched:
         plus, minus = (one, other) if one.iq_a >= other.iq_a else (other, one)
@@ -139,7 +137,7 @@ def _lateness(
     """
     omegas, angles = [], []
     for one, other in matched:
-        if max(abs(one.id_a), abs(other.id_a)) > SAME * largest:
+        if max(abs(one.id_a), abs(other.id_a)) > policy().flux_pairs.same_current * largest:
             continue
         omega = 0.5 * pole_pairs * (one.omega_mech_rad_s + other.omega_mech_rad_s)
         total = (instant_voltage(one, pole_pairs) + instant_voltage(other, pole_pairs)) / (
@@ -170,7 +168,9 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
     torque = np.array([p.torque_nm for p in points])
     i_d, i_q = (np.array([getattr(p, name) for p in points]) for name in ("id_a", "iq_a"))
     groups = sorted({p.group for p in points})
-    if not np.all(np.isfinite(torque)) or np.ptp(i_d) < 0.1 * np.ptp(i_q):
+    if not np.all(np.isfinite(torque)) or np.ptp(i_d) < policy().aligned.least_d_share * np.ptp(
+        i_q
+    ):
         return 0.0
     rows = [np.array([p.group == g for p in points], dtype=float) for g in groups]
     omega = pole_pairs * np.array([p.omega_mech_rad_s for p in points])
@@ -180,7 +180,7 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
         return 0.0
     kt, slope = float(found.coefficients[len(groups)]), float(found.coefficients[-1])
     u = float(np.sqrt(found.covariance[-1, -1] * found.chi2_dof))
-    return slope / (kt * np.cos(offset)) if abs(slope) > SEEN * u else 0.0
+    return slope / (kt * np.cos(offset)) if abs(slope) > policy().evidence.sigmas * u else 0.0
 
 
 def _corrected(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import bridged
+from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.instruments import (
     current_source,
     temperature_source,
@@ -23,19 +24,7 @@ from pipeline.records.constants import Constants
 
 Array = NDArray[np.float64]
 MEANS = ("id_a", "iq_a", "vd_v", "vq_v", "torque_shaft_nm", "temp_magnet_degc")
-# Whole turns, or cycles, are kept where they cost no more than a fifth of a point's rows.
-WORTHWHILE = 0.8
-# Ten levels a side step by a twentieth of the span; less than this is ripple, not a step.
-TOLERANCE = 0.03
-# The error of a mean is then known to a sixth (JCGM 100:2008, E.4.3).
-LEAST_ROWS = 20
 TURN_RAD = 2.0 * np.pi
-SAME_SPEED = 0.02
-# What a sensor's noise makes of a held shaft's speed is some thousandths of a turn, in one point
-# and in a whole capture; a shaft that turns passes more, or none of its ripple would average out.
-STILL_TURN, STILL_CAPTURE_TURN = 0.01, 0.1
-# A twelfth of a cogging period of 84 a turn: cogging there is one constant.
-SAME_ANGLE_TURN = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +113,7 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
         data = _columns(capture)
         n = data["iq_a"].size
         total += n
-        if n < LEAST_ROWS:
+        if n < policy().evidence.rows:
             continue
         for rows in _settled(data, ("id_a", "iq_a", "torque_shaft_nm")) or _settled(
             data, ("id_a", "iq_a")
@@ -151,10 +140,14 @@ def _alike(point: Point, first: Point) -> bool:
     """Whether two points share drag, or cogging at rest: one speed, one angle, else one capture."""
     if point.standing or first.standing:
         apart = abs(np.angle(np.exp(1j * (point.angle_rad - first.angle_rad)))) / TURN_RAD
-        near = point.capture is first.capture if np.isnan(apart) else apart < SAME_ANGLE_TURN
+        near = (
+            point.capture is first.capture
+            if np.isnan(apart)
+            else apart < policy().points.same_angle_turn
+        )
         return point.standing and first.standing and bool(near)
     speed = first.omega_mech_rad_s
-    return abs(point.omega_mech_rad_s - speed) <= SAME_SPEED * abs(speed)
+    return abs(point.omega_mech_rad_s - speed) <= policy().points.same_speed * abs(speed)
 
 
 def magnet_temperature(capture: Capture) -> tuple[float, str]:
@@ -194,17 +187,19 @@ def _settled(data: Mapping[str, Array], names: Sequence[str]) -> list[slice]:
         if not np.all(np.isfinite(data[name])):
             continue
         inside = np.zeros(size, dtype=bool)
-        for plateau in find_plateaus(data[name], LEAST_ROWS, tolerance=TOLERANCE):
+        for plateau in find_plateaus(
+            data[name], policy().evidence.rows, tolerance=policy().points.step_share
+        ):
             inside[plateau.rows] = True
             edges |= {plateau.start, plateau.stop}
         flags &= inside
     found, last = [], 0
     for a, b in pairwise(sorted(edges)):
-        if b - a < LEAST_ROWS or not flags[a:b].all():
+        if b - a < policy().evidence.rows or not flags[a:b].all():
             continue
         start = a + min(a - last, (b - a) // 2)
         last = b
-        if b - start >= LEAST_ROWS and _steady(data, slice(start, b), names):
+        if b - start >= policy().evidence.rows and _steady(data, slice(start, b), names):
             found.append(slice(start, b))
     return found
 
@@ -217,8 +212,8 @@ def _steady(data: Mapping[str, Array], rows: slice, names: Sequence[str]) -> boo
             continue
         half = part.size // 2
         drift = abs(float(np.mean(part[half:]) - np.mean(part[:half])))
-        noise = 6.0 * white_noise_sigma(part) / np.sqrt(half)
-        if drift > max(0.02 * float(np.ptp(signal)), noise):
+        noise = policy().points.drift_sigmas * white_noise_sigma(part) / np.sqrt(half)
+        if drift > max(policy().points.drift_share * float(np.ptp(signal)), noise):
             return False
     return True
 
@@ -230,7 +225,7 @@ def _whole_cycles(rows: slice, data: Mapping[str, Array], pole_pairs: int | None
     turns = abs(float(theta[-1] - theta[0])) / (2.0 * np.pi)
     for cycles in (turns, turns * (pole_pairs or 1)):
         whole = np.floor(cycles)
-        if whole >= 1 and whole / cycles >= WORTHWHILE:
+        if whole >= 1 and whole / cycles >= policy().points.whole_share:
             return slice(rows.stop - round(theta.size * whole / cycles), rows.stop)
     return rows
 
@@ -244,7 +239,9 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
     else:
         omega = float(np.mean(data["omega_mech_rad_s"][rows]))
     travel = abs(omega) * np.array([t[-1] - t[0], data["t_s"][-1] - data["t_s"][0]]) / TURN_RAD
-    if travel[0] < STILL_TURN and (cos_turn == 0.0 or travel[1] < STILL_CAPTURE_TURN):
+    still = policy().points
+    no_angle = cos_turn == 0.0
+    if travel[0] < still.still_turn and (no_angle or travel[1] < still.still_capture_turn):
         omega = 0.0
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
     u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.step_model import LD, LQ, SHARED, TERMS, StepModel, start_of
 from pipeline.estimation.electrical.step_wave import BETWEEN, Noise
+from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import NonlinearFit, autocorrelation_time, gauss_newton
 
 AXES: Mapping[str, tuple[int, tuple[int, ...]]] = {
     "ld_h": (LD, tuple(range(LD + 1, LD + 1 + TERMS))),
     "lq_h": (LQ, tuple(range(LQ + 1, LQ + 1 + TERMS))),
 }
-UNSEEN = 0.1
-"""Share of the standard error of a mean of all samples below which rounding is left out."""
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Offer = tuple[float, int, float]
@@ -168,7 +167,7 @@ def row_variance(
 ) -> tuple[Array, Array]:
     """Variance of the means [n] of `count` samples of a channel, and white noise's part of it."""
     white = sigma**2 / count
-    if noise.rounding**2 * float(count[used].sum()) < (UNSEEN * sigma) ** 2:
+    if noise.rounding**2 * float(count[used].sum()) < (policy().steps.unseen_share * sigma) ** 2:
         return white, white
     order = np.argsort(read[used])
     level = read[used][order]

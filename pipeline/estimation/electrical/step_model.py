@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.step_record import StepRecord
 from pipeline.estimation.electrical.step_wave import BETWEEN
+from pipeline.estimation.policy import policy
 
 Array = NDArray[np.float64]
 SHARED = ("ld_h", "d_1", "d_2", "d_3", "d_4", "lq_h", "q_1", "q_2", "q_3", "q_4")
 TERMS = 4
-EDGE_REACH = 4.0  # [samples]
 LD, LQ = 0, 1 + TERMS
 SPACE = 2.0 / math.sqrt(3.0)
 
@@ -222,7 +222,7 @@ class StepModel:
         drop = np.concatenate([o.drop_v for o in own])
         knee = np.concatenate(
             [
-                np.full(o.r_ohm.size, 0.02 * c.largest_a)
+                np.full(o.r_ohm.size, policy().steps.drop_knee_share * c.largest_a)
                 for o, c in zip(own, self.records, strict=True)
             ]
         )
@@ -313,7 +313,7 @@ class StepModel:
             if own.source_ohm is not None:
                 low[at], low[at + own.source_ohm] = 0.6 * start[at], -0.5 * start[at]
             moves = slice(at + own.moves.start, at + own.moves.stop)
-            low[moves], high[moves] = -EDGE_REACH, EDGE_REACH
+            low[moves], high[moves] = -policy().steps.edge_reach, policy().steps.edge_reach
         return low, high
 
     def columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:

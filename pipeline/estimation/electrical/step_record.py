@@ -11,16 +11,13 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.step_wave import BETWEEN, Noise, Waveform, noise_of, waveform_of
 from pipeline.estimation.electrical.terminals import pair_of, pair_signals
+from pipeline.estimation.policy import policy
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.physics.conventions import PAIR_AXES_RAD
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
-MOST_BINS = 3000
-SPIKE = 8.0
-MOST_APART = 100.0
-"""Most that saliency and iron's bend together part the inductances of one rotor's steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +102,7 @@ def read_step(capture: Capture) -> StepRecord | None:
 
 
 def _spikes(signal: Array) -> NDArray[np.bool_]:
-    """Samples [n] that stand more than `SPIKE` of the noise from the median of five around them.
+    """Samples [n] more than `steps.spike_sigmas` of the noise from the median of five around them.
 
     A signal that rises or falls through the five is its own median, an edge too. Reference: Hampel,
     J. Am. Stat. Assoc. 69, 1974, 383 (the median as the estimator that outliers move least).
@@ -115,7 +112,9 @@ def _spikes(signal: Array) -> NDArray[np.bool_]:
     padded = np.pad(signal, 2, mode="edge")
     middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
     noise = noise_of(signal)
-    found: NDArray[np.bool_] = np.abs(signal - middle) > SPIKE * max(noise.sigma, noise.step)
+    found: NDArray[np.bool_] = np.abs(signal - middle) > policy().steps.spike_sigmas * max(
+        noise.sigma, noise.step
+    )
     return found
 
 
@@ -140,20 +139,20 @@ def disagreement(records: Sequence[StepRecord]) -> str:
     A clock or a current in another unit scales L by a thousand, and a common fit would follow it.
     """
     found = np.log([record.l_start_h for record in records])
-    if found.size < 2 or np.ptp(found) < math.log(MOST_APART):
+    if found.size < 2 or np.ptp(found) < math.log(policy().steps.most_apart):
         return ""
     apart = found - np.median(found)
     odd = [
         f"{record.capture.path} ({math.exp(ratio):.3g} times the usual L)"
         for record, ratio in zip(records, apart, strict=True)
-        if abs(ratio) > 0.5 * math.log(MOST_APART) - 1e-9
+        if abs(ratio) > 0.5 * math.log(policy().steps.most_apart) - 1e-9
     ]
     return f"look at t_s and the units of {', '.join(odd)}: not one rotor with the other steps"
 
 
 def _cuts(size: int, wave: Waveform) -> NDArray[np.intp]:
-    """First samples of equal groups, about `MOST_BINS` at most, none across an edge of a supply."""
-    cuts = np.arange(0, size, max(1, size // MOST_BINS))
+    """First samples of equal groups, about `steps.most_bins`, none across an edge of a supply."""
+    cuts = np.arange(0, size, max(1, size // policy().steps.most_bins))
     if not wave.has_supply:
         return cuts
     near = np.flatnonzero(np.diff(wave.level_of)) + 1

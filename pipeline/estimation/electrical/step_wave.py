@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.quantisation import (
     noise_after_rounding,
@@ -29,8 +30,6 @@ from pipeline.records.capture import VoltageTiming
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-MOST_EDGES = 12
-MOST_CELLS = 1500
 BETWEEN = -1
 """Level of a sample that was taken while the voltage rose."""
 
@@ -85,7 +84,7 @@ def waveform_of(
     noise = noise_of(v_v)
     jumps = np.flatnonzero(np.abs(np.diff(v_v)) > max(8.0 * noise.sigma, 0.1 * float(np.ptp(v_v))))
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > 1) + 1) if jumps.size else []
-    few = len(groups) <= MOST_EDGES
+    few = len(groups) <= policy().steps.most_edges
     if few and all(group.size <= 2 for group in groups):
         wave = _supplied(t_s, v_v, i_a, groups, noise, period, ideal)
         if wave is not None:
@@ -144,7 +143,7 @@ def _is_noise(residuals: Array, skew: Array, sigma: float, rounding: float) -> b
 def _sampled(
     t_s: Array, v_v: Array, timing: VoltageTiming, groups: list[Index], period_s: float
 ) -> Waveform:
-    """Cells of one or more samples each, about `MOST_CELLS` at most, with the integral kept.
+    """Cells of one or more samples each, about `steps.most_cells` at most, with the integral kept.
 
     With edges, each parts the two samples around it and moves between them; the rest is straight
     lines. Without, the voltage moves as a whole.
@@ -160,7 +159,7 @@ def _sampled(
         edges, means = np.concatenate([first, middle, last]), v_v
     else:
         edges, means = t_s, 0.5 * (v_v[1:] + v_v[:-1])
-    group = -(-means.size // MOST_CELLS)
+    group = -(-means.size // policy().steps.most_cells)
     near = {k + d for together in free for k in together for d in (-1, 0, 1)}
     cuts = np.array(sorted({*range(0, means.size, group), *near, means.size}), dtype=np.intp)
     areas = np.add.reduceat(means * np.diff(edges), cuts[:-1])

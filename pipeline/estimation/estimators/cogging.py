@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.numerics.orders import (
@@ -37,7 +38,6 @@ METHOD = Method("cogging")
 COGGING = ("cogging_order", "cogging_amplitude_nm", "cogging_peak_nm")
 GIVES = (*COGGING, "torque_coulomb_nm")
 AIDS = ("pole_pairs", "coast_coulomb_rad_s2", "coast_viscous_1_s")
-STRANGER_LEVEL = 1e-6
 EXPERIMENT = (
     "record a cogging test: zero current, at least one slow whole turn each way, with "
     "theta_mech_rad and torque_shaft_nm"
@@ -103,9 +103,9 @@ def peak_orders(
 
     Over a turn the crest of any further order meets that of the others somewhere, so a false one
     adds its whole height. Multiples of the leading order, of `teeth` (slots, poles) and the
-    encoder's `sides` count as found, others only where p < `STRANGER_LEVEL`. The second and third
-    multiple of the leading order are in whatever their test says: they bend the crests of every
-    real motor, and as measured they are unbiased.
+    encoder's `sides` count as found, others only where p < `cogging.stranger_level`. The second
+    and third multiple of the leading order are in whatever their test says: they bend the crests
+    of every real motor, and as measured they are unbiased.
     """
     leading = lines[0].order
     known = [leading, *teeth]
@@ -113,7 +113,7 @@ def peak_orders(
         line
         for line in lines
         if line in sides
-        or line.p_value < STRANGER_LEVEL
+        or line.p_value < policy().cogging.stranger_level
         or any(line.order % order == 0 for order in known)
     ]
     there = {line.order for line in kept}
@@ -263,7 +263,7 @@ def _variance_of_mean(
             (backward - backward.mean()) ** 2
         )
         seen = float(squares) / free
-        if predicted == 0.0 or fdtrc(free, dof, seen / predicted) < 0.01:
+        if predicted == 0.0 or fdtrc(free, dof, seen / predicted) < policy().cogging.friction_level:
             return seen, float(free)
     return predicted, dof
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -50,15 +51,9 @@ EXPERIMENT = (
     "record a drive with vq_v, iq_a and theta_mech_rad over a wide range of speed and current, or "
     "better an open_circuit and a resistance test"
 )
-WIDTHS_S = (0.03, 0.1)
-CLUSTER_S = 0.25
-U_UNKNOWN_K = 15.0
 HOLD = "assumed:voltage_hold"
 D_FLUX = "d flux"
 CANDIDATES = ("zero", "acceleration", "turned", "cross flux")
-# A drive's voltage is late by a period of computing and half a one of holding (Bae and Sul, IEEE
-# Trans. Ind. Appl. 39(3), 2003), the row of its log may be another half.
-LATEST_PERIODS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,8 +169,9 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     if angle == "omega_mech_rad_s":
         theta = trapezoid(t, theta)
     period = float(np.median(np.diff(t)))
+    window, least = policy().inverter, 3 * LEAST_SAMPLES * period
     try:
-        weak = weak_rows(t, min(max(WIDTHS_S[0], 3 * LEAST_SAMPLES * period), WIDTHS_S[1]))
+        weak = weak_rows(t, min(max(window.shortest_window_s, least), window.longest_window_s))
         speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
     except ValueError:
         return None
@@ -188,7 +184,8 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     noise = 0.02 * float(np.max(modulus)) if modulus.size else 0.0
     found = {
         "capture": np.full(weak.count, float(index)),
-        "cluster": np.floor((weak.centres_s - weak.centres_s[0]) / CLUSTER_S) + 1e6 * index,
+        "cluster": np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
+        + 1e6 * index,
         "time_s": weak.centres_s,
         "voltage_v": weak.integral(v_q),
         "current_a": weak.integral(i_q),
@@ -346,9 +343,9 @@ def _estimates(
         told = [] if doubt is None else [doubt.words("the value")]
         note = "; ".join([*told, *words])
         if not all(c.has(place[name]) for c in rows.captures):
-            unsure = value * per_kelvin[name] * U_UNKNOWN_K
+            unsure = value * per_kelvin[name] * policy().magnet.unlogged_k
             parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))
-            note += f"; {place[name]} not logged, taken as 25 ± {U_UNKNOWN_K:g} K"
+            note += f"; {place[name]} not logged, taken as 25 ± {policy().magnet.unlogged_k:g} K"
         if i == 0:
             parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
         at = {place[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
@@ -365,7 +362,7 @@ def _moved(
     little parts them is also what any other error of the model follows. So a nuisance counts
     unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d.
     """
-    latest = LATEST_PERIODS * rows.period_s
+    latest = policy().inverter.latest_periods * rows.period_s
     most = {"acceleration": abs(float(values[0])) * latest, "turned": pole_pairs * latest}
     moved = np.zeros(len(GIVES))
     for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):

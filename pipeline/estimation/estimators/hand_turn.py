@@ -12,8 +12,9 @@ from pipeline.estimation.electrical.back_emf import read_spin
 from pipeline.estimation.electrical.hand_turns import Turn, turns_of
 from pipeline.estimation.electrical.terminals import first_temperature
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
     unstated_note,
@@ -162,7 +163,7 @@ ESTIMATOR = Estimator(
     clock_powers={"psi_pm_wb": 1},
     options={
         "temp_assumed_degc": 25.0,
-        "alpha_assumed_1_k": USUAL_1_K,
-        "u_alpha_assumed_1_k": U_USUAL_1_K,
+        "alpha_assumed_1_k": DEFAULT.magnet.coefficient_1_k,
+        "u_alpha_assumed_1_k": DEFAULT.magnet.u_coefficient_1_k,
     },
 )

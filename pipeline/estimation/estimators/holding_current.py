@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline.estimation.estimators.cogging import name_orders, part_orders, spectrum_bars
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
@@ -52,8 +53,6 @@ EXPERIMENT = (
     "hold the rotor at many angles over a whole turn, once forward and once backward, "
     "logging theta_mech_rad and iq_a"
 )
-SECTORS = 61
-REPLICATES = 200
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
@@ -98,7 +97,7 @@ def _u_rms(residual: Array) -> float:
         lambda part: np.sqrt(np.mean(part**2, keepdims=True)),
         residual,
         block_length(residual),
-        REPLICATES,
+        policy().cogging.replicates,
         np.random.default_rng(0),
     )
     return float(np.std(draws, ddof=1))
@@ -107,18 +106,19 @@ def _u_rms(residual: Array) -> float:
 def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | None:
     """The current [n, A] left in sectors of the turn that the fit did not see; None if too few.
 
-    The turn is cut into `SECTORS` (a prime); the orders, with one offset a direction, are fitted
-    to those whose number is a square modulo the prime and judged on the others, then the other
-    way round. That pattern has a flat spectrum, so it starves no order of its phases.
+    The turn is cut into `cogging.sectors` (a prime); the orders, with one offset a direction, are
+    fitted to those whose number is a square modulo the prime and judged on the others, then the
+    other way round. That pattern has a flat spectrum, so it starves no order of its phases.
     Reference: Schroeder, Number Theory in Science and Communication, 15.
     """
     angle = np.concatenate([turn.theta_rad for turn in turns])
     value = np.concatenate([turn.value for turn in turns])
     sense = np.concatenate([np.full(turn.value.size, float(turn.sense)) for turn in turns])
     design = np.column_stack([harmonic_design(angle, list(orders)), sense])
-    squared = np.isin(np.arange(SECTORS), np.arange(SECTORS) ** 2 % SECTORS).astype(np.int64)
-    number = np.floor(np.mod(angle, TURN_RAD) * (SECTORS / TURN_RAD)).astype(np.int64)
-    sector = squared[np.minimum(number, SECTORS - 1)]
+    sectors = policy().cogging.sectors
+    squared = np.isin(np.arange(sectors), np.arange(sectors) ** 2 % sectors).astype(np.int64)
+    number = np.floor(np.mod(angle, TURN_RAD) * (sectors / TURN_RAD)).astype(np.int64)
+    sector = squared[np.minimum(number, sectors - 1)]
     left = np.zeros(value.size)
     for part in (0, 1):
         seen, unseen = sector == part, sector != part

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.flux_pairs import (
-    SAME,
     Flux,
     flux_pairs,
     frame_of,
@@ -17,6 +16,7 @@ from pipeline.estimation.electrical.flux_pairs import (
 )
 from pipeline.estimation.electrical.operating_points import Point, operating_points, pole_pairs_of
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -177,12 +177,13 @@ def _without_ripple(
 def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     """psi_q over i_q at the largest q current without d current."""
     del magnet
+    same = policy().flux_pairs.same_current
     largest = max((f.iq_a for f in fluxes), default=0.0)
-    near = [f for f in fluxes if abs(f.id_a) < SAME * max(largest, 1e-300)]
+    near = [f for f in fluxes if abs(f.id_a) < same * max(largest, 1e-300)]
     rated = max((f.iq_a for f in near), default=0.0)
     if rated <= 0.0:
         return None
-    used = [f for f in near if f.iq_a > (1.0 - SAME) * rated]
+    used = [f for f in near if f.iq_a > (1.0 - same) * rated]
     weights = np.array([1.0 / max(f.u_q_wb, 1e-300) ** 2 for f in used])
     weights /= weights.sum()
     value = float(sum(w * f.psi_q_wb / f.iq_a for w, f in zip(weights, used, strict=True)))
@@ -198,23 +199,24 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     Of two d currents of one size the negative, which a drive uses: iron saturates on the other.
     Some q current is preferred: with none at all the inverter's dead time has no sign to cancel.
     """
+    same = policy().flux_pairs.same_current
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
     both = [
         (f, zero)
         for f in fluxes
         for zero in fluxes
         if f.group == zero.group
-        and abs(zero.id_a) < SAME * reach < abs(f.id_a)
-        and abs(f.iq_a - zero.iq_a) < SAME * reach
+        and abs(zero.id_a) < same * reach < abs(f.id_a)
+        and abs(f.iq_a - zero.iq_a) < same * reach
     ]
     if not both:
         return None
     rated = max(abs(f.id_a) for f, _ in both)
-    side = 1.0 if min(f.id_a for f, _ in both) > -(1.0 - SAME) * rated else -1.0
-    at_rated = [(f, zero) for f, zero in both if side * f.id_a > (1.0 - SAME) * rated]
-    driven = [f.iq_a for f, _ in at_rated if f.iq_a > SAME * reach]
+    side = 1.0 if min(f.id_a for f, _ in both) > -(1.0 - same) * rated else -1.0
+    at_rated = [(f, zero) for f, zero in both if side * f.id_a > (1.0 - same) * rated]
+    driven = [f.iq_a for f, _ in at_rated if f.iq_a > same * reach]
     smallest = min(driven, default=0.0)
-    used = [(f, zero) for f, zero in at_rated if abs(f.iq_a - smallest) < SAME * reach]
+    used = [(f, zero) for f, zero in at_rated if abs(f.iq_a - smallest) < same * reach]
     values, variances = [], []
     for f, zero in used:
         warm = magnet * (f.temp_magnet_degc - zero.temp_magnet_degc) * zero.psi_d_wb
@@ -230,8 +232,9 @@ def _direct(fluxes: Sequence[Flux], magnet: float) -> Result | None:
 def _other_side(fluxes: Sequence[Flux], magnet: float, found: Result) -> str:
     """L_d at the largest d current of the other sign in words, empty where there is none."""
     across = [f for f in fluxes if f.id_a * found.id_a <= 0.0]
+    same = policy().flux_pairs.same_current
     reach = max((max(abs(f.id_a), f.iq_a) for f in fluxes), default=0.0)
-    near = [f for f in fluxes if abs(f.id_a) < SAME * reach and f not in across]
+    near = [f for f in fluxes if abs(f.id_a) < same * reach and f not in across]
     other = _direct([*across, *near], magnet)
     if other is None:
         return ""
@@ -264,6 +267,7 @@ def _evidence(
     """Flux linkages with the line of the published inductance through the flux at no current."""
     if not fluxes:
         return ()
+    same = policy().flux_pairs.same_current
     reach = max(max(abs(f.id_a), f.iq_a) for f in fluxes)
     plots = []
     for axis, current, flux, found in (
@@ -272,9 +276,9 @@ def _evidence(
     ):
         other = "id_a" if axis == "q" else "iq_a"
         series = []
-        levels = sorted({round(getattr(f, other) / (SAME * reach)) for f in fluxes})
+        levels = sorted({round(getattr(f, other) / (same * reach)) for f in fluxes})
         for level in levels:
-            mine = [f for f in fluxes if round(getattr(f, other) / (SAME * reach)) == level]
+            mine = [f for f in fluxes if round(getattr(f, other) / (same * reach)) == level]
             mine.sort(key=lambda f: (getattr(f, current), f.group))
             x = np.array([getattr(f, current) for f in mine])
             y = np.array([getattr(f, flux) for f in mine])
@@ -282,7 +286,7 @@ def _evidence(
             label = f"{other} {amps:.3g} A"
             line = np.array([])
             if found is not None:
-                still = x[np.abs(x) < SAME * reach], y[np.abs(x) < SAME * reach]
+                still = x[np.abs(x) < same * reach], y[np.abs(x) < same * reach]
                 start = (
                     float(np.mean(still[1] - found.value_h * still[0])) if still[0].size else 0.0
                 )

@@ -21,6 +21,7 @@ from pipeline.estimation.mechanical.shaft_regimes import drag_disagreements
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -52,10 +53,6 @@ LONGER = (
     "with iq_a and theta_mech_rad"
 )
 LOAD = "log torque_shaft_nm in the drives, or record them with nothing coupled to the shaft"
-# J may be too large by this share, twice what a torque transducer of unstated gain leaves open.
-# Loads of a third of rated torque left 38 to 60 % in drives of three motors; none, on a real
-# bench, 0.6 %.
-MATERIAL = 0.02
 AIDS = (
     "kt_reluctance_nm_a2",
     "temp_coeff_magnet_1_k",
@@ -107,7 +104,7 @@ class Doubts:
         """What the regimes and the share say, where they say something."""
         names = ("the inertia", "Coulomb friction over inertia", "viscous friction over inertia")
         words = [d.words(n) for d, n in zip(self.regimes, names, strict=True) if d is not None]
-        if logged and self.share > MATERIAL:
+        if logged and self.share > policy().drag.unexplained_share:
             words.append(
                 f"{100.0 * self.share:.2g} % of the square of the drives' acceleration follows "
                 "neither current nor load"
@@ -204,7 +201,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         note = f"the drive's torque cannot be told from its friction; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     strange = _share_of_no_torque(rows, found)
-    if strange > MATERIAL and not _load_logged(rows):
+    if strange > policy().drag.unexplained_share and not _load_logged(rows):
         return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
     doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
     estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.terminals import PAIRS
 from pipeline.estimation.method import Method, over_x
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
@@ -49,8 +50,6 @@ TERMS = (
 GIVES = ("ld_h", "lq_h", *(term.name for term in TERMS))
 METHOD = Method("lcr", TERMS)
 Array = NDArray[np.float64]
-# Twice what noise alone makes: a swing four of its standard deviations long is one.
-SEEN = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,14 +162,18 @@ def _over_angle(table: Table, options: Mapping[str, float]) -> Found | None:
     known = np.isfinite(table.theta_rad)
     design = inductance(table.theta_rad[known], table.axis_rad[known])
     free = linear_fit(design, table.l_h[known])
-    if not free.full_rank or free.dof < 2 or np.linalg.cond(design) > 20.0:
+    if (
+        not free.full_rank
+        or free.dof < 2
+        or np.linalg.cond(design) > policy().meter_table.most_condition
+    ):
         return None
     mean, a, b = (float(c) for c in free.coefficients)
     swing, u_swing = math.hypot(a, b), math.sqrt(float(np.trace(free.covariance[1:, 1:])) / 2.0)
     values: dict[str, tuple[float, float, float]] = {}
     note = ""
     shift, u_shift = 0.0, math.inf
-    if swing > 4.0 * u_swing:
+    if swing > policy().evidence.sigmas * u_swing:
         # Modulo half a turn of 2 theta: the sign of A decides which axis is the low one.
         shift = 0.5 * math.degrees(math.atan2(b, a) if a > 0.0 else math.atan2(-b, -a))
         u_shift = 0.5 * math.degrees(u_swing / swing)
@@ -180,7 +183,7 @@ def _over_angle(table: Table, options: Mapping[str, float]) -> Found | None:
         slope = np.array([0.0, a, b]) / signed
         model, fit = np.array([mean, a, b]), free
         note = f"theta_elec_deg is off by {shift:.1f} deg, found from the table itself"
-        if abs(shift) > 35.0:
+        if abs(shift) > policy().meter_table.exchanged_deg:
             note += "; the axes are told apart by that zero alone and may be exchanged"
     else:
         fit = linear_fit(design[:, :2], table.l_h[known])
@@ -250,7 +253,7 @@ def _swing_of_noise(swing_h: Array) -> bool:
     """
     if swing_h.size < 2:
         return False
-    return bool(np.mean(swing_h) < SEEN * np.std(swing_h, ddof=1))
+    return bool(np.mean(swing_h) < policy().evidence.sigmas * np.std(swing_h, ddof=1))
 
 
 def _estimate(

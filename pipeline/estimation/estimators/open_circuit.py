@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.back_emf import (
-    LEAST_CYCLES,
     flux_of,
     read_spin,
     steady_stretches,
@@ -17,8 +16,9 @@ from pipeline.estimation.electrical.back_emf import (
 from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
 from pipeline.estimation.electrical.terminals import first_temperature
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
-from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K, USUAL_1_K
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
     temperature_source,
@@ -139,9 +139,8 @@ def _groups(
             notes.append(f"{capture.path}: needs two line voltages")
             continue
         if not stretches:
-            notes.append(
-                f"{capture.path}: no steady stretch of {LEAST_CYCLES} electrical cycles found"
-            )
+            least = policy().back_emf.least_cycles
+            notes.append(f"{capture.path}: no steady stretch of {least} electrical cycles found")
         for stretch in stretches:
             flux = flux_of(spin, stretch, ORDERS)
             temp = fallback if flux.temp_degc is None else flux.temp_degc
@@ -317,7 +316,7 @@ ESTIMATOR = Estimator(
         "temp_assumed_degc": 25.0,
         "least_span_k": 8.0,
         "worst_u_alpha_1_k": 3e-4,
-        "alpha_assumed_1_k": USUAL_1_K,
-        "u_alpha_assumed_1_k": U_USUAL_1_K,
+        "alpha_assumed_1_k": DEFAULT.magnet.coefficient_1_k,
+        "u_alpha_assumed_1_k": DEFAULT.magnet.u_coefficient_1_k,
     },
 )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
 from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.coasting import coast_down, coasting_rows
@@ -45,12 +46,9 @@ EXPERIMENT = (
     "record a spin_down: terminals open, let the shaft coast from full speed to rest with "
     "theta_mech_rad logged, once in each sense"
 )
-MOST_SAMPLES = 4000
 SHARED = ("coulomb", "viscous")
 EXTRAS = ("windage", *STRIBECK[::3])
-EXPLAINED = 1.05
 RIPPLES = ("cos", "sin", "cos 2", "sin 2")
-UNEXPLAINED = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +144,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     found = _solve(motion, coasts, None)
     for _ in range(2):
         free = found.residuals.size - found.parameters.size
-        if found.residuals @ found.residuals < EXPLAINED**2 * free:
+        if found.residuals @ found.residuals < policy().coast_down.explained ** 2 * free:
             break
         wider = _wider(motion, coasts, found, options["level"])
         if wider == motion:
@@ -184,7 +182,7 @@ def _coasts(capture: Capture) -> list[Coast]:
 
 
 def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bool) -> Coast:
-    block = -(-t.size // MOST_SAMPLES)
+    block = -(-t.size // policy().coast_down.most_samples)
     sigma = white_noise_sigma(y) / np.sqrt(block)
     start = float(t[0])
     t, y = block_means(t - start, block), block_means(y, block)
@@ -256,7 +254,13 @@ def _wider(motion: Motion, coasts: Sequence[Coast], found: NonlinearFit, level: 
     theta = np.concatenate([c.theta_rad for c in coasts])
     candidates |= {name: _ripple(name, theta) * weights for name in ripples}
     chosen = needed_columns(
-        found.jacobian, candidates, -found.residuals, sigma, level, 3, min(tau, 50.0)
+        found.jacobian,
+        candidates,
+        -found.residuals,
+        sigma,
+        level,
+        policy().coast_down.most_additions,
+        min(tau, 50.0),
     )
     return Motion(
         motion.extras + tuple(n for n in extras if n in chosen),
@@ -289,7 +293,7 @@ def _estimates(
     note = f"{len(coasts)} coasts; residual {np.sqrt(spread):.2g} times the encoder's own noise"
     note += f"; {allowed_for(added)}" if added else ""
     form = np.zeros(2)
-    if np.sqrt(spread) > UNEXPLAINED:
+    if np.sqrt(spread) > policy().coast_down.unexplained:
         form = _form(motion, coasts, found)
         note += "; drag has another form: allowance from the fast and the slow half apart"
     dof = max(free / tau, 1.0)

@@ -18,6 +18,7 @@ from pipeline.estimation.electrical.operating_points import (
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, angle_doubt, standstill_words
 from pipeline.estimation.mechanical.torque_slope import Slope, slope_without_d
 from pipeline.estimation.method import Method, over_x
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE, magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -52,8 +53,6 @@ EXPERIMENT = (
     "record a torque_map: the dynamometer holds a speed while positive and negative q currents "
     "are stepped, at two or more d currents, in both senses of rotation"
 )
-FORM_SHARE = 0.1
-BY_CHANCE = 0.01
 BENDING = ("iq^3", "iq^5", "id^2 iq", "id iq^3", "id^3 iq", "id^2 iq^3")
 
 
@@ -157,7 +156,7 @@ def torque(points: Sequence[Point], alpha_1_k: float) -> tuple[dict[str, Array],
     base = {f"speed {g}": (group == g).astype(float) for g in sorted({p.group for p in points})}
     base["iq"] = i_q * warm
     candidates = {"iq^3": i_q**3, "iq^5": i_q**5, "|iq| sense": np.abs(i_q) * sense}
-    if np.ptp(i_d) > 0.1 * np.ptp(i_q):
+    if np.ptp(i_d) > policy().aligned.least_d_share * np.ptp(i_q):
         base["id iq"] = i_d * i_q
         candidates |= {
             "id": i_d,
@@ -274,8 +273,9 @@ def _drag(points: Sequence[Point], model: Regression) -> tuple[Array, Array, int
     if part.dof > 0:
         lack = _lack(part.residuals, block, part.dof)
         covariance = np.maximum(1.0, lack) * covariance
-        dof = part.dof if fdtrc(part.dof, model.dof, lack) < BY_CHANCE else dof
-    if np.any(part.coefficients[:2] < -4.0 * np.sqrt(np.diag(covariance)[:2])):
+        dof = part.dof if fdtrc(part.dof, model.dof, lack) < policy().torque_map.level else dof
+    least = -policy().evidence.sigmas * np.sqrt(np.diag(covariance)[:2])
+    if np.any(part.coefficients[:2] < least):
         return *blank, "drag is not Coulomb and viscous: a fitted coefficient is negative"
     return part.coefficients[:2], covariance[:2, :2], dof, ""
 
@@ -289,7 +289,7 @@ def _untested_form(
 ) -> tuple[Contribution, ...]:
     """Allowance for drag of another form where no speed is left over to test it.
 
-    `FORM_SHARE` of the drag at the slowest speed may be Stribeck's, iron's or windage.
+    A share of the drag at the slowest speed may be Stribeck's, iron's or windage.
     """
     turning = [p for p in points if not p.standing]
     if len({p.group for p in turning}) > 3:
@@ -297,7 +297,7 @@ def _untested_form(
     speeds = _column(turning, "omega_mech_rad_s")
     drag = _drag(points, model)[0]
     slowest = float(np.min(np.abs(speeds)))
-    torque = FORM_SHARE * abs(drag[0] + drag[1] * slowest)
+    torque = policy().torque_map.untested_form_share * abs(drag[0] + drag[1] * slowest)
     u = torque if index == 0 else torque / slowest
     return (Contribution("assumed:drag_form", float(u), "B"),)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, SOURCE, ripple_share
 from pipeline.estimation.method import Method, over_x
+from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import magnet_coefficient
 from pipeline.estimation.uncertainty.instruments import (
@@ -67,7 +68,7 @@ def torque(iq_a: Array, id_a: Array, warm: Array) -> tuple[Array, dict[str, Arra
 
     """
     base = [np.ones(iq_a.size), iq_a * warm]
-    if np.ptp(id_a) > 0.1 * np.ptp(iq_a):
+    if np.ptp(id_a) > policy().aligned.least_d_share * np.ptp(iq_a):
         base.append(id_a * iq_a)
     candidates = {"iq^3": iq_a**3, "iq^5": iq_a**5, "sign iq": np.sign(iq_a)}
     return np.column_stack(base), candidates

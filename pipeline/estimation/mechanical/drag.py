@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, OVERLAP, ShaftRows
+from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows
+from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.nuisances import allowed_for
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
@@ -18,33 +19,12 @@ from pipeline.numerics.selection import needed_columns
 Array = NDArray[np.float64]
 
 # Shares of the highest speed, denser where friction bends. Chords of a square of speed are off by
-# a quarter of the square of their width: by 1.2 % of the largest drag at most, within `MATERIAL`.
+# a quarter of the square of their width: by 1.2 % of the largest drag at most, within
+# `drag.material_share`.
 KNOTS = (0.0, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0)
 # Widths of Stribeck's excess, from what the slowest rows resolve (`SLOWEST_SHARE`) to where it is
 # as good as viscous drag. A fifth apart, the nearest one is off by 7 % of the excess at most.
 BUMPS = tuple(float(f"{0.008 * 1.2**k:.3g}") for k in range(19))
-# As many as the estimator names beside orders of the angle: half or twice of it moved no constant
-# of ten simulated campaigns by a twentieth of its u.
-MOST_NUISANCES = 14
-# Two numbers stand for drag as long as they leave a fiftieth of it; the drag curve tells the rest.
-# At this limit a square root of speed beside them would have moved T_c by 20 %, B by 56 %, a cube
-# by 6 and 25 %: they are the law's constants then. Half or twice of it chose no other form.
-MATERIAL = 0.02
-# Six windows that share no sample, thrice what the two constants of drag need; one coast makes 39.
-ENOUGH_COASTING = 12
-# Drives of 0.3 to 0.8 s of two motors, 60 each: 3 to 10 rows gave J alike within a fifth of u, at
-# 15 a nuisance was left out that then stood in J.
-ROWS_A_COLUMN = 10
-LEAST_FREEDOM = 8
-# Errors by clusters are too small where these are few (Cameron and Miller, VI): at three, 0.4 to
-# 0.7 of the scatter of J over 60 drives of two motors, where the other way gave 1.0 to 1.4. At 12
-# to 24 it is 0.4 to 0.8 still, of a scatter that is a tenth of what the gains make of J, while the
-# other way gives up to three times too much.
-LEAST_CLUSTERS = 10
-# Two seconds of windows: longer than what converter, load and speed loop remember.
-LONGEST_MEMORY = 200
-# Below nought by chance once in 30,000.
-NEGATIVE = 4.0
 
 
 def _hat(index: int) -> Callable[[Array], Array]:
@@ -174,9 +154,14 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
     rich = np.column_stack([driving_nm, *curve_columns, *(candidates[n] for n in usable)])
     if rows.disjoint(DRIVE) < rich.shape[1]:
         rich = base
-    most = min(MOST_NUISANCES, max(0, rows.disjoint(DRIVE) // ROWS_A_COLUMN - _drive_columns(rows)))
+    most = min(
+        policy().drag.most_nuisances,
+        max(0, rows.disjoint(DRIVE) // policy().drag.rows_a_column - _drive_columns(rows)),
+    )
     sigma = _balanced(rows, rich, y)
-    tau = autocorrelation_time(linear_fit(rich, y, sigma).residuals / sigma, LONGEST_MEMORY)
+    tau = autocorrelation_time(
+        linear_fit(rich, y, sigma).residuals / sigma, policy().evidence.memory_rows
+    )
     pool = {n: candidates[n] for n in [*usable, "windage"]}
     chosen = needed_columns(base, pool, y, sigma, level, most, tau)
     start = np.column_stack([base, *(candidates[n] for n in chosen)])
@@ -213,21 +198,22 @@ def freedom(rows: ShaftRows) -> int:
 
 def _drive_columns(rows: ShaftRows) -> int:
     """Columns that drives determine: g, and drag's two where no coast-down fixes them."""
-    return 1 if np.count_nonzero(rows.kind == COAST) >= ENOUGH_COASTING else 3
+    return 1 if np.count_nonzero(rows.kind == COAST) >= policy().drag.enough_coasting_rows else 3
 
 
 def too_short(rows: ShaftRows) -> str:
     """Why the drive windows cannot carry an inertia with its uncertainty, else empty.
 
     The scatter s of v degrees of freedom is itself known to 1/sqrt(2v): a quarter at
-    `LEAST_FREEDOM`. Fewer tell neither how sure J is nor whether a nuisance is there.
+    `drag.least_freedom`. Fewer tell neither how sure J is nor whether a nuisance is there.
     Reference: JCGM 100:2008, E.4.3.
     """
-    if freedom(rows) >= LEAST_FREEDOM:
+    least = policy().drag.least_freedom
+    if freedom(rows) >= least:
         return ""
     return (
         f"the drive logs hold only {rows.disjoint(DRIVE)} windows that share no sample and in "
-        f"which the shaft turns, {LEAST_FREEDOM + _drive_columns(rows)} are needed to know how "
+        f"which the shaft turns, {least + _drive_columns(rows)} are needed to know how "
         "sure the inertia is"
     )
 
@@ -252,9 +238,12 @@ def _covariance(
     so that the residual variance and the number of windows that count as one stand in.
     Reference: Cameron and Miller, J. Human Resources 50(2), 2015, VI.
     """
-    if np.unique(rows.cluster[rows.kind == DRIVE]).size >= LEAST_CLUSTERS:
+    if np.unique(rows.cluster[rows.kind == DRIVE]).size >= policy().evidence.clusters:
         return cluster_covariance(design, found.residuals, sigma, rows.cluster)
-    tau = max(autocorrelation_time(found.residuals / sigma, LONGEST_MEMORY), 1.0 / (1.0 - OVERLAP))
+    tau = max(
+        autocorrelation_time(found.residuals / sigma, policy().evidence.memory_rows),
+        1.0 / (1.0 - policy().shaft_rows.overlap),
+    )
     return found.covariance * found.chi2_dof * tau, max(freedom(rows), 1)
 
 
@@ -285,22 +274,22 @@ def _form_fails(
     y: Array,
     level: float,
 ) -> bool:
-    """Whether a free drag curve explains the rows better, beyond chance and beyond `MATERIAL`.
+    """Whether a free drag curve explains the rows better, beyond chance and beyond what matters.
 
     Coast-downs show drag alone, so where there are enough of them they decide: the form fails if
-    it leaves more than `MATERIAL` of their deceleration (they see a millionth of it). Else chance
-    is judged by F with correlation counted, and a free curve must also move the drag by more than
-    `MATERIAL` of itself (rms over the rows).
+    it leaves more than `drag.material_share` of their deceleration (they see a millionth of it).
+    Else chance is judged by F with correlation counted, and a free curve must also move the drag
+    by more than that share of itself (rms over the rows).
     """
     coasting = rows.kind == COAST
-    if np.count_nonzero(coasting) >= ENOUGH_COASTING:
+    if np.count_nonzero(coasting) >= policy().drag.enough_coasting_rows:
         straight_fit = linear_fit(design, y, _balanced(rows, design, y))
         left = np.sqrt(np.mean(straight_fit.residuals[coasting] ** 2))
-        return bool(left > MATERIAL * np.sqrt(np.mean(y[coasting] ** 2)))
+        return bool(left > policy().drag.material_share * np.sqrt(np.mean(y[coasting] ** 2)))
     sigma = _balanced(rows, curve, y)
     loose, strict = linear_fit(curve, y, sigma), linear_fit(design, y, sigma)
     costs = [float(np.sum((f.residuals / sigma) ** 2)) for f in (loose, strict)]
-    tau = autocorrelation_time(loose.residuals / sigma, LONGEST_MEMORY)
+    tau = autocorrelation_time(loose.residuals / sigma, policy().evidence.memory_rows)
     free = max((y.size - curve.shape[1]) / tau, 1.0)
     extra = max(len(CURVE) - 2, 1)
     statistic = (costs[1] - costs[0]) / extra / tau / (costs[0] / (y.size - curve.shape[1]))
@@ -308,7 +297,9 @@ def _form_fails(
         return False
     curved = _drag_part(curve, loose, curve_names)
     straight = _drag_part(design, strict, names)
-    return bool(np.std(curved - straight) > MATERIAL * np.sqrt(np.mean(curved**2)))
+    return bool(
+        np.std(curved - straight) > policy().drag.material_share * np.sqrt(np.mean(curved**2))
+    )
 
 
 def _without_dip(
@@ -352,7 +343,7 @@ def _implausible(
     found = linear_fit(design, y, sigma)
     u = np.sqrt(np.diag(_covariance(rows, design, found, sigma)[0]))
     parts = [names.index("coulomb"), names.index("viscous")]
-    return any(found.coefficients[k] < -NEGATIVE * u[k] for k in parts)
+    return any(found.coefficients[k] < -policy().evidence.sigmas * u[k] for k in parts)
 
 
 def _drag_part(design: Array, found: LinearFit, names: Sequence[str]) -> Array:

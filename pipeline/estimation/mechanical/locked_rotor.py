@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import Point
+from pipeline.estimation.policy import policy
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import Contribution
 
@@ -19,7 +20,6 @@ RIPPLES = {
     6: ("bemf_harmonic_5", "bemf_harmonic_7"),
     12: ("bemf_harmonic_11", "bemf_harmonic_13"),
 }
-USUAL = {6: 0.03, 12: 0.01}
 HARMONICS = tuple(name for pair in RIPPLES.values() for name in pair)
 
 
@@ -48,10 +48,10 @@ def ripple_share(angles_rad: Array, pole_pairs: int | None, known: Constants) ->
     Angles that are not known (NaN), and any angle without pole pairs, cancel nothing.
     """
     alone = pole_pairs is None or not np.all(np.isfinite(angles_rad))
-    parts = []
+    parts, usual = [], {6: policy().ripple.usual_6, 12: policy().ripple.usual_12}
     for order, names in RIPPLES.items():
         found = [known.best(name) for name in names]
-        ripple = sum(USUAL[order] if one is None else one.number for one in found)
+        ripple = sum(usual[order] if one is None else one.number for one in found)
         share = 1.0 if alone else abs(np.mean(np.exp(1j * order * (pole_pairs or 1) * angles_rad)))
         parts.append(float(ripple * share) / np.sqrt(2.0))
     return float(np.hypot(*parts))

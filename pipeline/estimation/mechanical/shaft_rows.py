@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import magnet_temperature
+from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.plateaus import white_noise_sigma
@@ -24,21 +25,6 @@ from pipeline.records.capture import Capture
 Array = NDArray[np.float64]
 
 DRIVE, COAST = 0, 1
-# Windows of a drive: the shortest in which the angle's noise is `QUIET`, as torque changes in them.
-WIDTHS_S = (0.02, 0.04, 0.08)
-# A coast only slows down: windows of a twentieth resolve its curve. Half or twice that moved T_c
-# and B by a ninth of their u at most, half or twice the longest window by nothing.
-COAST_SHARE = 0.05
-LONGEST_COAST_S = 0.5
-# Rows of a drive forget within seven windows, 0.07 s: a cluster is over three times that.
-CLUSTER_S = 0.25
-# The sign of friction is not known where the shaft may stand; twice that moved T_c and B by an
-# eighth of their u, where there is a Stribeck's excess to lose, and half of it nothing.
-SLOWEST_SHARE = 0.01
-# A fiftieth of the acceleration adds 0.02 % to its scatter.
-QUIET = 0.02
-# Half, as in Welch's spectra: no sample counts less than another, and more only repeats.
-OVERLAP = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +59,7 @@ class ShaftRows:
 
     def disjoint(self, kind: int) -> int:
         """How many windows of a kind share no sample with another: those that count as one each."""
-        return math.ceil(np.count_nonzero(self.kind == kind) * (1.0 - OVERLAP))
+        return math.ceil(np.count_nonzero(self.kind == kind) * (1.0 - policy().shaft_rows.overlap))
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,18 +158,25 @@ def _part(capture: Capture) -> _Part | None:
 def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
     """Windows long enough for the encoder's noise to be a fiftieth of the acceleration."""
     if kind == COAST:
-        share = COAST_SHARE * float(t_s[-1] - t_s[0])
-        return weak_rows(t_s, min(max(share, WIDTHS_S[0]), LONGEST_COAST_S), OVERLAP)
+        share = policy().shaft_rows.coast_share * float(t_s[-1] - t_s[0])
+        return weak_rows(
+            t_s,
+            min(
+                max(share, policy().shaft_rows.drive_windows_s[0]),
+                policy().shaft_rows.longest_coast_window_s,
+            ),
+            policy().shaft_rows.overlap,
+        )
     sigma = white_noise_sigma(theta_rad)
-    for width in WIDTHS_S:
+    for width in policy().shaft_rows.drive_windows_s:
         try:
-            weak = weak_rows(t_s, width, OVERLAP)
+            weak = weak_rows(t_s, width, policy().shaft_rows.overlap)
         except ValueError:
             continue
         noise = sigma * weak.noise_gain(2)
-        if noise < QUIET * float(np.std(weak.integral(theta_rad, 2))):
+        if noise < policy().shaft_rows.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
             return weak
-    return weak_rows(t_s, WIDTHS_S[-1], OVERLAP)
+    return weak_rows(t_s, policy().shaft_rows.drive_windows_s[-1], policy().shaft_rows.overlap)
 
 
 def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:
@@ -201,7 +194,7 @@ def _undetermined(part: _Part, fastest: float) -> NDArray[np.bool_]:
     weak = part.weak
     ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
     least = np.array([np.min(np.abs(part.speed[a:b])) for a, b in ends])
-    slow: NDArray[np.bool_] = least < SLOWEST_SHARE * fastest
+    slow: NDArray[np.bool_] = least < policy().shaft_rows.slowest_share * fastest
     if part.kind == COAST:
         gaining = weak.integral(part.theta, 2) * weak.integral(part.theta, 1) > 0.0
         slow |= np.convolve(gaining, np.ones(3), mode="same") > 1.5
@@ -219,7 +212,7 @@ def _rows(
 ) -> tuple[dict[str, Array], int]:
     """Columns of one capture's windows, and how many of these were dropped."""
     weak = part.weak
-    clock = np.floor((weak.centres_s - weak.centres_s[0]) / CLUSTER_S)
+    clock = np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
     found = {
         "capture": np.full(weak.count, float(index)),
         "kind": np.full(weak.count, float(part.kind)),

@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import Point
+from pipeline.estimation.policy import policy
 from pipeline.numerics.least_squares import linear_fit
 
 Array = NDArray[np.float64]
-
-STRAIGHT_LEVEL = 0.01
-ZERO_D = 0.03
-HIGHEST_POWER = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +50,11 @@ def slope_without_d(
 
     """
     largest = max(abs(p.iq_a) for p in points)
-    rows = [p for p in points if abs(p.id_a) < ZERO_D * largest]
+    rows = [p for p in points if abs(p.id_a) < policy().flux_pairs.same_current * largest]
     groups = sorted({p.group for p in rows})
-    levels = len({round(abs(p.iq_a) / (ZERO_D * largest)) for p in rows} - {0})
+    levels = len(
+        {round(abs(p.iq_a) / (policy().flux_pairs.same_current * largest)) for p in rows} - {0}
+    )
     if levels < 3 or len(rows) < len(groups) + 6:
         return None
     i_q = np.array([p.iq_a for p in rows])
@@ -66,7 +65,9 @@ def slope_without_d(
     if rubbing:
         columns.append(np.abs(i_q) * np.sign([p.omega_mech_rad_s for p in rows]))
     columns.append(i_q * warm)
-    return _ladder(columns, i_q / largest, rows, min(2 * levels - 3, HIGHEST_POWER))
+    return _ladder(
+        columns, i_q / largest, rows, min(2 * levels - 3, policy().torque_slope.highest_power)
+    )
 
 
 def _ladder(
@@ -91,7 +92,7 @@ def _ladder(
             continue
         step = abs(value - best.kt_nm_a)
         added = float(found.coefficients[-1]) ** 2 / max(float(covariance[-1, -1]), 1e-300)
-        if fdtrc(1.0, found.dof, added) > STRAIGHT_LEVEL:
+        if fdtrc(1.0, found.dof, added) > policy().torque_slope.level:
             return replace(best, form_nm_a=step)
         best = Slope(value, u, found.dof, step / 2.0)
     return best

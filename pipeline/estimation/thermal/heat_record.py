@@ -14,6 +14,8 @@ from pipeline.estimation.electrical.terminals import (
     pair_of,
     pair_signals,
 )
+from pipeline.estimation.policy import policy
+from pipeline.numerics.integrals import GAP
 from pipeline.numerics.plateaus import block_means, find_plateaus
 from pipeline.physics.conventions import phase_from_line
 from pipeline.records.capture import Capture
@@ -21,8 +23,6 @@ from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, derived
 
 Array = NDArray[np.float64]
-BLOCKS = 300
-GAP = 1.5
 DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 TURNING = ("psi_pm_wb", "pole_pairs", "ld_h", "lq_h")
 REFERENCE = ("r_phase_ohm", "r_a_ohm", "r_b_ohm", "r_c_ohm", "angle_offset_elec_rad")
@@ -152,7 +152,8 @@ def _motional(capture: Capture, data: dict[str, Array], known: Constants) -> tup
     psi_q = numbers["lq_h"] * data["iq_a"]
     power = numbers["pole_pairs"] * omega * (psi_d * data["iq_a"] - psi_q * data["id_a"])
     copper = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]
-    matters = abs(float(np.nanmean(power))) > 1e-4 * abs(float(np.nanmean(copper)))
+    least = policy().heat_record.motional_share * abs(float(np.nanmean(copper)))
+    matters = abs(float(np.nanmean(power))) > least
     return (power if matters else np.zeros(omega.size)), matters
 
 
@@ -187,12 +188,16 @@ def _blocks(
     )
     current = np.sqrt(data["square_a2"])
     most = float(current.max(initial=0.0))
-    plateaus = find_plateaus(current, least=50, tolerance=0.02, least_span=most)
-    flowing = [p for p in plateaus if current[p.rows].mean() > 0.2 * most]
+    plateaus = find_plateaus(
+        current, least=50, tolerance=policy().heat_record.steady_share, least_span=most
+    )
+    flowing = [
+        p for p in plateaus if current[p.rows].mean() > policy().heat_record.flowing_share * most
+    ]
     if not flowing:
         return None
     longest = max(flowing, key=lambda p: p.size)
-    size = max(1, longest.size // BLOCKS)
+    size = max(1, longest.size // policy().heat_record.blocks)
     whole = _unbroken(data["t_s"][longest.rows], size)
     mean = {n: block_means(v[longest.rows], size)[whole] for n, v in data.items()}
     return HeatRecord(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from pipeline.estimation.policy import policy
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import Budget, type_b
 
 SOURCE = "assumed:temp_coeff_magnet_1_k"
-# Sintered NdFeB loses 0.09 to 0.12 % a kelvin, SmCo less than half of that, ferrite 0.2 %.
-USUAL_1_K, U_USUAL_1_K = -0.0011, 4e-4
 
 
 def magnet_coefficient(known: Constants) -> tuple[float, Budget]:
@@ -17,5 +16,6 @@ def magnet_coefficient(known: Constants) -> tuple[float, Budget]:
     """
     found = known.best("temp_coeff_magnet_1_k")
     if found is None:
-        return USUAL_1_K, type_b(SOURCE, U_USUAL_1_K)
+        usual = policy().magnet
+        return usual.coefficient_1_k, type_b(SOURCE, usual.u_coefficient_1_k)
     return found.number, found.budget

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.policy import policy
 from pipeline.numerics.random_effects import between
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -20,13 +21,6 @@ from pipeline.records.uncertainty import METHODS, Contribution, covariance
 
 Array = NDArray[np.float64]
 
-# Beyond the 99 % interval. In a hundred sound comparisons one is widened for nothing.
-LEVEL = 0.01
-# A method whose u is this many times the root of the number of methods times another's tells
-# nothing of that one (Particle Data Group, Review of Particle Physics, 2024, 5.2.2, scale factors).
-PRECISE = 3.0
-# Drag at creep speed and at full speed are two quantities where friction bends.
-SPEEDS_APART = 10.0
 # One coupling: torque per ampere is 1.5 p psi at small current, whatever the motor.
 SAME = {"kt_peak_nm_a": ("kt_from_ke_nm_a",)}
 
@@ -53,7 +47,7 @@ def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
         new = one.method not in {estimate.method, *(e.method for e in others)}
         if one.known and one.status in ("measured", "derived") and new and _alike(one, estimate):
             others.append(one)
-    limit = PRECISE * np.sqrt(len(others) + 1.0) * estimate.u
+    limit = policy().agreement.precise * np.sqrt(len(others) + 1.0) * estimate.u
     return [e for e in others if e.u <= limit]
 
 
@@ -61,7 +55,7 @@ def _alike(one: Estimate, other: Estimate) -> bool:
     """Whether two estimates hold for speeds of one order of magnitude, as far as they say."""
     speeds = [e.at.get("omega_mech_rad_s") for e in (one, other)]
     known = [abs(float(s)) for s in speeds if isinstance(s, int | float) and s != 0]
-    return len(known) < 2 or max(known) <= SPEEDS_APART * min(known)
+    return len(known) < 2 or max(known) <= policy().agreement.speed_ratio * min(known)
 
 
 def _widened(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
@@ -71,7 +65,7 @@ def _widened(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     values = np.array([e.number for e in methods])
     matrix = np.array([[covariance(a.budget, b.budget) for b in methods] for a in methods])
     found = between(values, matrix, min(e.dof for e in methods))
-    if found.p_value >= LEVEL or found.sd == 0.0:
+    if found.p_value >= policy().agreement.level or found.sd == 0.0:
         return estimate
     each = ", ".join(f"{e.method} {e.number:.5g} ± {e.u:.2g}" for e in methods)
     words = f"methods disagree beyond chance ({each} {estimate.unit})"

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.policy import policy
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.numerics.random_effects import Between, between
@@ -21,15 +22,6 @@ from pipeline.records.uncertainty import BETWEEN, Contribution
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
-
-# As many windows a regime as tell its scatter to a sixth (JCGM 100:2008, E.4.3).
-LEAST_ROWS = 20
-# A regime that tells less than this share of a constant moves it by less than so much of its own
-# departure: errors that are small beside the rest of the rows are large beside its few.
-LEAST_SHARE = 0.1
-# Errors by clusters are too small where these are few (Cameron and Miller 2015, VI).
-LEAST_CLUSTERS = 10
-LONGEST_MEMORY = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +117,8 @@ def _of_partition(
     present = [
         k
         for k in range(len(partition.names))
-        if np.sum(labels == k) >= LEAST_ROWS and told[labels == k].sum() >= LEAST_SHARE
+        if np.sum(labels == k) >= policy().evidence.rows
+        and told[labels == k].sum() >= policy().regimes.least_share
     ]
     if len(present) < 2:
         return None
@@ -134,12 +127,12 @@ def _of_partition(
     wide = np.column_stack([np.delete(design, column, axis=1), rest, *split])
     wide = wide[:, np.any(wide != 0.0, axis=0)]
     fit, common = linear_fit(wide, y, sigma), linear_fit(design, y, sigma).coefficients[column]
-    if not fit.full_rank or common == 0.0 or fit.dof < LEAST_ROWS:
+    if not fit.full_rank or common == 0.0 or fit.dof < policy().evidence.rows:
         return None
-    tau = autocorrelation_time(fit.residuals / sigma, LONGEST_MEMORY)
+    tau = autocorrelation_time(fit.residuals / sigma, policy().evidence.memory_rows)
     covariance, dof = fit.covariance * fit.chi2_dof * tau, max(fit.dof / tau, 1.0)
     clusters = [np.unique(regression.cluster[labels == k]).size for k in present]
-    if min(clusters) >= LEAST_CLUSTERS:
+    if min(clusters) >= policy().evidence.clusters:
         robust, _ = cluster_covariance(wide, fit.residuals, sigma, regression.cluster)
         covariance, dof = robust, float(sum(clusters) - len(clusters))
     count = len(present)

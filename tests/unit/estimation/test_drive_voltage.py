@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.estimation.estimators.drive_voltage import ESTIMATOR
-from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K
+from pipeline.estimation.policy import DEFAULT
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -75,7 +76,10 @@ def test_back_emf_constant_from_a_drive() -> None:
         assert low <= motor.pole_pairs * motor.psi_pm_wb <= high
         share = next(p.u for p in ke.budget if p.source == source)
         assert ke.u < 0.003 * ke.number or source == SOURCE
-        assert abs(share) > 5.0 * (1e-5 if source == "x" else U_USUAL_1_K) * ke.number
+        assert (
+            abs(share)
+            > 5.0 * (1e-5 if source == "x" else DEFAULT.magnet.u_coefficient_1_k) * ke.number
+        )
         assert r_phase.number == pytest.approx(motor.r_phase_ohm, rel=0.02)
 
 

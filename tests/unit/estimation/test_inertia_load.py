@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
-from pipeline.estimation.estimators.inertia import GIVES, MATERIAL
+from pipeline.estimation.estimators.inertia import GIVES
 from pipeline.estimation.estimators.torque_map import ESTIMATOR as TORQUE_MAP
+from pipeline.estimation.policy import DEFAULT
 from pipeline.records.capture import Campaign
 from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import CAMPAIGN, campaign
@@ -69,4 +70,4 @@ def test_a_shaft_that_follows_its_current_runs_free() -> None:
     assert "the shaft is taken as free" in inertia.note
     for name, one in estimates.items():
         doubt = {part.source: part.u for part in one.budget}["assumed:free_shaft"]
-        assert 0.0 < doubt < MATERIAL * one.number, name
+        assert 0.0 < doubt < DEFAULT.drag.unexplained_share * one.number, name

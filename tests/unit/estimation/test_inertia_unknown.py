@@ -27,7 +27,7 @@ def test_an_inertia_of_no_known_size_takes_the_friction_with_it() -> None:
         captures.append(replace(one, tables=strange) if one.meta.test == "drive" else one)
     constants = fit_all(Campaign("m", tuple(captures)), {})[0]
     for name in inertia.GIVES:
-        (own,) = (e for e in constants.all_of(name) if e.method == inertia.NAME)
+        (own,) = (e for e in constants.all_of(name) if e.method == inertia.METHOD.name)
         assert own.status == "not_identifiable", (name, own.u)
         assert "does not follow the torque" in own.note
     assert constants.best("tau_mech_s") is None

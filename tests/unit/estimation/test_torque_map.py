@@ -11,7 +11,8 @@ from scipy.special import jv
 from pipeline.estimation.estimators.inertia import ESTIMATOR as INERTIA
 from pipeline.estimation.estimators.open_circuit import ESTIMATOR as OPEN_CIRCUIT
 from pipeline.estimation.estimators.torque_map import ESTIMATOR, Regression
-from pipeline.estimation.thermal.magnet_coefficient import SOURCE, U_USUAL_1_K
+from pipeline.estimation.policy import DEFAULT
+from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
@@ -22,6 +23,7 @@ from tests.simulated import campaign_of, design
 from tests.unit.estimation.signals import capture
 
 EXACT_BENCH = Bench(instruments=EXACT)
+U_COEFFICIENT = DEFAULT.magnet.u_coefficient_1_k
 
 
 def hot_map(*others: str) -> Campaign:
@@ -60,7 +62,7 @@ def test_torque_constant_at_25_degrees() -> None:
     assert next(p.u for p in kt.budget if p.source == "x") != 0.0
     assumed = torque_constant(captures)
     share = next(p.u for p in assumed.budget if p.source == SOURCE)
-    assert abs(share) / truth == pytest.approx(35.0 * U_USUAL_1_K / (1 - 0.0385), rel=0.05)
+    assert abs(share) / truth == pytest.approx(35.0 * U_COEFFICIENT / (1 - 0.0385), rel=0.05)
 
 
 def test_one_thermometer_is_one_source_of_the_torque_constant() -> None:
@@ -105,7 +107,7 @@ def test_what_is_assumed_of_the_magnets_is_one_error_of_kt_and_ke() -> None:
         next(part.u for part in one.budget if part.source == SOURCE) / one.number
         for one in (kt, psi)
     ]
-    assert abs(shares[0]) > 30.0 * U_USUAL_1_K
+    assert abs(shares[0]) > 30.0 * U_COEFFICIENT
     assert shares[0] == pytest.approx(shares[1], rel=0.02)
 
 
@@ -121,7 +123,7 @@ def test_inertia_from_a_hot_drive_carries_what_is_assumed_of_the_magnets() -> No
     kt = Estimate("kt_peak_nm_a", 0.0746, "N·m/A", "measured", "given", type_b("kt", 1e-5))
     found = INERTIA.fit(campaign_of_two, Constants((kt,)), INERTIA.options).estimates[0]
     share = next(part.u for part in found.budget if part.source == SOURCE) / found.number
-    assert share == pytest.approx(35.0 * U_USUAL_1_K / (1 - 0.0385), rel=0.05)
+    assert share == pytest.approx(35.0 * U_COEFFICIENT / (1 - 0.0385), rel=0.05)
 
 
 @pytest.mark.parametrize("wobble_rad", [0.05, 0.3])
