@@ -8,7 +8,7 @@
     pipeline.compare(recordings, effects=["cogging"])  # where a model is off
     pipeline.diagnose(recordings)                    # which physical effect it lacks
     pipeline.simulate("gimbal-5208", ["stribeck"])   # recordings of a simulated motor
-    pipeline.load("reports/demo")                    # what a run wrote
+    pipeline.load("reports/demo")                    # the datasheets of a run
 
 Results are frozen records with polars frames (`.constants`, `.residuals`, `.ladder`, ...). Nothing
 is written to the disk. Whatever is not listed in `__all__` may change without notice.
@@ -20,9 +20,29 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["check", "compare", "diagnose", "fit", "load", "read", "simulate"]
+__all__ = [
+    "Comparisons",
+    "Datasheets",
+    "Diagnoses",
+    "Figure",
+    "Fits",
+    "Recordings",
+    "check",
+    "compare",
+    "diagnose",
+    "fit",
+    "load",
+    "read",
+    "simulate",
+]
 
 _HOMES = {
+    "Comparisons": "models",
+    "Datasheets": "datasheets",
+    "Diagnoses": "models",
+    "Figure": "figure",
+    "Fits": "fits",
+    "Recordings": "recordings",
     "check": "datasheets",
     "compare": "models",
     "diagnose": "models",
@@ -34,7 +54,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """A public function, imported when it is first used: commands start without its libraries."""
+    """A public name, imported at its first use, so that commands start without its libraries."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.api.{_HOMES[name]}"), name)

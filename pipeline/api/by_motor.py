@@ -1,4 +1,4 @@
-"""What every result of the public functions is: one thing a motor, by motor_id."""
+"""The base of the results of the public functions: one record a motor, by motor_id."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ One = TypeVar("One")
 
 @dataclass(frozen=True, slots=True)
 class ByMotor(Generic[One]):
-    """Results by motor_id, in the order of the motors."""
+    """Results by motor_id, in the order of the motors.
+
+    Attributes
+    ----------
+    motors : mapping
+        The results by motor_id.
+
+    """
 
     motors: Mapping[str, One]
 
@@ -26,5 +33,17 @@ class ByMotor(Generic[One]):
         return len(self.motors)
 
     def motor_or_first(self, motor: str | None) -> str:
-        """The motor_id that is asked for, the first one where none is."""
+        """A motor_id, or the first one.
+
+        Parameters
+        ----------
+        motor : str, optional
+            A motor_id.
+
+        Returns
+        -------
+        str
+            `motor`, or the first motor_id where it is None.
+
+        """
         return next(iter(self.motors)) if motor is None else motor

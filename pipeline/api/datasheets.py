@@ -39,7 +39,16 @@ DATASHEET_SCHEMA = {
 
 @dataclass(frozen=True, slots=True)
 class Datasheets(ByMotor[Datasheet]):
-    """Datasheets by motor, and diagnoses where an output folder holds some."""
+    """Datasheets by motor.
+
+    Attributes
+    ----------
+    motors : mapping of str to Datasheet
+        The datasheets by motor_id.
+    diagnoses : mapping of str to DiagnosisSummary
+        The diagnoses of an output folder by motor_id; empty for datasheets made by `check`.
+
+    """
 
     diagnoses: Mapping[str, DiagnosisSummary] = field(default_factory=dict)
 
@@ -96,31 +105,32 @@ def check(
     Parameters
     ----------
     fits : Fits
-        What `fit` gave.
+        The result of `fit`.
     limits : str
-        Limits file of `conf/limits/`, or the path of one: constants that a release must hold.
+        Name of a file of `conf/limits/`, or a path. It names the constants that a release requires.
     release : str
         `manual`: a person approves in the registry; `auto`: released if nothing is missing.
     options : mapping of mapping, optional
-        Options of checks.
+        Options by check [units in the check's file].
     model : str, optional
-        Model that the captures are held against; None for no residual test.
+        The model of the residual test; None for no residual test.
     effects : sequence of str
-        Effects to add to it.
+        Effects to add to the model.
 
     Returns
     -------
     Datasheets
-        One a motor: `released`, `provisional` or `refused`, with the reasons.
+        One datasheet a motor: `released`, `provisional` or `refused`, with the reasons.
 
     Raises
     ------
     UsageError
-        For a limits file or an option that there is not.
+        For an unknown limits file, check, option, model or effect.
 
     Examples
     --------
     >>> import pipeline
+    >>> import polars as pl
     >>> sheets = pipeline.check(pipeline.fit(pipeline.read("data/demo", motor="G52-1402")))
     >>> sheets["G52-1402"].status
     'refused'
@@ -165,19 +175,30 @@ def _datasheet(fit: MotorFit, settings: RunSettings, required: tuple[str, ...]) 
 
 
 def load(output: str | Path) -> Datasheets:
-    """Reads the datasheets, and the diagnoses, of an output folder of `run`.
-
-    Raises UsageError where the folder holds none, or a file that is no datasheet.
+    """Reads the datasheets and diagnoses of an output folder of `run`.
 
     Parameters
     ----------
     output : path
-        The folder that a run wrote to.
+        The output folder of a run.
 
     Returns
     -------
     Datasheets
-        As they were published; who approved them is in the registry.
+        The datasheets as published. Approvals are in the registry.
+
+    Raises
+    ------
+    UsageError
+        If the folder holds no datasheet, or a file that is no datasheet.
+
+    Examples
+    --------
+    >>> import pipeline
+    >>> pipeline.load("data/demo")
+    Traceback (most recent call last):
+    ...
+    pipeline.records.errors.UsageError: no datasheets in data/demo; name the output folder of a run
 
     """
     place = Path(output)

@@ -13,7 +13,16 @@ from pipeline.report.page import TEMPLATES
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Figure:
-    """One drawing as a self-contained SVG document; light and dark follow the viewer."""
+    """One drawing as a self-contained SVG document; light and dark follow the viewer.
+
+    Attributes
+    ----------
+    title : str
+        What is drawn.
+    svg : str
+        The SVG document.
+
+    """
 
     title: str
     svg: str
@@ -27,7 +36,19 @@ class Figure:
         return f'<img alt="{escape(self.title)}" src="data:image/svg+xml;base64,{data}"/>'
 
     def save(self, path: str | Path) -> Path:
-        """Writes the SVG document; returns its path."""
+        """Writes the SVG document.
+
+        Parameters
+        ----------
+        path : path
+            The file to write.
+
+        Returns
+        -------
+        pathlib.Path
+            The path of the file.
+
+        """
         place = Path(path)
         place.write_text(self.svg, encoding="utf-8")
         return place

@@ -39,7 +39,22 @@ RESIDUAL_SCHEMA = {
 
 @dataclass(frozen=True, slots=True)
 class MotorFit:
-    """What the estimators found of one motor; `sources` are the maps it was read by."""
+    """The estimates of one motor.
+
+    Attributes
+    ----------
+    campaign : Campaign
+        The captures that were fitted, with the stated constants.
+    constants : Constants
+        Every estimate; `constants.best("ld_h")` is the preferred one of a name.
+    evidence : tuple of Evidence
+        The plots: measured and fitted series.
+    failures : tuple of Failure
+        Estimators that failed on these captures, with the reason.
+    sources : tuple of SourceMap
+        The source maps by which the captures were read.
+
+    """
 
     campaign: Campaign
     constants: Constants
@@ -52,8 +67,15 @@ class MotorFit:
 class Fits(ByMotor[MotorFit]):
     """Estimates of every motor, before any check.
 
-    `options` are those of the estimators, `stated` the constants that were stated. `failures` of a
-    motor name estimators that broke on it.
+    Attributes
+    ----------
+    motors : mapping of str to MotorFit
+        The estimates by motor_id.
+    options : mapping of mapping
+        The options of the estimators.
+    stated : mapping of str to float
+        The constants that were stated [SI].
+
     """
 
     options: Options = field(default_factory=dict)
@@ -81,7 +103,23 @@ class Fits(ByMotor[MotorFit]):
     def plot(self, estimator: str, motor: str | None = None) -> tuple[Figure, ...]:
         """The plots of one estimator: measured, fitted, and the residual below.
 
-        Raises KeyError where that estimator drew none for the motor.
+        Parameters
+        ----------
+        estimator : str
+            Name of the estimator, for instance `"current_step"`.
+        motor : str, optional
+            A motor_id; the first motor without it.
+
+        Returns
+        -------
+        tuple of Figure
+            One figure a plot.
+
+        Raises
+        ------
+        KeyError
+            If the estimator has no plot of this motor.
+
         """
         from pipeline.report.chart import chart
 
@@ -117,12 +155,13 @@ def fit(
     Parameters
     ----------
     recordings : Recordings or path
-        What `read` or `simulate` gave, or a folder to read.
+        The result of `read` or `simulate`, or a folder to read.
     constants : mapping of str to float, optional
-        Stated constants and their standard uncertainties, SI units:
+        Stated constants and their standard uncertainties [SI units of the glossary]:
         `{"kt_peak_nm_a": 0.118, "u_kt_peak_nm_a": 0.002}`.
     options : mapping of mapping, optional
-        Options of estimators, for instance `{"torque_map": {"level": 0.001}}`.
+        Options by estimator [units in the estimator's file], for instance
+        `{"torque_map": {"level": 0.001}}`.
 
     Returns
     -------
@@ -132,11 +171,23 @@ def fit(
     Raises
     ------
     UsageError
-        For an option that no estimator has, or a constant that there is not.
+        For an unknown estimator, option or constant.
+
+    Notes
+    -----
+    An uncertainty is the root sum of squares of its contributions, by the law of propagation [1]_.
+    Contributions that two constants share, such as the gain of an instrument, are correlated and
+    cancel where they can.
+
+    References
+    ----------
+    .. [1] JCGM 100:2008, Guide to the expression of uncertainty in measurement.
+       https://doi.org/10.59161/JCGM100-2008E
 
     Examples
     --------
     >>> import pipeline
+    >>> import polars as pl
     >>> fits = pipeline.fit(pipeline.read("data/demo", motor="G52-0601"))
     >>> row = fits.constants.row(by_predicate=pl.col("constant") == "pole_pairs", named=True)
     >>> row["value"], row["status"]

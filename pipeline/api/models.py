@@ -1,4 +1,4 @@
-"""Models held against recordings: where one is off, and which physical effect it lacks."""
+"""Models compared with recordings: their errors, and the physical effects that they lack."""
 
 from __future__ import annotations
 
@@ -64,7 +64,14 @@ RANKING_SCHEMA = {
 
 @dataclass(frozen=True, slots=True)
 class Comparisons(ByMotor[Comparison]):
-    """One comparison a motor. Errors are of window means; 1 is the noise floor."""
+    """One comparison a motor. Errors are of window means; a ratio of 1 is the noise floor.
+
+    Attributes
+    ----------
+    motors : mapping of str to Comparison
+        The comparisons by motor_id.
+
+    """
 
     @property
     def errors(self) -> pl.DataFrame:
@@ -78,7 +85,7 @@ class Comparisons(ByMotor[Comparison]):
 
     @property
     def parameters(self) -> pl.DataFrame:
-        """One row a fitted parameter; what the data do not determine has no value."""
+        """One row a fitted parameter; a parameter that the data do not determine has no value."""
         rows = [
             _only({"motor_id": name, "parameter": key, **one.document()}, PARAMETER_SCHEMA)
             for name, result in self.motors.items()
@@ -113,7 +120,23 @@ class Comparisons(ByMotor[Comparison]):
     def plot(self, signal: str, capture: str, motor: str | None = None) -> Figure:
         """One signal of one capture: measured, model, and the residual below.
 
-        Raises KeyError where the comparison holds no such trace.
+        Parameters
+        ----------
+        signal, capture : str
+            As in the columns of `residuals`.
+        motor : str, optional
+            A motor_id; the first motor without it.
+
+        Returns
+        -------
+        Figure
+            Measured and model over time [s], in the unit of the signal.
+
+        Raises
+        ------
+        KeyError
+            If the comparison has no such trace.
+
         """
         from pipeline.report.chart import chart
 
@@ -133,7 +156,14 @@ class Comparisons(ByMotor[Comparison]):
 
 @dataclass(frozen=True, slots=True)
 class Diagnoses(ByMotor[Diagnosis]):
-    """One diagnosis a motor: what its model lacks, how sure that is, what else it could be."""
+    """One diagnosis a motor: the missing effects, their evidence, and their alternatives.
+
+    Attributes
+    ----------
+    motors : mapping of str to Diagnosis
+        The diagnoses by motor_id.
+
+    """
 
     @property
     def verdicts(self) -> pl.DataFrame:
@@ -159,7 +189,7 @@ class Diagnoses(ByMotor[Diagnosis]):
 
     @property
     def ranking(self) -> pl.DataFrame:
-        """One row an effect: its evidence, and what it could be confused with."""
+        """One row an effect: its evidence, and the effects it could be confused with."""
         rows = [
             _only(
                 {"motor_id": name, "missing": one.effect in result.missing, **one.document()},
@@ -171,7 +201,19 @@ class Diagnoses(ByMotor[Diagnosis]):
         return frames.frame(rows, RANKING_SCHEMA)
 
     def plot(self, motor: str | None = None) -> Figure:
-        """The ladder of one motor: each signal's held-out error over its noise floor by step."""
+        """The ladder of one motor: each signal's held-out error over its noise floor by step.
+
+        Parameters
+        ----------
+        motor : str, optional
+            A motor_id; the first motor without it.
+
+        Returns
+        -------
+        Figure
+            One line a signal; 1 is the noise floor.
+
+        """
         from pipeline.report.rung_chart import rung_chart
 
         motor_id = self.motor_or_first(motor)
@@ -198,16 +240,16 @@ def compare(
     effects_path: str | None = None,
     policy: Mapping[str, Any] | None = None,
 ) -> Comparisons:
-    """Holds a model against measurements that it was not fitted to, signal by signal.
+    """Compares a model with measurements that it was not fitted to, signal by signal.
 
     Parameters
     ----------
     recordings : Recordings or path
-        What `read` or `simulate` gave, or a folder to read.
+        The result of `read` or `simulate`, or a folder to read.
     model : str
         `ideal`, or `standard`: with copper and magnet temperature and Coulomb friction.
     effects : sequence of str
-        Effects to add; a name with a leading `-` takes one away.
+        Effects to add; a name with a leading `-` removes one.
     effects_path : str, optional
         Folder of your own effects, one file each.
     policy : mapping of mapping, optional
@@ -221,11 +263,28 @@ def compare(
     Raises
     ------
     UsageError
-        For an effect that there is not.
+        For an unknown model or effect.
 
     Notes
     -----
-    Leave-one-capture-out prediction; see docs/criticism.md.
+    Every capture is predicted by a model that was fitted to the others [1]_. The page
+    "Criticism" describes the equations and the noise floors.
+
+    References
+    ----------
+    .. [1] Stone, Cross-validatory choice and assessment of statistical predictions,
+       J. R. Stat. Soc. B 36 (1974) 111-147. https://doi.org/10.1111/j.2517-6161.1974.tb00994.x
+
+    Examples
+    --------
+    A motor with an unmodelled bump of friction at low speed coasts down:
+
+    >>> import pipeline
+    >>> hidden = pipeline.simulate("gimbal-5208", ["stribeck"], seed=3, exact=True)
+    >>> recordings = hidden.only(tests=("spin_down", "cogging"))
+    >>> errors = pipeline.compare(recordings, effects=["cogging"]).errors
+    >>> errors.filter(errors["ratio"] > 100)["capture"].unique(maintain_order=True).to_list()
+    ['spin_down_backward', 'spin_down_forward']
 
     """
     from pipeline.criticism.comparison import compare as compare_one
@@ -243,20 +302,48 @@ def diagnose(
     effects_path: str | None = None,
     policy: Mapping[str, Any] | None = None,
 ) -> Diagnoses:
-    """Names the physical effects that a model lacks, or says that it knows none.
+    """Names the physical effects that a model lacks, or reports that no known effect explains it.
 
-    Parameters are those of `compare`.
+    Parameters
+    ----------
+    recordings : Recordings or path
+        The result of `read` or `simulate`, or a folder to read.
+    model : str
+        `ideal`, or `standard`: with copper and magnet temperature and Coulomb friction.
+    effects : sequence of str
+        Effects that are known to be present; a name with a leading `-` removes one.
+    effects_path : str, optional
+        Folder of your own effects, one file each.
 
     Returns
     -------
     Diagnoses
-        Verdict `adequate`, `missing`, `unknown` or `insufficient` a motor; the ladder of held-out
-        errors as effects are added; the ranking of all effects.
+        The verdict of each motor (`adequate`, `missing`, `unknown` or `insufficient`), the ladder
+        of held-out errors as effects are added, and the ranking of all effects.
 
     Raises
     ------
     UsageError
-        For an effect that there is not.
+        For an unknown model or effect.
+
+    Notes
+    -----
+    Effects are added one by one while they lower the deviance by more than their BIC penalty [1]_
+    and lower the held-out error.
+
+    References
+    ----------
+    .. [1] Schwarz, Estimating the dimension of a model, Ann. Stat. 6 (1978) 461-464.
+       https://doi.org/10.1214/aos/1176344136
+
+    Examples
+    --------
+    >>> import pipeline
+    >>> hidden = pipeline.simulate("gimbal-5208", ["stribeck"], seed=3, exact=True)
+    >>> tests = ("spin_down", "drive", "open_circuit", "torque_map")
+    >>> recordings = hidden.only(tests=tests)
+    >>> pipeline.diagnose(recordings, effects=["cogging"])["gimbal-5208-3"].missing
+    ('stribeck',)
 
     """
     from pipeline.criticism.diagnosis import diagnose as diagnose_one

@@ -26,10 +26,19 @@ Options = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class Recordings:
-    """Validated captures by motor, and what was refused or doubtful.
+    """Validated captures by motor, with findings on refused or doubtful files.
 
-    `campaigns` maps a motor_id to its captures. `truth` holds what is true of simulated motors,
-    `sources` the maps that the captures of each motor were read by.
+    Attributes
+    ----------
+    campaigns : mapping of str to Campaign
+        The captures of each motor by motor_id.
+    findings : tuple of Finding
+        Files that were refused or are doubtful: rows, reason and remedy.
+    truth : mapping of str to mapping
+        The true parameters of simulated motors; empty for recordings from files.
+    sources : mapping of str to tuple of SourceMap
+        The source maps by which the captures of each motor were read.
+
     """
 
     campaigns: Mapping[str, Campaign]
@@ -64,14 +73,42 @@ class Recordings:
         return frames.frame(frames.finding_rows(self.findings), frames.FINDING_SCHEMA)
 
     def signals(self, path: str) -> pl.DataFrame:
-        """The longest table of one capture as read, SI units, NaN for missing.
+        """The longest table of one capture, in SI units; NaN for a missing value.
 
-        Raises KeyError for a path that is not among the captures.
+        Parameters
+        ----------
+        path : str
+            Path of the capture as in the column `path` of `captures`.
+
+        Returns
+        -------
+        polars.DataFrame
+            The columns of the glossary [units by their suffix].
+
+        Raises
+        ------
+        KeyError
+            If there is no such capture.
+
         """
         return max(self._capture(path).tables, key=lambda table: table.height)
 
     def only(self, motor: str | None = None, tests: tuple[str, ...] = ()) -> Recordings:
-        """The recordings of one motor, of some tests, or both; a motor left without any goes."""
+        """The recordings of one motor, of some tests, or of both.
+
+        Parameters
+        ----------
+        motor : str, optional
+            A motor_id; all motors without it.
+        tests : tuple of str
+            Names of tests; all tests where it is empty.
+
+        Returns
+        -------
+        Recordings
+            Motors without any such capture are left out.
+
+        """
         kept = {}
         for name, campaign in self.campaigns.items():
             captures = campaign.of(*tests) if tests else campaign.captures
@@ -104,8 +141,8 @@ def read(
 ) -> Recordings:
     """Reads and validates every capture of a folder and its subfolders, in this process.
 
-    Nothing is written. The commands parse files in worker processes that can be ended; here a
-    file that a stranger made to exhaust the reader ends the caller.
+    Nothing is written. The commands read files in worker processes with a time limit. This function
+    does not, so use the commands for untrusted files.
 
     Parameters
     ----------
@@ -117,11 +154,12 @@ def read(
     motor : str, optional
         Only the captures of this motor_id.
     gates : mapping of mapping, optional
-        Options of gates, for instance `{"time_gaps": {"enabled": 0}}`.
+        Options by gate [units in the gate's file], for instance
+        `{"clock_jump": {"enabled": 0}}`.
     recover : bool
-        Use the good part of MCAP files that are cut off.
+        Read the intact part of truncated MCAP files.
     limits : ReadLimits, optional
-        Most memory that one file may take.
+        Memory [MB] and time [s] that one file may take; only the memory is enforced here.
 
     Returns
     -------
@@ -131,7 +169,7 @@ def read(
     Raises
     ------
     UsageError
-        Where the folder, the source map or the motor is not there.
+        If the folder, the source map or the motor does not exist.
 
     Examples
     --------

@@ -51,27 +51,28 @@ def simulate(
     motor : str
         Design in `conf/motor/`.
     effects : str or sequence of str
-        Hidden effects: `"cogging"` at its typical size, `"dead_time=0.3"` at another.
+        Hidden effects: `"cogging"` at its typical size, `"dead_time=0.3"` at another
+        [units in docs/simulator.md].
     outside : str, optional
-        A term that is in nobody's library, for instance `"eddy_brake"`.
+        A term that no model of the library has, for instance `"eddy_brake"`.
     seed : int
-        Of every random draw; the same seed gives the same recordings.
+        Seed of every random draw; the same seed gives the same recordings.
     motor_id : str, optional
-        Serial number; the design and the seed without it.
+        Serial number; without it, the design and the seed.
     exact : bool
-        Instruments without gain errors.
+        Instruments without gain errors; noise remains.
     gates : mapping of mapping, optional
-        Options of the gates that validate the captures.
+        Options by gate [units in the gate's file].
 
     Returns
     -------
     Recordings
-        Validated as those of `read`; `truth` says what is true of the motor.
+        Validated like those of `read`; `truth` holds the true parameters.
 
     Raises
     ------
     UsageError
-        For a design, an effect or a size that there is not.
+        For an unknown design or effect, or an impossible size.
 
     Examples
     --------
