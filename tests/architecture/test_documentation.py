@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import re
 from pathlib import Path
 
 import numpy as np
@@ -85,3 +87,101 @@ def test_unbalance_is_one_wave_a_turn() -> None:
     wave = np.column_stack([np.sin(found.x), np.cos(found.x), np.ones_like(found.x)])
     rest = found.change - wave @ np.linalg.lstsq(wave, found.change, rcond=None)[0]
     assert np.std(rest) < 0.02 * np.std(found.change)
+
+
+PRIVATE = (
+    r"told|tells|telling|hears?|heard|hearing|rungs?|climb(?:s|ed)?|kin|crew|mate|crumbs?|"
+    r"wanders?|calm|misfit|guess(?:es)?|denied|rooms?|house|door|strangers?|rivals?|nibble|besides"
+)
+"""Words that have a standard term, or none that a newcomer knows."""
+CODE = re.compile(r"^(```|~~~).*?^\1|`[^`\n]*`", re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_page_has_a_private_word(page: Path) -> None:
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    found = re.findall(rf"\b(?:{PRIVATE})\b", text, flags=re.IGNORECASE)
+    assert found == []
+
+
+MANUALS = ["criticism", "uncertainty", "lots", "registry", "export", "review", "fleet", "simulator"]
+
+
+def prose(text: str) -> list[str]:
+    """The paragraphs of a page, list items each by itself, without tables, code and headings."""
+    text = re.sub(r"^(```|~~~).*?^\1", "", text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^(?: {4}.*|\|.*|#.*|!\[.*)$", "", text, flags=re.MULTILINE)
+    parts = re.split(r"\n\s*\n|\n(?=- |\d+\. )", text)
+    return [part for part in parts if re.search(r"\w", part)]
+
+
+def words(text: str) -> int:
+    return len(re.findall(r"\w[\w'./-]*", text))
+
+
+@pytest.mark.parametrize("name", MANUALS)
+def test_manuals_have_short_sentences_and_paragraphs(name: str) -> None:
+    parts = prose((DOCS / f"{name}.md").read_text(encoding="utf-8"))
+    sentences = [s for part in parts for s in re.split(r"(?<=[.:!?])\s+", part) if words(s)]
+    assert sum(map(words, sentences)) / len(sentences) <= 16.0
+    assert sum(map(words, parts)) / len(parts) <= 48.0
+
+
+def test_modules_that_the_manual_of_criticism_cites_are_there() -> None:
+    text = (DOCS / "criticism.md").read_text(encoding="utf-8")
+    cited = set(re.findall(r"`([a-z_]+/[a-z_]+(?:\.py)?)`", text))
+    cited |= set(re.findall(r"─ ([a-z_]+/[a-z_]+)", text))
+    assert len(cited) > 15
+    homes = (ROOT / "pipeline", ROOT / "pipeline" / "criticism")
+    lost = {c for c in cited if not any((h / c).with_suffix(".py").is_file() for h in homes)}
+    assert lost == set()
+
+
+ARCHITECTURE = (DOCS / "architecture.md").read_text(encoding="utf-8")
+BRANCH = re.compile(r"^((?:[│ ]  )*)(?:[├└]─ )?([a-z_]+(?:\.[a-z_]+)+)")
+
+
+def imported(module: str) -> set[str]:
+    """The modules of the package that a module imports, anywhere in its text."""
+    path = ROOT.joinpath("pipeline", *module.split("."))
+    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f"{node.module}.{one.name}" for one in node.names)}
+    return {name.removeprefix("pipeline.") for name in names}
+
+
+def arrows(tree: str) -> list[tuple[str, str]]:
+    """Parent and child of every branch of a text tree."""
+    found, above = [], []
+    for line in tree.splitlines():
+        match = BRANCH.match(line)
+        assert match, line
+        depth = len(match[1]) // 3 + ("─" in line)
+        above = [*above[:depth], match[2]]
+        found += [(above[-2], above[-1])] if depth else []
+    return found
+
+
+def test_the_walks_are_those_of_the_imports() -> None:
+    trees = re.findall(r"^```text\n(.*?)^```", ARCHITECTURE, flags=re.MULTILINE | re.DOTALL)
+    walks = [arrow for tree in trees for arrow in arrows(tree)]
+    assert len(trees) == 3 and len(walks) > 25
+    assert [(a, b) for a, b in walks if b not in imported(a)] == []
+
+
+def test_a_tree_is_read_as_it_is_drawn() -> None:
+    tree = "a.a\n├─ b.b   text\n│  └─ c.c\n└─ d.d\n   └─ e.e\n"
+    assert arrows(tree) == [("a.a", "b.b"), ("b.b", "c.c"), ("a.a", "d.d"), ("d.d", "e.e")]
+
+
+def test_every_package_is_in_the_table() -> None:
+    named = set(re.findall(r"^\| (.*?) \|", ARCHITECTURE, flags=re.MULTILINE)) - {"package", "---"}
+    names = {name for cell in named for name in re.findall(r"`([a-z_]+)`", cell)}
+    there = {
+        path.stem
+        for path in (ROOT / "pipeline").iterdir()
+        if (path / "__init__.py").is_file() or (path.suffix == ".py" and path.stem != "__init__")
+    }
+    assert names == there

@@ -135,8 +135,8 @@ def _sizes(rows: list[Judged]) -> list[Line]:
         made.append(_line(f"{line}: right", here, _right, least=right))
         made.append(_line(f"{line}: wrong with confidence", here, _wrong, most=wrong))
         made.append(_line(f"{line}: unknown", here, lambda row: row.mark == "unknown"))
-        made.append(_line(f"{line}: right, or told as too small to matter", here, _seen))
-        made.append(_line(f"{line}: another told as too small to matter", here, _misread))
+        made.append(_line(f"{line}: right, or reported as too small to matter", here, _seen))
+        made.append(_line(f"{line}: another reported as too small to matter", here, _misread))
         found = [row for row in here if row.right]
         made.append(_line(f"{line}: right, and a remainder that matters", found, _flagged))
         if line.endswith("a*"):
@@ -166,7 +166,7 @@ def _nulls(rows: list[Judged]) -> list[Line]:
         here = _of(rows, "null", line)
         made.append(_line(f"nothing hidden, {line}: not called adequate", here, _not_right))
     quiet = [row for row in _of(rows, "null") if row.right]
-    made.append(_line("nothing hidden: an effect told as too small to matter", quiet, _misread))
+    made.append(_line("nothing hidden: an effect reported as too small to matter", quiet, _misread))
     return made
 
 
@@ -186,7 +186,7 @@ def _others(rows: list[Judged]) -> list[Line]:
         _line("among 25 small others: wrong", _of(rows, "crowd"), _wrong),
         _line(f"wrong form: right name{_ANY}", forms, _all_found, least=0.95),
         _line(
-            "wrong form: remainder told, or none left",
+            "wrong form: remainder reported, or none left",
             forms,
             lambda row: row.left or bool(row.floor),
             least=1.0,

@@ -291,5 +291,5 @@ def test_a_slight_effect_is_missed_and_has_its_own_line():
     pairs = [(PLAIN, slight(("windage", 40.0, 0.2))), (PLAIN, slight(("cogging", 40.0, 0.2)))]
     shares = {line.what: (line.count, line.total) for line in lines(pairs)}
     assert shares["2 a*: right"] == (0, 2)
-    assert shares["2 a*: right, or told as too small to matter"] == (1, 2)
-    assert shares["2 a*: another told as too small to matter"] == (1, 2)
+    assert shares["2 a*: right, or reported as too small to matter"] == (1, 2)
+    assert shares["2 a*: another reported as too small to matter"] == (1, 2)

@@ -23,7 +23,7 @@ TOP = {
 GROUPS: Mapping[str, Sequence[str]] = {
     "Tutorials": ("notebooks/*", "tutorial-effect"),
     "How to": ("recorder-forms", "review", "registry", "export", "lots", "fleet"),
-    "Explanation": ("criticism", "uncertainty", "simulator", "real-recordings"),
+    "Explanation": ("architecture", "criticism", "uncertainty", "simulator", "real-recordings"),
     "Reference": ("api", "glossary", "policy", "gallery"),
     "Project": ("contributing", "changelog", "decisions/index"),
 }
