@@ -253,7 +253,8 @@ def compare(
     effects_path : str, optional
         Folder of your own effects, one file each.
     policy : mapping of mapping, optional
-        Constants of judgement that differ from the defaults: {section: {field: number}}.
+        Constants of judgement that differ from the defaults [units in docs/policy.md]:
+        `{section: {field: number}}`.
 
     Returns
     -------
@@ -314,6 +315,9 @@ def diagnose(
         Effects that are known to be present; a name with a leading `-` removes one.
     effects_path : str, optional
         Folder of your own effects, one file each.
+    policy : mapping of mapping, optional
+        Constants of judgement that differ from the defaults [units in docs/policy.md]:
+        `{section: {field: number}}`.
 
     Returns
     -------
