@@ -19,7 +19,7 @@ from typing import Any
 from pipeline.records.errors import UsageError
 
 PREFIX = "motor_datasheets"
-GROUPS = ("readers", "gates", "estimators", "rules", "exporters", "effects")
+GROUPS = ("readers", "gates", "estimators", "rules", "exporters", "effects", "equations")
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import combinations
 
+from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
+
 PAIRS = ("ab", "bc", "ca")
 LINE_VOLTAGES = tuple(f"v{pair}_v" for pair in PAIRS)
 LINE_CURRENTS = ("ia_a", "ib_a", "ic_a")
-TABLES_WITHOUT_TIME = frozenset({"lcr", "flux_map", "torque_table"})
 
 Alternative = tuple[str, ...]
 
@@ -91,7 +92,7 @@ def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
         fixed = (Requirement(terminals, anywhere), *fixed)
     if test == "heat_run":
         fixed = (Requirement((DQ, *terminals), f"vd_v, vq_v, id_a, iq_a or {anywhere}"), *fixed)
-    clock = () if test in TABLES_WITHOUT_TIME else _all("t_s")
+    clock = () if test in TESTS_WITHOUT_CLOCK else _all("t_s")
     return (*clock, *fixed)
 
 

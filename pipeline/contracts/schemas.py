@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from pipeline.contracts.requirements import TABLES_WITHOUT_TIME, requirements
-from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, Term
+from pipeline.contracts.requirements import requirements
+from pipeline.physics.glossary import COLUMNS, METADATA, TESTS, TESTS_WITHOUT_CLOCK, Term
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.errors import CaptureError, merged
 
@@ -174,7 +174,7 @@ def check_columns(capture: Capture) -> None:
             f"{test} needs {needs}; the file has {', '.join(sorted(there)) or 'none'}{blank}",
             "record what is missing, or map it in conf/source",
         )
-    if test not in TABLES_WITHOUT_TIME:
+    if test not in TESTS_WITHOUT_CLOCK:
         _every_table_has_a_clock(capture)
 
 

@@ -13,8 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
-from pipeline.criticism.data.segment import told_signal
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import TOO_LITTLE, enough, not_shown, verdict_of
 from pipeline.criticism.effect import Array
 from pipeline.criticism.ladder import parameters_of
@@ -22,6 +20,8 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.goodness import HeldOut, leave_out, remainder
 from pipeline.criticism.regression.linear_system import own_columns
+from pipeline.criticism.residuals.channels import reported_signal
+from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import End, ended
 from pipeline.criticism.selection.drift import wandering
 from pipeline.criticism.selection.requested_model import Begun, fit_of
@@ -99,7 +99,7 @@ def _residuals(begun: Begun) -> ModelVerdict:
     worst = None
     if left:
         first = max(left, key=lambda one: one.chi2_per_n)
-        names = {(s.capture, c): told_signal(s, c) for s in begun.segments for c in s.channels}
+        names = {(s.capture, c): reported_signal(s, c) for s in begun.segments for c in s.channels}
         signal = names[first.capture, first.signal]
         floors = math.sqrt(first.chi2_per_n)
         worst = Excess(first.capture, signal, first.order, floors, first.size, unit_of(signal))

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
-from pipeline.criticism.data.segment import Segment, told_signal
-from pipeline.criticism.data.segments import segments
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -18,6 +17,8 @@ from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.identifiability import combinations_told, parameters_told
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
 from pipeline.criticism.regression.mains_hum import told_hum
+from pipeline.criticism.residuals.channels import reported_signal
+from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.missing_data import at_ambient, unused
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
@@ -151,7 +152,7 @@ def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator
         out = bool(np.isfinite(held.residual[mine]).all())
         residual = held.residual[mine] if out else around.residual[mine]
         unit, soft = around.unit[mine], around.soft[mine]
-        signal = told_signal(found[number], channel)
+        signal = reported_signal(found[number], channel)
         yield SignalError(
             signal,
             found[number].capture,

@@ -9,11 +9,11 @@ from dataclasses import replace
 from scipy.special import gammaincc
 
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
-from pipeline.criticism.data.segment import Segment, told_signal
-from pipeline.criticism.data.segments import segments
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.ladder import parameters_of, rung_record
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.library.registry import effects
@@ -26,6 +26,8 @@ from pipeline.criticism.regression.goodness import (
 from pipeline.criticism.regression.identifiability import combinations_told
 from pipeline.criticism.regression.linear_system import System
 from pipeline.criticism.regression.mains_hum import told_hum
+from pipeline.criticism.residuals.channels import reported_signal
+from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import End, ended
 from pipeline.criticism.selection.alternatives import experiment_for, remedies, rivals_of
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
@@ -139,7 +141,9 @@ def _as_told(
     """All that is over its floor, first what is `left`, then what is too small to matter, with
     signals as outputs name them.
     """
-    names = {(s.capture, channel): told_signal(s, channel) for s in found for channel in s.channels}
+    names = {
+        (s.capture, channel): reported_signal(s, channel) for s in found for channel in s.channels
+    }
     small = [one for one in over_floor(around, found, around.residual) if one not in left]
     told = (*left, *(replace(one, matters=False) for one in small))
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
@@ -147,10 +151,8 @@ def _as_told(
 
 def enough(found: Sequence[Segment]) -> bool:
     """Whether there is a test under current and one that turns, or one that is both."""
-    kinds = {segment.kind for segment in found}
-    if kinds & {"dq", "q", "flux_map", "steady"}:
-        return True
-    return "terminal" in kinds and bool(kinds & {"shaft", "open"})
+    shown = frozenset[str]().union(*(equation_of(segment).use.shows for segment in found))
+    return shown >= {"current", "turning"}
 
 
 def _insufficient(

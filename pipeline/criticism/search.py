@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.library.named_models import model_of
@@ -17,6 +16,7 @@ from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.regression.linear_system import own_columns
+from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.drift import wandering
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import Begun, fit_of

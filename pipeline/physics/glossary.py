@@ -182,3 +182,5 @@ TESTS: dict[str, str] = {
     "drive": "everyday closed-loop log",
     "torque_table": "static table of torque and current",
 }
+TESTS_WITHOUT_CLOCK = frozenset({"lcr", "flux_map", "torque_table"})
+"""Tests whose captures are tables: their rows come in no time."""

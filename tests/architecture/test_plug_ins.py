@@ -13,6 +13,13 @@ import pytest
 from pipeline.contracts import gates as gates_package
 from pipeline.contracts.registry import gates
 from pipeline.contracts.validate import validate
+from pipeline.criticism import equations as equations_package
+from pipeline.criticism.effect import SCALES, Machine
+from pipeline.criticism.library.equations import equations
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.gauss_newton import start_values
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.residuals.segments import segments
 from pipeline.crosscheck import rules as rules_package
 from pipeline.crosscheck.registry import check_all, rules
 from pipeline.estimation import estimators as estimators_package
@@ -74,11 +81,22 @@ def read(text):
 EXPORTER = Exporter("dropped_in", "txt", "pole pairs", render, read)
 '''
 
+EQUATION = '''
+"""A flux map whose rows count twice."""
+from dataclasses import replace
+from pipeline.criticism.equations.flux_map import EQUATION as FLUX_MAP
+
+def cut(capture, machine):
+    return replace(FLUX_MAP.cut(capture, machine), kind="dropped_in")
+
+EQUATION = replace(FLUX_MAP, name="dropped_in", cut=cut)
+'''
+
 
 @pytest.fixture
 def drop_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
     """Puts one file into a package for the length of a test."""
-    registries = (estimators, rules, gates, exporters)
+    registries = (estimators, rules, gates, exporters, equations)
 
     def drop(package: ModuleType, source: str) -> None:
         (tmp_path / "dropped_in.py").write_text(source)
@@ -137,7 +155,25 @@ def test_an_exporter_is_one_file(drop_in: Callable[..., None]) -> None:
     assert exporters()["dropped_in"].read("7.0") == {"pole_pairs": 7.0}
 
 
+def test_an_equation_is_one_file(drop_in: Callable[..., None], capture: Capture) -> None:
+    """A capture of its test makes a segment more, and residuals are its own."""
+    machine = Machine(7, None, dict.fromkeys(SCALES, 1.0))
+    model = Model(machine, ())
+    drop_in(equations_package, EQUATION)
+    made = segments(Campaign("m", (capture,)), machine)
+    assert {segment.kind for segment in made} == {"flux_map", "dropped_in"}
+    values = start_values(model, machine)
+    first, second = (residual(segment, model, values) for segment in made)
+    assert (first == second).all()
+
+
 def test_packages_are_clean_again() -> None:
     """The tests above leave nothing behind."""
-    plugs = (*estimators(), *rules(), *gates(), *exporters().values())
+    plugs = (
+        *estimators(),
+        *rules(),
+        *gates(),
+        *exporters().values(),
+        *equations().values(),
+    )
     assert "dropped_in" not in {plug.name for plug in plugs}

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

@@ -10,11 +10,11 @@ import numpy as np
 
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.data.segments import segments
-from pipeline.criticism.equations.residuals import measured, residual
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.regression.goodness import leave_out, signal_errors
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.residuals.residual import measured, residual
+from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.execution.start import start_constants

@@ -19,6 +19,7 @@ GROUPS = {
     "rules": ("pipeline.crosscheck.registry", "rules"),
     "exporters": ("pipeline.export.registry", "exporters"),
     "effects": ("pipeline.criticism.library.registry", "effects"),
+    "equations": ("pipeline.criticism.library.equations", "equations"),
 }
 MARKS = {
     "gates": "GATE",
@@ -26,12 +27,41 @@ MARKS = {
     "rules": "RULE",
     "exporters": "EXPORTER",
     "effects": "EFFECT",
+    "equations": "EQUATION",
 }
 READER = """
 from pipeline.io.tables.foreign import Reader
 from pipeline.io.tables.raw_table import RawTable
 
 READER = Reader("hall_binary", lambda data: (RawTable("hall", {}),))
+"""
+
+HAND_TURN = """
+import json
+import numpy as np
+import polars as pl
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.residuals.segments import segments
+from pipeline.records.capture import Campaign, Capture, CaptureMeta
+from pipeline.records.constants import Constants
+
+t = 1e-3 * np.arange(4000)
+theta = 3.0 * (1.0 - np.cos(2.0 * t))
+eps = 7 * theta - 0.4
+flux = np.sqrt(3.0) * 0.0123 * np.exp(1j * (eps + np.pi / 6.0))
+volts = np.gradient(flux, t).real + 1e-3 * np.random.default_rng(1).normal(size=t.size)
+table = pl.DataFrame({"t_s": t, "vab_v": volts, "theta_mech_rad": theta})
+meta = CaptureMeta("m", "hand_turn", pole_pairs=7)
+capture = Capture("turn.csv", "0", "verified", meta, (table,))
+campaign = Campaign("m", (capture,))
+machine = machine_of(campaign, Constants())
+made = segments(campaign, machine)
+fitted, _ = first_fit(made, rough_fit(made, Model(machine, ())))
+left = residual(made[0], fitted.model, fitted.values)[0, 50:-50]
+print(json.dumps([made[0].kind, fitted.values["psi_wb"], float(np.std(left))]))
 """
 
 
@@ -83,6 +113,17 @@ def test_one_file_of_another_package_is_found(group: str, tmp_path: Path) -> Non
     there, count = json.loads(done.stdout)
     assert there
     assert count > 1
+
+
+def test_compare_holds_captures_against_an_equation_of_another_package(tmp_path: Path) -> None:
+    """A hand turn, which no equation of this package takes: its flux is that of its voltage."""
+    package(tmp_path, "equations", example("EQUATION"), "EQUATION")
+    done = python(tmp_path, "-c", HAND_TURN)
+    assert done.returncode == 0, done.stderr
+    kind, psi_wb, error_v = json.loads(done.stdout)
+    assert kind == "hand"
+    assert psi_wb == pytest.approx(0.0123, rel=1e-3)
+    assert error_v < 0.002
 
 
 @pytest.mark.parametrize(

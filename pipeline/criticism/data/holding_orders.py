@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.holding_segments import standing
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.data.holding_cells import holding_cells
+from pipeline.criticism.effect import Array
 from pipeline.records.capture import Capture
 
 _MOST = 12
@@ -85,15 +85,14 @@ def _joined(
     captures: Iterable[Capture],
 ) -> tuple[Array, Array, Array, NDArray[np.int64]] | None:
     """Angle, current, an offset a capture and sense, and the sector, of all cells."""
-    machine = Machine(1, None, {})
-    tables = [s for s in (standing(c, machine) for c in captures) if s is not None]
+    tables = [cells for cells in map(holding_cells, captures) if cells is not None]
     if not tables:
         return None
-    theta = np.concatenate([t.recorded["theta_mech_rad"] for t in tables])
-    current = np.concatenate([t.recorded["iq_a"] for t in tables])
-    label = np.concatenate([2 * n + (t.recorded["sense"] > 0) for n, t in enumerate(tables)])
+    theta = np.concatenate([t.theta_mech_rad for t in tables])
+    current = np.concatenate([t.iq_a for t in tables])
+    label = np.concatenate([2 * n + (t.sense > 0) for n, t in enumerate(tables)])
     side = (label[:, None] == np.unique(label)[None, :]).astype(float)
-    sector = np.concatenate([t.blocks for t in tables if t.blocks is not None])
+    sector = np.concatenate([t.sector for t in tables])
     return theta, current, side, sector
 
 

@@ -15,11 +15,12 @@ from pipeline.criticism.data.traces import LINES_V, tellable
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.orders import TURN_RAD
 from pipeline.physics.frames import vector_of_lines
+from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
-_TABLES = ("flux_map", "holding_current")
+_TABLES = (*sorted(TESTS_WITHOUT_CLOCK), "holding_current")
 _TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
 # orders a turn that a slow turn is searched for, and harmonics of the cogging order
@@ -60,6 +61,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
     voltage = voltage or flux * pole_pairs * speed
     # without a winding on record the torque's own size is all there is
     shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
+    clamped = _largest(tables, ("torque_shaft_nm",))
     current, voltage = current or 1.0, voltage or 1.0
     psi = voltage / (pole_pairs * speed)
     known = start.best("psi_pm_wb")
@@ -70,7 +72,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
         "voltage_v": voltage,
         "speed_rad_s": speed,
         "freq_hz": max(pole_pairs * speed / (2 * math.pi), 1.0),
-        "torque_nm": shaft or 1.5 * pole_pairs * psi * current,
+        "torque_nm": max(shaft or 1.5 * pole_pairs * psi * current, clamped),
         "period_s": period,
         "flux_wb": psi,
     }

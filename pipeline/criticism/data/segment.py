@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +14,8 @@ from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.projection import Projection
 from pipeline.records.capture import Capture
 
-Kind = Literal[
-    "dq", "q", "shaft", "motion", "open", "terminal", "lcr", "flux_map", "steady", "standing"
-]
 PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 """Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
-RECORDER: Mapping[Kind, str] = {
-    "dq": "log",
-    "q": "log",
-    "motion": "log",
-    "open": "open",
-    "shaft": "shaft",
-    "terminal": "step",
-}
-"""Whose clock the equations of a kind of segment go by (`effect.RECORDERS`); tables go by none."""
 _REFERENCE_DEGC = 25.0
 
 
@@ -47,7 +34,8 @@ class Sensors:
 class Segment:
     """One capture's signals [n] for one kind of equation, with its weak form.
 
-    `recorded` holds capture columns on an even clock of period `ts_s`; `noise` the standard
+    `kind` is the name of its equation (`equation.Equation`). `recorded` holds capture columns on an
+    even clock of period `ts_s`; `noise` the standard
     deviation of each one's sensor. `channels` are the equations: the recorded signal that each
     predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` and
     `ammeter` the nuisances that are the gains of its voltmeter and of its current sensors;
@@ -64,7 +52,7 @@ class Segment:
 
     capture: str
     test: str
-    kind: Kind
+    kind: str
     instrument: str
     timing: str
     ts_s: float
@@ -90,15 +78,9 @@ class Segment:
         return int(next(iter(self.recorded.values())).size)
 
 
-def told_signal(segment: Segment, channel: str) -> str:
-    """A channel as outputs name it: of a coasting shaft the equation gives an acceleration."""
-    coasting = segment.kind == "shaft" and channel == "omega_mech_rad_s"
-    return "alpha_mech_rad_s2" if coasting else channel
-
-
 def segment_of(
     capture: Capture,
-    kind: Kind,
+    kind: str,
     instrument: str,
     period: float,
     *,

@@ -15,6 +15,7 @@ from pipeline.criticism.data.segment import Sensors
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.projection import window_starts
+from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture
 
 if TYPE_CHECKING:
@@ -37,7 +38,6 @@ PAD = 24
 speed reach over."""
 _SHORTEST = 24
 """Fewest rows of a capture with a clock: three windows of eight, by judgement."""
-_WITHOUT_CLOCK = frozenset({"lcr", "flux_map"})
 _SLACK = 6.0
 """Standard deviations of the angle's noise that a shaft must turn back for a reversal."""
 _RIPPLE = 1.5
@@ -52,7 +52,7 @@ def tellable(capture: Capture) -> Capture | None:
     table = max(capture.tables, key=lambda t: (len(t.columns), t.height), default=None)
     if table is None or table.height == 0:
         return None
-    if capture.meta.test not in _WITHOUT_CLOCK and not _rises(table):
+    if capture.meta.test not in TESTS_WITHOUT_CLOCK and not _rises(table):
         return None
     kept = [[n for n in t.columns if _has_values(t, n, table)] for t in capture.tables]
     if all(set(names) <= {"t_s"} for names in kept):

@@ -10,9 +10,9 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment, electrical_orders, slow_orders
 from pipeline.criticism.effect import Array
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import Fitted
+from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.projection import projection, window_starts
 
 PLANNED = {

@@ -1,1 +1,1 @@
-"""What is measured, what the model predicts, and which parameters each kind of test observes."""
+"""The equation of one kind of test a file; each defines `EQUATION`."""

@@ -13,13 +13,13 @@ import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment, row_index
-from pipeline.criticism.data.segments import sparse
 from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.regression.bounds import Best, bounded_step, limits_of
 from pipeline.criticism.regression.linear_system import Fitted, System, floors, system
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import rough_floor
+from pipeline.criticism.residuals.segments import sparse
 
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),

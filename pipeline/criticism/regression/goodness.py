@@ -11,17 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtr
 
-from pipeline.criticism.data.segment import Segment, told_signal
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.linear_system import System
-from pipeline.criticism.regression.noise_floors import channel_scale
+from pipeline.criticism.residuals.channels import (
+    channel_of,
+    channel_scale,
+    largest_reading,
+    reported_signal,
+)
 from pipeline.records.diagnosis import Remainder
 
 _MOST_BLOCKS = 10_000
 """More than the blocks of any capture, so that every block has a number of its own."""
-_VOLTS = ("vd_v", "vq_v")
-"""Channels whose reading is little beside the machine's voltage at standstill."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +140,7 @@ def signal_errors(segments: Sequence[Segment], around: System, residual: Array) 
     """Rms error [unit of the signal] of each signal's window means."""
     found: dict[str, float] = {}
     plain = (
-        told_signal(segments[number], channel) if order == 0 else ""
+        reported_signal(segments[number], channel) if order == 0 else ""
         for number, channel, order in around.labels
     )
     names = np.array(list(plain))
@@ -227,11 +230,10 @@ def material_size(segment: Segment, channel: str, around: System, large: bool = 
 
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
     """
-    bench = segment.kind in ("terminal", "lcr", "flux_map", "standing")
-    fitted, policy = around.around, around.policy.goodness
-    scale = channel_scale(segment, channel, fitted.model, fitted.values)
-    size = (policy.material_bench if bench else policy.material) * scale
-    if segment.kind == "dq" and channel in _VOLTS and not large:
-        reading = max(float(np.abs(segment.recorded[name]).max()) for name in _VOLTS)
-        size = min(size, policy.material_reading * reading)
+    one, fitted = channel_of(segment, channel), around.around
+    policy = around.policy.goodness
+    scale = channel_scale(segment, channel, fitted.model.machine, fitted.values)
+    size = (policy.material if one.scale else policy.material_bench) * scale
+    if one.scale and one.beside and not large:
+        size = min(size, policy.material_reading * largest_reading(segment, one.beside))
     return size

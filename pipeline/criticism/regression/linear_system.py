@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Values
-from pipeline.criticism.equations.residuals import over_inertia
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
@@ -26,6 +25,7 @@ from pipeline.criticism.regression.linearise import (
 from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
 from pipeline.criticism.regression.normal_equations import Grams, misfit_of, pseudo_inverse
 from pipeline.criticism.regression.parallel import on_each
+from pipeline.criticism.residuals.channels import of_acceleration
 
 _SEED = 20260302
 _STEADY = ("psi_wb", "ld_h", "lq_h", "r_ohm")
@@ -293,7 +293,7 @@ def _with_known(
     """The system with the `known` columns of the one `before` put where its matrix is still open:
     over the noise of now, and those of a free shaft by its inertia of now.
     """
-    free = np.array([over_inertia(segments[n], channel) for n, channel, _ in now.labels])
+    free = np.array([of_acceleration(segments[n], channel) for n, channel, _ in now.labels])
     inertia = before.around.values["j_kgm2"] / now.around.values["j_kgm2"]
     lighter = np.where(free, inertia, 1.0)[now.group]
     places = [n for n, column in enumerate(now.columns) if column.key in known]

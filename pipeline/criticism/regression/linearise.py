@@ -12,18 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import RECORDER, Segment, projected, row_index
+from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
-from pipeline.criticism.equations.observability import HEARS, hears, hears_sensor
-from pipeline.criticism.equations.residuals import (
-    RIPPLES,
-    TORQUE_RIPPLES,
-    measured,
-    over_inertia,
-    predicted,
-    residual,
-)
-from pipeline.criticism.equations.true_signals import operate
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
     Model,
     Pieces,
@@ -39,9 +30,13 @@ from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.noise_floors import (
     offsets,
     reading_error,
-    told_unit,
     window_gain,
 )
+from pipeline.criticism.residuals.channels import of_acceleration, reported_unit
+from pipeline.criticism.residuals.observability import observes, observes_sensor
+from pipeline.criticism.residuals.residual import measured, operate, predicted, residual
+from pipeline.criticism.signals.shaft import TORQUE_RIPPLES
+from pipeline.criticism.signals.voltage import RIPPLES
 
 _CHUNK = 8
 """Columns that are projected at a time: more leave the processor's cache (of 32 a linearisation
@@ -105,7 +100,7 @@ def linearise(
     kept = _weak_columns(segment, sampler, columns, valid)
     both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * whiten[:, None]
     absorb(both, offsets(segment, valid, whiten, model.policy.noise_floors))
-    unit = told_unit(segment, values) / (whiten * window_gain(segment))
+    unit = reported_unit(segment, values) / (whiten * window_gain(segment))
     soft = floor * whiten
     return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
 
@@ -113,7 +108,7 @@ def linearise(
 def _weak_columns(
     segment: Segment, sampler: _Sampler, columns: Sequence[Column], valid: NDArray[np.bool_]
 ) -> Array:
-    """Weak samples [R, P] of every column, zero where the segment does not hear it."""
+    """Weak samples [R, P] of every column, zero where the segment does not observe it."""
     kept = np.zeros((int(valid.sum()), len(columns)))
     for first in range(0, len(columns), _CHUNK):
         some = enumerate(columns[first : first + _CHUNK], first)
@@ -174,6 +169,8 @@ class _Sampler:
 
     def __init__(self, segment: Segment, model: Model, values: dict[str, float]) -> None:
         self.segment, self.model, self.values = segment, model, values
+        self.observes = equation_of(segment).observes
+        self.recorder = equation_of(segment).recorder
         self.x = operate(segment, segment.recorded, model, values)
         pieces = self.pieces = evaluate(model, self.x, values)
         self.own: dict[str, Pieces] = {}
@@ -189,9 +186,9 @@ class _Sampler:
         """d(residual)/d(parameter) [C, n]; None where it is zero throughout."""
         if column.effect is None:
             return self._base(column)
-        if self.segment.kind == "lcr":
+        if self.observes.form == "neither":
             return self._anew(column, column.effect)
-        if not hears(self.segment, column.effect):
+        if not observes(self.segment, column.effect):
             return None
         if column.effect.hook == "sensor":
             return self._anew(column, column.effect)
@@ -200,7 +197,7 @@ class _Sampler:
     def _base(self, column: Column) -> Array | None:
         if column.name in self.gains:
             return self._gain(column)
-        if column.name not in HEARS[self.segment.kind].constants:
+        if column.name not in self.observes.constants:
             return None
         step = column.step
         if column.name == "j_kgm2":
@@ -214,7 +211,7 @@ class _Sampler:
         if column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved)
         there = predicted(self.segment, x, pieces, self.model, moved)
-        if column.name == "j_kgm2" and over_inertia(self.segment, self.segment.channels[-1]):
+        if column.name == "j_kgm2" and of_acceleration(self.segment, self.segment.channels[-1]):
             # the slope of 1/J, not of its chord: friction over inertia is known better than 1e-3
             step *= self.values[column.name] / moved[column.name]
         return -(there - self.start) / step
@@ -222,12 +219,12 @@ class _Sampler:
     def _gain(self, column: Column) -> Array | None:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
         heard = {
-            "gain_torque": hears_sensor(self.segment, "load"),
-            "gain_lcr": self.segment.kind == "lcr",
+            "gain_torque": observes_sensor(self.segment, "load"),
+            "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            "gain_clock": hears_sensor(self.segment, "clock"),
-            self.segment.meter: hears_sensor(self.segment, "voltage"),
-            self.segment.ammeter: hears_sensor(self.segment, "current"),
+            "gain_clock": observes_sensor(self.segment, "clock"),
+            self.segment.meter: observes_sensor(self.segment, "voltage"),
+            self.segment.ammeter: observes_sensor(self.segment, "current"),
         }
         if not heard.get(column.name, False):
             return None
@@ -245,8 +242,7 @@ class _Sampler:
         start = self._start(column, effect)
         moved = {**start, column.name: start[column.name] + column.step}
         if effect.clock is not None:
-            recorder = RECORDER.get(self.segment.kind)
-            gains = [clock_gain(recorder, model, values) for values in (start, moved)]
+            gains = [clock_gain(self.recorder, model, values) for values in (start, moved)]
             return self._along_time(column.step) * (gains[1] - gains[0]) / column.step
         change: Array = (self._there(effect, model, moved) - self.here) / column.step
         return change if np.any(change) else None
@@ -287,13 +283,14 @@ class _Sampler:
                 change.drop_v - before.drop_v,
                 change.drag_nm - before.drag_nm,
             )
-        if effect.hook == "torque" and self.segment.kind == "dq":
+        if effect.hook == "torque" and self.observes.torque_in:
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
-            drag[-1] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
+            place = self.segment.channels.index(self.observes.torque_in)
+            drag[place] = change.drag_nm * (1.0 + self.values["gain_torque"]) / column.step
             return drag if np.any(drag) else None
         plain = self.model.without(*(e.name for e in self.model.effects if e.shaft is not None))
-        if self.segment.kind in ("q", "shaft", "motion", "standing"):
+        if self.observes.form == "affine":
             still = self._pieces_of_nothing()
             there = predicted(self.segment, self.x, change, plain, self.values) - predicted(
                 self.segment, self.x, still, plain, self.values

@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import PAIR_RAD, Segment, clock
+from pipeline.criticism.data.segment import Segment, clock
 from pipeline.criticism.effect import Array, Machine, Values
-from pipeline.criticism.equations.residuals import disturbed, residual
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.regression import MainsHum
+from pipeline.criticism.residuals.residual import disturbed, residual
 
 LINES_HZ = (50.0, 60.0, 100.0, 120.0, 150.0, 180.0)
 """Mains of 50 and 60 Hz, and their second and third harmonics."""
@@ -34,8 +35,6 @@ _LOBE = 3
 _FINER = 2
 """Points of the spectrum a bin, by zeros behind the record: between bins a Hann window's line
 loses up to 1.4 dB, between these 0.35 dB."""
-_LINE_RAD = {"vab_v": PAIR_RAD["ab"], "vbc_v": PAIR_RAD["bc"], "vca_v": PAIR_RAD["ca"]}
-"""Where each line voltage of an open winding stands [rad, electrical]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +119,7 @@ def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Value
     lines = []
     for hum in mine:
         waves = hum.rms * _waves(segment, hum.freq_hz)
-        if segment.kind == "open":
+        if hum.signal not in segment.channels:
             lines.append(disturbed(segment, weak, model, values, hum.signal, waves))
             continue
         both = np.zeros((2, len(segment.channels), weak.starts.size, weak.orders.size))
@@ -133,20 +132,18 @@ def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Value
 
 
 def _sensors(segment: Segment) -> tuple[str, ...]:
-    """Signals that hum is in: the channels, of an open winding its line voltages."""
-    if segment.kind != "open":
-        return segment.channels
-    return tuple(name for name in _LINE_RAD if name in segment.recorded)
+    """Recorded signals that hum is in: the channels, or what they are made of."""
+    names = equation_of(segment).sensing.sensors
+    return tuple(name for name in names if name in segment.recorded) or segment.channels
 
 
-def _as_sensed(segment: Segment, model: Model, values: Values) -> dict[str, Array]:
+def _as_sensed(segment: Segment, model: Model, values: Values) -> Mapping[str, Array]:
     """Residual [n] of every sensor; what the rotor's frame turns at its speed, turned back."""
     left = residual(segment, model, values)
-    if segment.kind != "open":
-        return dict(zip(segment.channels, left, strict=True))
-    eps = model.machine.pole_pairs * segment.recorded["theta_mech_rad"] - values["bench_angle_rad"]
-    winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))
-    return {name: (winding * np.exp(-1j * _LINE_RAD[name])).real for name in _sensors(segment)}
+    sensed = equation_of(segment).sensing.sensed
+    if sensed is not None:
+        return sensed(segment, left, model, values)
+    return dict(zip(segment.channels, left, strict=True))
 
 
 def _in_currents(segment: Segment, mine: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:
@@ -276,7 +273,7 @@ def _whole(channel: str, machine: Machine) -> float:
 def _turns_at(segment: Segment, freq_hz: float, policy: MainsHum) -> bool:
     """Whether an order of a steadily turning shaft may make a line of this frequency."""
     theta = segment.recorded.get("theta_mech_rad")
-    if theta is None or segment.kind in ("terminal", "lcr"):
+    if theta is None:
         return False
     time = clock(segment)
     speed = np.gradient(theta, time) / (2.0 * math.pi)

@@ -12,10 +12,16 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
 from pipeline.criticism.effect import Array, Effect, Operating, Values
-from pipeline.criticism.equations.residuals import residual
-from pipeline.criticism.equations.true_signals import operate
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.policy.regression import NoiseFloors
+from pipeline.criticism.residuals.channels import (
+    channel_of,
+    channel_scale,
+    largest_reading,
+    reported_unit,
+)
+from pipeline.criticism.residuals.residual import operate, residual
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
@@ -73,11 +79,11 @@ def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
 def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
     """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
     _, _, _, groups = row_index(segment)
-    scales = [channel_scale(segment, channel, model, values) for channel, _ in groups]
+    scales = [channel_scale(segment, channel, model.machine, values) for channel, _ in groups]
     floor: Array = (
         model.policy.noise_floors.rough
         * window_gain(segment)
-        / told_unit(segment, values)
+        / reported_unit(segment, values)
         * np.array(scales)
     )
     return floor
@@ -122,29 +128,34 @@ def reading_error(
     weak, policy = segment.weak, model.policy.noise_floors
     if weak is None:
         return np.zeros((len(segment.channels), segment.size, 1))
-    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
-    sizes = []
-    for channel in segment.channels:
-        if channel == "torque_shaft_nm" and segment.kind == "dq":
-            sizes.append(kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"]))
-        elif channel in ("vd_v", "vq_v"):
-            names = ("vd_v", "vq_v") if segment.kind in ("dq", "q") else ("vab_v", "vbc_v")
-            present = [segment.recorded[n] for n in names if n in segment.recorded]
-            sizes.append(np.sqrt(sum(column**2 for column in present)))
-        else:
-            sizes.append(np.abs(segment.recorded.get(channel, np.zeros(segment.size))))
+    sensing = equation_of(segment).sensing
+    sizes = [
+        np.abs(segment.recorded.get(channel, np.zeros(segment.size)))
+        if sensing.reading is None
+        else sensing.reading(segment, channel, model, values)
+        for channel in segment.channels
+    ]
     reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
     reading[:, :, 0] = policy.reading * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
-    part = policy.model_drive if segment.kind in ("dq", "q", "motion") else policy.model_bench
-    scales = [channel_scale(segment, channel, model, values) for channel in segment.channels]
-    own = part * window_gain(segment) / told_unit(segment, values) * np.array(scales)[:, None, None]
+    part = policy.model_drive if segment.instrument == "drive" else policy.model_bench
+    scales = [
+        channel_scale(segment, channel, model.machine, values) for channel in segment.channels
+    ]
+    own = (
+        part
+        * window_gain(segment)
+        / reported_unit(segment, values)
+        * np.array(scales)[:, None, None]
+    )
     both: Array = np.hypot(reading, own)
-    if segment.kind == "dq" and "torque_shaft_nm" in segment.channels:
+    if "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
-        both[place] = np.hypot(both[place], _encoder_lines(segment, values, policy))
-        x = operate(segment, segment.recorded, model, values) if state is None else state
-        both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values, x))
-    if segment.kind == "dq":
+        if "encoder_lines" in sensing.errors:
+            both[place] = np.hypot(both[place], _encoder_lines(segment, values, policy))
+        if "standstill" in sensing.errors:
+            x = operate(segment, segment.recorded, model, values) if state is None else state
+            both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values, x))
+    if "voltage_jumps" in sensing.errors:
         jumps = _jumps(segment, policy)[:, None]
         for place, channel in enumerate(segment.channels):
             if channel in ("vd_v", "vq_v"):
@@ -227,21 +238,6 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
     return lines
 
 
-def channel_scale(segment: Segment, channel: str, model: Model, values: Values) -> float:
-    """The machine's own size in a channel's unit; of a bench meter its largest reading."""
-    if channel == "torque_shaft_nm":
-        return model.machine.scales["torque_nm"]
-    if channel == "omega_mech_rad_s" and segment.kind == "q":
-        return model.machine.scales["speed_rad_s"]
-    if channel == "omega_mech_rad_s":
-        return model.machine.scales["torque_nm"] / values["j_kgm2"]
-    if segment.kind in ("dq", "q", "open", "steady"):
-        return model.machine.scales["voltage_v"]
-    # an axis that stands still has the scale of the other one
-    beside = segment.channels if segment.kind == "flux_map" else (channel,)
-    return max(float(np.abs(segment.recorded[name]).max()) for name in beside)
-
-
 def offsets(
     segment: Segment, valid: NDArray[np.bool_], whiten: Array, policy: NoiseFloors
 ) -> list[Array]:
@@ -255,23 +251,16 @@ def offsets(
     if segment.weak is None:
         return []
     for place, channel in enumerate(segment.channels):
-        names = ("vab_v",) if segment.kind == "open" else (channel,)
-        prior = policy.offset * max((segment.noise.get(name, 0.0) for name in names), default=0.0)
-        if segment.kind == "terminal":
-            prior = math.hypot(
-                prior, policy.terminal_offset * float(np.abs(segment.recorded[channel]).max())
-            )
-        if segment.kind == "open" or prior == 0.0:
+        offset = channel_of(segment, channel).offset
+        prior = policy.offset * segment.noise.get(channel, 0.0)
+        if offset == "voltmeter":
+            prior = math.hypot(prior, policy.terminal_offset * largest_reading(segment, (channel,)))
+        if offset == "none" or prior == 0.0:
             continue
         constant = np.zeros((len(segment.channels), segment.size))
         constant[place] = prior
         made.append(projected(segment, constant)[valid] * whiten)
     return made
-
-
-def told_unit(segment: Segment, values: Values) -> float:
-    """The channel's own unit a unit of the residual: a free shaft's is an acceleration [rad/s²]."""
-    return values["j_kgm2"] if segment.kind == "motion" else 1.0
 
 
 def window_gain(segment: Segment) -> float:

@@ -10,11 +10,10 @@ import numpy as np
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Parameter, Told, Values, Whole
-from pipeline.criticism.equations.residuals import measured
-from pipeline.criticism.equations.true_signals import operate
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
 from pipeline.criticism.regression.gauss_newton import clipped, gauss_newton
 from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.residuals.residual import measured, operate
 
 
 def told_by_wholes(segments: Sequence[Segment], fitted: Fitted, effect: Effect) -> Told | None:

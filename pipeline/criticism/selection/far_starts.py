@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Parameter, Values
-from pipeline.criticism.equations.observability import hears
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
 from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
+from pipeline.criticism.residuals.observability import observes
 from pipeline.criticism.selection.score_test import (
     Candidate,
     Score,
@@ -118,7 +118,7 @@ def _moved(
     values = {**fitted.values, **candidate.values, **start}
     none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
     floors = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
-    heard = [number for number, segment in enumerate(segments) if hears(segment, effect)]
+    heard = [number for number, segment in enumerate(segments) if observes(segment, effect)]
     each = [(model, values, *floors[number], fitted.near) for number in heard]
     rows = on_each(_residual, [segments[number] for number in heard], each)
     residual = own.residual.copy()

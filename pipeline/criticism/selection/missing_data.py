@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.data.segments import TESTS
 from pipeline.criticism.effect import Effect
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.residuals.segments import known_tests
 from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
 from pipeline.criticism.selection.stepwise import Rung
 from pipeline.records.capture import Campaign
 from pipeline.records.diagnosis import Unexcited
 
-_WARMED = {"drop": ("dq", "q"), "flux": ("dq", "q", "open")}
-"""Equations in which what an effect of a hook does grows with a temperature while it changes."""
-
 
 def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
     """A note of the captures that no equation could use, none where all are used."""
     used = {segment.capture for segment in found}
-    idle = [c.path for c in campaign.captures if c.path not in used and c.meta.test in TESTS]
+    idle = [
+        c.path for c in campaign.captures if c.path not in used and c.meta.test in known_tests()
+    ]
     words = "without the signals of their test's equation, or an even stretch of samples"
     return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
 
@@ -31,8 +31,8 @@ def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
     notes = []
     for effect in model.effects:
         for name in (signal for signal in effect.signals if signal.startswith("temp_")):
-            kinds = _WARMED.get(effect.hook, ())
-            cold = {s.capture for s in found if s.kind in kinds and name not in s.recorded}
+            warmed = (s for s in found if effect.hook in equation_of(s).use.warms)
+            cold = {s.capture for s in warmed if name not in s.recorded}
             if cold:
                 where = ", ".join(sorted(cold))
                 notes.append(f"no {name}, taken to be at ambient temperature: {where}")

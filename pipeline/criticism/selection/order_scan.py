@@ -25,10 +25,11 @@ from scipy.ndimage import median_filter
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex
-from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.goodness import material_size
 from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.orders import TURN_RAD
 from pipeline.numerics.projection import Projection, bump
 
@@ -130,7 +131,9 @@ Line = tuple[float, Log]
 
 def _logs(segment: Segment, around: System) -> Iterator[Log]:
     weak, theta = segment.weak, segment.recorded.get("theta_mech_rad")
-    if segment.kind != "dq" or weak is None or theta is None or not (weak.orders > 0).any():
+    if not equation_of(segment).use.currents or weak is None or theta is None:
+        return
+    if not (weak.orders > 0).any():
         return
     weight = _weight(weak, segment.size)
     rows = list(_parts(theta, weight, around.policy.order_scan))

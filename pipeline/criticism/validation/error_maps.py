@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, slow_orders, told_signal
+from pipeline.criticism.data.segment import Segment, slow_orders
 from pipeline.criticism.effect import Array
-from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.validation import Validation
 from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.residuals.channels import reported_signal
+from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.cell_means import cell_means, visits_of
 from pipeline.physics.glossary import suffix_of
 from pipeline.physics.units import SUFFIX_UNITS
@@ -59,7 +61,7 @@ def window_errors(found: Sequence[Segment], around: System, whitened: Array) -> 
     for place, (number, channel, order) in enumerate(around.labels):
         mine = around.group == place
         if order == 0 and found[number].weak is not None and mine.any():
-            parts.setdefault(told_signal(found[number], channel), []).append((number, mine))
+            parts.setdefault(reported_signal(found[number], channel), []).append((number, mine))
     told = [window_variables(segment) for segment in found]
     return tuple(
         _errors_of(signal, groups, found, told, around, whitened)
@@ -226,8 +228,8 @@ def angle_maps(found: Sequence[Segment], fitted: Fitted) -> tuple[ErrorMap, ...]
 
 def _turns(segment: Segment) -> bool:
     theta = segment.recorded.get("theta_mech_rad")
-    turning = segment.kind in ("dq", "open", "shaft")
-    return theta is not None and turning and float(np.ptp(theta)) > 0.1
+    mapped = equation_of(segment).use.angle_maps
+    return theta is not None and mapped and float(np.ptp(theta)) > 0.1
 
 
 def _mechanical_cells(model: Model) -> int:
@@ -247,8 +249,9 @@ def _by_angle(
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(2, weak.length - 2)[None, :]
     window = np.broadcast_to(first + np.arange(starts.size)[:, None], rows.shape).ravel()
+    own_zero = "bench_angle_rad" in equation_of(segment).observes.constants
     # the bench's encoder has a zero of its own, which is known as an electrical angle alone
-    zero_rad = fitted.values["bench_angle_rad"] if segment.kind == "open" else 0.0
+    zero_rad = fitted.values["bench_angle_rad"] if own_zero else 0.0
     turned = {
         "theta_elec_rad": fitted.model.machine.pole_pairs * theta - zero_rad,
         "theta_mech_rad": theta,
@@ -262,7 +265,7 @@ def _by_angle(
             cell = np.minimum((share * cells[variable]).astype(np.int64), cells[variable] - 1)
             error = inside.ravel()
             part = (error, np.full(error.size, noise), cell.astype(float), window.astype(float))
-            yield told_signal(segment, channel), variable, part
+            yield reported_signal(segment, channel), variable, part
 
 
 def disjoint(starts: NDArray[np.int64], length: int) -> NDArray[np.int64]:

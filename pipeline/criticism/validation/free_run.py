@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex, Values
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.validation.trajectories import (
     Batch,
@@ -29,8 +30,6 @@ from pipeline.criticism.validation.trajectories import (
 )
 from pipeline.numerics.projection import bump
 
-ELECTRICAL = ("torque_map", "drive")
-MECHANICAL = ("spin_down",)
 SPEED = "omega_mech_rad_s"
 _OFFSETS = ("vd_v", "vq_v", "id_a", "iq_a", "torque_shaft_nm")
 """Signals whose sensors may have an offset."""
@@ -77,13 +76,14 @@ class Run:
 def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     """The model on its own over the windows of one capture.
 
-    None if the test is neither `ELECTRICAL` nor `MECHANICAL`, if the sample period is longer than
-    the electrical time constant, or if fewer than half of the trajectories settle.
+    None if the equation has no free run of the test (`equation.Use`), if the sample period is
+    longer than the electrical time constant, or if fewer than half of the trajectories settle.
     """
-    if segment.test not in (ELECTRICAL if segment.kind == "dq" else MECHANICAL):
+    use = equation_of(segment).use
+    if segment.test not in use.free_runs:
         return None
     still = segment.ts_s * values["r_ohm"] > min(values["ld_h"], values["lq_h"])
-    batch = None if still and segment.kind == "dq" else batch_of(segment, model, values)
+    batch = None if still and use.currents else batch_of(segment, model, values)
     if batch is None:
         return None
     recorded = batch.segment.recorded

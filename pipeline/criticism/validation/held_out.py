@@ -12,10 +12,11 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.effect import Array
-from pipeline.criticism.equations.residuals import residual
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.regression.gauss_newton import clipped
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import disjoint, unit_of
 from pipeline.criticism.validation.free_run import Run, free_run
 from pipeline.records.comparison import SignalError, Trace
@@ -94,7 +95,7 @@ def traces(
     """Recorded and predicted signals of the simulated captures, window by window."""
     for one in simulated:
         segment, run = found[one.number], one.run
-        if segment.kind == "dq":
+        if equation_of(segment).use.currents:
             yield from _equations(segment, fitted, one)
         for signal in run.signals:
             told, made = run.recorded[signal], run.simulated[signal]

@@ -19,17 +19,17 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex, Operating, Values
-from pipeline.criticism.equations.residuals import measured, predicted
-from pipeline.criticism.equations.true_signals import operate
+from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model, air_gap_torque, evaluate
 from pipeline.criticism.regression.noise_floors import reading_error
+from pipeline.criticism.residuals.residual import measured, operate, predicted
 from pipeline.criticism.validation.error_maps import disjoint
 
 _STATE = ("id_a", "iq_a", "theta_mech_rad")
 _PAD = 23
 """Samples kept around a window: one less than a thinned log has there (`traces.PAD`)."""
 _START_S = 0.002
-"""Length [s] of the straight line that tells the first speed, as of `true_signals._SPEED_S`."""
+"""Length [s] of the straight line that tells the first speed, as of `true_state._SPEED_S`."""
 _PROBE = 1e-3
 """Step of the finite differences, as a share of the machine's scale [A, rad/s], and in electrical
 radians: small against what bends the equations, large against rounding."""
@@ -53,7 +53,7 @@ class Batch:
     @property
     def currents(self) -> bool:
         """Whether the capture is under current, so that there is a flux to integrate."""
-        return self.segment.kind == "dq"
+        return bool(equation_of(self.segment).use.currents)
 
     def folded(self, column: Any) -> Any:
         """A column [n], real or complex, by window [W, n / W]."""
@@ -81,7 +81,8 @@ def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
     gain = float(weak.functions[0, 0].sum())
     chosen = np.searchsorted(weak.starts, starts)
     allowed = reading_error(segment, model, values)[:, chosen, 0] / gain
-    shaft = segment.kind == "shaft" or "torque_shaft_nm" in segment.channels
+    currents = equation_of(segment).use.currents
+    shaft = not currents or "torque_shaft_nm" in segment.channels
     short = replace(segment, recorded=cut, weak=None)
     return Batch(short, starts.size, length, pad, shaft, allowed)
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.choices import reconsidered
 from tests.unit.criticism.machines import BASE, log, machine
 

@@ -9,13 +9,14 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.segment import RECORDER
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.effect import RECORDERS
-from pipeline.criticism.equations.residuals import over_inertia, residual
+from pipeline.criticism.library.equations import equations
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, clock_gain
+from pipeline.criticism.residuals.channels import of_acceleration
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -49,6 +50,9 @@ def recorded(
     whole = campaign_of(campaign(plain, bench, seed, plan))
     captures = (on_clock(c, factor) if c.meta.test in tests else c for c in whole.captures)
     return replace(whole, captures=tuple(captures))
+
+
+RECORDER = {name: one.recorder for name, one in equations().items() if one.recorder}
 
 
 @pytest.mark.parametrize("kind", RECORDER)
@@ -89,7 +93,7 @@ def test_the_true_gain_undoes_a_wrong_clock_in_every_equation():
         there = residual(wrong, model, {**base, **gain})
         for channel, a, b in zip(one.channels, here, there, strict=True):
             # an acceleration is told by the recorded clock
-            told_by = FAST**2 if over_inertia(one, channel) else 1.0
+            told_by = FAST**2 if of_acceleration(one, channel) else 1.0
             assert b * told_by == pytest.approx(a, abs=1e-9 * np.abs(a).max()), (one.kind, channel)
             unaware = residual(wrong, plain, base)
             assert one.test in STILL or np.abs(unaware - here).max() > 1e-3 * np.abs(here).max()

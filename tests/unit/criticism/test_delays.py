@@ -9,11 +9,11 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.effect import Recorded, between
-from pipeline.criticism.equations.true_signals import ahead_in
 from pipeline.criticism.library.registry import effects
+from pipeline.criticism.residuals.segments import segments
+from pipeline.criticism.signals.true_state import ahead_in
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import (
     Errors,
     angle_maps,

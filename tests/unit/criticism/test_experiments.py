@@ -13,12 +13,12 @@ from pipeline.criticism.design import experiments
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.design.planned_tests import PLANNED, planned
 from pipeline.criticism.effect import Parameter
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, floors
 from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, widened
 from tests.unit.criticism.machines import BASE, log, machine
 

@@ -8,9 +8,9 @@ import pytest
 
 from pipeline.criticism.data.instruments import gains_of, stated_u
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.machine.model import Model, base_of
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 

@@ -11,8 +11,8 @@ import pytest
 
 from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of, pole_pairs_of
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.residuals.segments import segments
 from pipeline.execution.start import start_constants
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec

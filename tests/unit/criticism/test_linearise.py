@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import row_index
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linear_system import Fitted, _kept, floors, own_columns, system
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
+from pipeline.criticism.residuals.residual import residual
 from tests.unit.criticism.machines import BASE, log, machine
 
 PLAIN = Model(machine(), ())

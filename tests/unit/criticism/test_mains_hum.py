@@ -174,6 +174,7 @@ def spin(seed, rms=0.0, freq=50.0, zero_rad=0.3, n=40_000, rad_s=43.7):
         log(n),
         capture=f"spin_{seed}.mcap",
         kind="open",
+        instrument="bench",
         test="open_circuit",
         recorded={**lines, "theta_mech_rad": theta},
         noise={**dict.fromkeys(lines, 5e-3), "theta_mech_rad": 1e-6},

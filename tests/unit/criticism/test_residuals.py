@@ -9,12 +9,14 @@ import pytest
 
 from pipeline.criticism.data.segment import projected, row_index, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.equations.residuals import _averaged, residual
-from pipeline.criticism.equations.true_signals import finer_of
+from pipeline.criticism.equations.free_shaft import _FINEST
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, mean_current, zero
 from pipeline.criticism.regression.linearise import effect_columns, linearise
 from pipeline.criticism.regression.noise_floors import noise_floor, reading_error
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.signals.shaft import _averaged
+from pipeline.criticism.signals.true_state import finer_of
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, coasting, log, machine, operating
 
@@ -263,7 +265,7 @@ def test_a_coasting_sample_is_averaged_over_parts_enough(turn_rad):
     order = max(slow_orders(machine()))
     theta = np.arange(40) * turn_rad / order
     segment = replace(coasting(), recorded={"theta_mech_rad": theta})
-    finer = finer_of(segment, machine())
+    finer = finer_of(segment, machine(), _FINEST)
     turned = np.arange(40 * finer) * turn_rad / order / finer
     x = replace(operating(), theta_rad=turned, inverter=False, finer=finer)
     mean = _averaged(x.shaft_waves(order)[0], finer)

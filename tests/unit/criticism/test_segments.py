@@ -10,10 +10,10 @@ import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import clock, projected
-from pipeline.criticism.data.segments import segments
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.noise_floors import window_gain
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.validation.free_run import free_run
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants

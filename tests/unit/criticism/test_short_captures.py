@@ -9,13 +9,15 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.segments import TESTS, segments
 from pipeline.criticism.data.traces import tellable
+from pipeline.criticism.residuals.segments import known_tests, segments
+from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 
 SIGNALS = ("id_a", "iq_a", "vd_v", "vq_v", "ia_a", "vab_v", "vbc_v", "torque_shaft_nm")
 TABLES = ("lab_h", "rab_ohm", "psi_d_wb", "psi_q_wb")
+TESTS = known_tests()
 TOO_SHORT = (0, 1, 2, 8, 20)
 
 
@@ -37,10 +39,10 @@ def made_of(one: Capture):
 @pytest.mark.parametrize("test", sorted(TESTS))
 def test_a_capture_of_a_few_rows_is_left_out(test, n):
     found = made_of(capture(test, n, 1e-3 * np.arange(n), 0.03 * np.arange(n)))
-    assert found == () or test in ("lcr", "flux_map")
+    assert found == () or test in TESTS_WITHOUT_CLOCK
 
 
-@pytest.mark.parametrize("test", sorted(TESTS - {"lcr", "flux_map"}))
+@pytest.mark.parametrize("test", sorted(TESTS - TESTS_WITHOUT_CLOCK))
 @pytest.mark.parametrize("stopped", [np.zeros(400), np.repeat(np.arange(200.0), 2)])
 def test_a_capture_whose_clock_does_not_rise_is_left_out(test, stopped):
     assert made_of(capture(test, 400, stopped, 0.03 * np.arange(400))) == ()

@@ -8,22 +8,27 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.data.drive_segments import q_log
 from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
-from pipeline.criticism.data.holding_segments import standing
-from pipeline.criticism.data.segments import segments
-from pipeline.criticism.data.table_segments import flux_table, levels_of, set_levels
+from pipeline.criticism.data.levels import levels_of, set_levels
+from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.effect import Machine
+from pipeline.criticism.library.equations import equations
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, values_of
 from pipeline.criticism.regression.bounds import bounded_step, limits_of
 from pipeline.criticism.regression.linearise import Column
+from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 
 MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
+
+
+def cut(name: str, one: Capture) -> Segment | None:
+    """The segment that an equation cuts out of a capture."""
+    return equations()[name].cut(one, MACHINE)
 
 
 def capture(test: str, **columns) -> Capture:
@@ -43,7 +48,7 @@ def held(orders: dict[int, float], noise: float, seed: int = 1) -> Capture:
 
 
 def test_cells_of_a_held_rotor_keep_the_sense_of_arrival_and_their_own_noise():
-    segment = standing(held({30: 0.1}, 0.01), MACHINE)
+    segment = cut("standing", held({30: 0.1}, 0.01))
     forward = segment.recorded["sense"] > 0
     assert abs(forward.sum() - (~forward).sum()) <= 2
     mean = segment.recorded["iq_a"][forward].mean()
@@ -61,7 +66,7 @@ def test_cells_of_a_row_or_two_have_the_noise_of_their_neighbours(every):
     resting = np.random.default_rng(3).normal(0.0, 0.1, (2, 40))
     theta = np.concatenate([np.zeros(40), theta, np.zeros(40)])
     current = np.concatenate([resting[0], current, resting[1]])
-    segment = standing(capture("holding_current", theta_mech_rad=theta, iq_a=current), MACHINE)
+    segment = cut("standing", capture("holding_current", theta_mech_rad=theta, iq_a=current))
     a_cell = max(6000 / every / 1024, 1.0)
     assert segment.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(a_cell), rel=0.35)
 
@@ -78,7 +83,7 @@ def test_a_small_part_of_a_turn_tells_of_no_order(sectors):
     theta = np.linspace(0.01, sectors * 2.0 * np.pi / 24.0 - 0.01, 6000)
     current = 0.05 + np.random.default_rng(1).normal(0.0, 0.01, theta.size)
     part = capture("holding_current", theta_mech_rad=theta, iq_a=current)
-    assert set(standing(part, MACHINE).blocks.tolist()) == set(range(sectors))
+    assert set(cut("standing", part).blocks.tolist()) == set(range(sectors))
     assert holding_orders([part], (5, 6)) == ()
 
 
@@ -119,7 +124,7 @@ def test_one_level_with_noise_is_one_level(set_a):
     assert set_levels(current).max() == 0
     volts = 0.05 * speed + random.normal(0.0, 1e-3, 30)
     table = capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts)
-    assert flux_table(table, MACHINE).offsets.shape == (1, 30)
+    assert cut("steady", table).offsets.shape == (1, 30)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3, 0.1])
@@ -148,22 +153,20 @@ def test_a_sweep_of_one_axis_has_noise_on_the_other():
     """i_q = 0 throughout, and ψ_q with it: noise of no range at all would be none."""
     sweep, still = np.linspace(-10.0, 10.0, 21), np.zeros(21)
     columns = {"id_a": sweep, "iq_a": still, "psi_d_wb": 0.02 + 3e-4 * sweep, "psi_q_wb": still}
-    told = flux_table(capture("flux_map", **columns), MACHINE)
+    told = cut("flux_map", capture("flux_map", **columns))
     assert told.noise["id_a"] == pytest.approx(0.02)
     assert told.noise["psi_d_wb"] == pytest.approx(6e-6)
     assert told.noise["iq_a"] == pytest.approx(0.1 * told.noise["id_a"])
     assert told.noise["psi_q_wb"] == pytest.approx(0.1 * told.noise["psi_d_wb"])
     standing_still = {**columns, "psi_d_wb": np.full(21, 0.02)}
-    assert flux_table(capture("flux_map", **standing_still), MACHINE) is None
+    assert cut("flux_map", capture("flux_map", **standing_still)) is None
 
 
 def test_steady_voltages_have_an_offset_a_level_and_are_held_out_by_level():
     current = np.repeat([0.0, -4.0, -8.0, -12.0], 6)
     speed = np.tile(np.linspace(50.0, 100.0, 6), 4)
     volts = 0.1 * (current == 0.0) + 5 * speed * (0.01 + 1e-4 * current)
-    segment = flux_table(
-        capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts), MACHINE
-    )
+    segment = cut("steady", capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts))
     assert segment.kind == "steady"
     assert segment.offsets.shape == (4, 24)
     assert segment.blocks.tolist() == levels_of(current).tolist()
@@ -181,13 +184,13 @@ def test_readings_that_came_late_are_set_aside_in_a_log_of_the_q_axis():
         theta_mech_rad=theta,
         omega_mech_rad_s=np.full(4000, 20.0),
     )
-    voltage, motion = q_log(log, MACHINE)
+    voltage, motion = cut("q", log), cut("motion", log)
     assert voltage.channels == ("vq_v", "omega_mech_rad_s")
     assert motion.channels == ("torque_shaft_nm",)
     starts, length = voltage.weak.starts, voltage.weak.length
     assert not np.any((starts <= 2003) & (starts + length > 2003))
     assert starts.min() < 500 and starts.max() > 3500
-    assert q_log(capture("drive", t_s=time, vq_v=theta, iq_a=theta), MACHINE) is None
+    assert cut("q", capture("drive", t_s=time, vq_v=theta, iq_a=theta)) is None
 
 
 @dataclass

@@ -11,12 +11,11 @@ import pytest
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect, Operating, Parameter, Told, Values
-from pipeline.criticism.equations.residuals import residual
-from pipeline.criticism.equations.true_signals import operate
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.regression.linear_system import Fitted, System, system
 from pipeline.criticism.regression.linearise import base_columns
+from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.selection.discrimination import told_by_wholes
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine, operating

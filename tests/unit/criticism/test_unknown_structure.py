@@ -14,12 +14,12 @@ from pipeline.criticism.discovery.dictionary import CENTRED, SHAPES, Term
 from pipeline.criticism.discovery.residual_inputs import ports, refined
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect, Parameter
-from pipeline.criticism.equations.residuals import residual
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.residuals.residual import residual
 from tests.unit.criticism.machines import BASE, fitted, log, machine, operating, with_drag
 
 

@@ -11,12 +11,12 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.data.segments import segments
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
 from pipeline.criticism.regression.parallel import by_threads, on_each
+from pipeline.criticism.residuals.segments import segments
 from pipeline.execution.pools import core_count
 from pipeline.execution.segment_worker import halves, segment_worker
 from pipeline.records.capture import Campaign, Capture, CaptureMeta

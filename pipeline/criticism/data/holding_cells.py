@@ -1,15 +1,15 @@
-"""A rotor held at many angles: the holding current, averaged in cells of angle and sense."""
+"""The current that holds a rotor at many angles, averaged in cells of angle and sense."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.data.sensor_noise import sensor_noise
-from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.effect import Array
 from pipeline.numerics.orders import TURN_RAD, passes
 from pipeline.records.capture import Capture
 
@@ -25,8 +25,21 @@ _ENOUGH = 0.5
 scatter otherwise than the rest."""
 
 
-def standing(capture: Capture, _: Machine) -> Segment | None:
-    """Mean angle, current and sense of arrival of every cell; sectors are held out one by one.
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Mean angle [n, rad], current [n, A] and sense of arrival [n] of every cell, with the sector
+    of the turn [n]; `noise_a` is the standard deviation of a cell's mean.
+    """
+
+    theta_mech_rad: Array
+    iq_a: Array
+    sense: Array
+    sector: NDArray[np.int64]
+    noise_a: float
+
+
+def holding_cells(capture: Capture) -> Cells | None:
+    """The cells of a holding current; None where there are too few.
 
     The noise of a cell's mean comes from the scatter within cells about a straight line, with its
     correlation from sample to sample; a loop that holds does not repeat better than that. Where
@@ -45,20 +58,8 @@ def standing(capture: Capture, _: Machine) -> Segment | None:
     if not rows or sum(len(r) for r in rows) < _SECTORS:
         return None
     table = np.concatenate(rows)
-    recorded = {"theta_mech_rad": table[:, 0], "iq_a": table[:, 1], "sense": table[:, 2]}
-    noise = {"iq_a": _noise(spread, [cells[:, 1] for cells in rows])}
-    sectors = sectors_of(table[:, 0])
-    return segment_of(
-        capture,
-        "standing",
-        "drive",
-        1.0,
-        found=recorded,
-        sensors=Sensors(noise),
-        channels=("iq_a",),
-        weak=None,
-        blocks=sectors,
-    )
+    noise = _noise(spread, [cells[:, 1] for cells in rows])
+    return Cells(table[:, 0], table[:, 1], table[:, 2], sectors_of(table[:, 0]), noise)
 
 
 def _cells(theta: Array, current: Array) -> tuple[Array, list[Array]]:

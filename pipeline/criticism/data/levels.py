@@ -1,0 +1,51 @@
+"""Levels that a table's current was set to, noise and all."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.effect import Array
+
+_ROWS_A_LEVEL = 3
+"""Rows a level on the average: two make a straight line, a third its scatter."""
+_CLEAR_OF_NOISE = 2.0
+"""Widths of the widest level that levels must be apart. By judgement: at 1 noise parts a level."""
+
+
+def set_levels(current: Array) -> NDArray[np.int64]:
+    """Number of the level [n] that was set for each current, noise and all.
+
+    The rows are parted as finely as leaves three rows a level on average, and levels further from
+    each other than twice the width of the widest. If there is no such parting, all are one level.
+    """
+    gaps = np.diff(np.sort(current))
+    gaps = gaps[gaps > _apart(current, 0.0)]
+    for least in np.unique(np.append(gaps, 0.0)):
+        levels = levels_of(current, float(least))
+        count = int(levels.max(initial=0)) + 1
+        if current.size < _ROWS_A_LEVEL * count:
+            continue
+        widest = max(float(np.ptp(current[levels == k])) for k in range(count))
+        if gaps[gaps > least].min(initial=math.inf) > _CLEAR_OF_NOISE * widest:
+            return levels
+    return np.zeros(current.size, dtype=np.int64)
+
+
+def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
+    """Number of the level [n] that each current is at; levels are parted by a gap between them.
+
+    A gap is a step of the sorted currents over a hundredth of their range, and over `least`.
+    """
+    order = np.argsort(current, kind="stable")
+    parted = np.diff(current[order]) > _apart(current, least)
+    number = np.concatenate([[0], np.cumsum(parted)])
+    levels = np.empty(current.size, dtype=np.int64)
+    levels[order] = number
+    return levels
+
+
+def _apart(current: Array, least: float) -> float:
+    return max(1e-2 * float(np.ptp(current)), least)

@@ -1,0 +1,70 @@
+"""A drive's log of the q axis alone, on an even clock: voltage, current and the shaft's motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Sensors
+from pipeline.criticism.data.traces import even_clock, prepared, shaft_angle
+from pipeline.criticism.effect import Array, Machine
+from pipeline.records.capture import Capture
+
+_BLOCKS = 12
+"""Parts that a log is held out in: by judgement. Fewer leave little to fit, more
+are like their neighbours."""
+_STALE, _LATE = 12, 1.5
+"""Samples given up before a reading that came late, and twice as many from it on; periods from
+which on it did. By judgement: what a host reads after a hold-up is of before."""
+_MOTION = ("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad")
+
+
+@dataclass(frozen=True, slots=True)
+class QLog:
+    """Columns [n] on an even clock, samples to keep [n], and what the recording says of its
+    sensors; `speed` and `angle`: whether the log holds the drive's own speed, and an angle.
+    """
+
+    period_s: float
+    columns: dict[str, Array]
+    keep: NDArray[np.bool_]
+    sensors: Sensors
+    speed: bool
+    angle: bool
+
+
+def q_log(capture: Capture, machine: Machine) -> QLog | None:
+    """The log of a drive that tells of the q axis alone; None of any other."""
+    moving = [name for name in _MOTION if capture.has(name)]
+    if capture.has("vd_v", "vq_v", "id_a", "iq_a") or not moving:
+        return None
+    period, found, keep = even_clock(capture, ("vq_v", "iq_a", *moving))
+    keep &= _on_time(capture, period, keep.size)
+    speed = found.get("omega_mech_rad_s")
+    shaft_angle(found, period, machine)
+    if speed is not None:
+        found["omega_mech_rad_s"] = speed
+    told = prepared(found, period)
+    angle = any("theta" in name for name in moving)
+    return QLog(period, found, keep, told, speed is not None, angle)
+
+
+def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:
+    """Samples [size] of the even clock that are not near a reading that came late.
+
+    A host that was held up reads again at once, and then gets old values.
+    """
+    time = capture.arrays("t_s", masked=False)["t_s"]
+    gaps = np.diff(time)
+    odd = np.flatnonzero((gaps > _LATE * period) | (gaps < period / _LATE / 2))
+    on_time = np.ones(size, dtype=bool)
+    for at in np.round((time[odd] - time[0]) / period).astype(np.int64).tolist():
+        on_time[max(at - _STALE, 0) : at + 2 * _STALE] = False
+    return on_time
+
+
+def in_time(middle: Array | NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    """Number of the twelfth of the capture's rows that each window's middle [W] is in."""
+    return np.minimum((middle * _BLOCKS // size).astype(np.int64), _BLOCKS - 1)

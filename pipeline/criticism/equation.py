@@ -1,0 +1,162 @@
+"""What an equation is: the physics that a kind of test is held against.
+
+An equation takes the captures of its tests as segments, says what their sensors should have shown
+by the machine's model, and what that tells of the model. It is one file in `equations/` with one
+`EQUATION`; CONTRIBUTING.md shows how to add one, here or in a package of your own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.records.capture import Capture
+
+Signals = Mapping[str, Array]
+Cut = Callable[[Capture, Machine], Segment | None]
+State = Callable[[Segment, Signals, Model, Values], Operating]
+Measured = Callable[[Segment, Signals, Model, Values], Array]
+Predicted = Callable[[Segment, Operating, Pieces, Model, Values], Array]
+Reading = Callable[[Segment, str, Model, Values], Array]
+Sensed = Callable[[Segment, Array, Model, Values], Mapping[str, Array]]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One scalar equation of a segment: a signal that is predicted, and how large its errors are.
+
+    `name` is the recorded signal. `scale` names the entry of `Machine.scales` that is the machine's
+    own size in it; without one it is a bench meter's, and its size the largest reading of it and of
+    those `beside` it (an axis that stands still has the size of the other). With both, an error
+    also matters that is large beside the readings. `reported` is the signal's name in outputs, if
+    another. `acceleration`: the residual is one of a free shaft's acceleration [rad/s²];
+    `as_torque`: it is reported times the inertia [N·m]. `offset`: what a sensor may be off by in a
+    whole capture; a bench voltmeter has a zero besides its noise.
+    """
+
+    name: str
+    scale: str = ""
+    beside: tuple[str, ...] = ()
+    reported: str = ""
+    acceleration: bool = False
+    as_torque: bool = False
+    offset: Literal["noise", "voltmeter", "none"] = "noise"
+
+
+@dataclass(frozen=True, slots=True)
+class Observes:
+    """What an equation has in it, and so may tell of.
+
+    `constants` of the base model (`machine.model.BASE`); of effects the `hooks` (`flux`, `drop`,
+    `torque`), and the `sensors` whose errors are in it (`angle`, `current`, `voltage`, `load`,
+    `clock`, `lcr`). `torque_in` is the channel in which alone a drag is, as that much torque: a
+    segment without that channel does not observe it. `form`: whether the prediction is linear in
+    what the hooks give, affine, or neither, so that columns must be found by differences.
+    """
+
+    constants: tuple[str, ...] = ()
+    hooks: frozenset[str] = frozenset()
+    sensors: frozenset[str] = frozenset()
+    torque_in: str = ""
+    form: Literal["linear", "affine", "neither"] = "linear"
+
+
+@dataclass(frozen=True, slots=True)
+class Sensing:
+    """What the sensors add to an equation that no model predicts.
+
+    `reading`(segment, channel, model, values) is what a sensor's linearity is a share of [n, the
+    channel's unit]; without it the recorded signal itself. `errors`: those of `voltage_jumps`,
+    `encoder_lines` and `standstill` that an equation of a drive's log has. `sensors` are the
+    recorded signals that the channels are made of, if they are not the signals themselves, and
+    `sensed`(segment, residual, model, values) is the residual of each of them [n].
+    """
+
+    reading: Reading | None = None
+    errors: frozenset[str] = frozenset()
+    sensors: tuple[str, ...] = ()
+    sensed: Sensed | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """What segments of an equation serve for, beside the fit.
+
+    `shows`: of `current` and `turning`, what such a test is done under; a diagnosis needs both.
+    `warms`: hooks whose effects grow in it with a temperature. `free_runs`: tests in which the
+    model is also left to itself, with these `currents` as its state; a log with currents is looked
+    through for orders too. `angle_maps`: errors are mapped over the turn. `whole_beside`: equations
+    beside whose segments one of this is held out as a whole, and not in its blocks.
+    """
+
+    shows: frozenset[str] = frozenset()
+    warms: frozenset[str] = frozenset()
+    free_runs: tuple[str, ...] = ()
+    currents: tuple[str, ...] = ()
+    angle_maps: bool = False
+    whole_beside: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """The equation of a kind of test.
+
+    Parameters
+    ----------
+    name : str
+        Name of the equation, which its segments have as their `kind`.
+    words : str
+        The formula in a line.
+    tests : tuple of str
+        Tests whose captures it takes (`physics.glossary.TESTS`).
+    columns : tuple of str
+        Columns without which a capture is not taken; `cut` may ask for more.
+    channels : tuple of Channel
+        Every channel that its segments may have.
+    cut : callable (capture, machine) -> Segment or None
+        The signals of one capture on an even clock, with noise and windows.
+    state : callable (segment, signals, model, values) -> Operating
+        True currents, angle and speed [n], the errors of the sensors taken out.
+    measured : callable (segment, signals, model, values) -> array [C, n]
+        What the sensors recorded, as the prediction is told.
+    predicted : callable (segment, x, pieces, model, values) -> array [C, n]
+        What they should have recorded, from flux, drop and drag at the true state.
+    observes : Observes
+        Constants, hooks and sensors that are in it.
+    recorder : str or None
+        Whose clock it goes by (`effect.RECORDERS`); None of a table.
+    sensing, use : Sensing, Use
+        What the sensors add, and what else such segments serve for.
+    rank : int
+        Place among the segments of one capture, the lowest first; then by name.
+
+    Notes
+    -----
+    `state`, `measured` and `predicted` get the segment on its true clock: the model's own clock
+    error is taken out of `ts_s` before. The residual is `measured - predicted`. They are called
+    with noise added to `signals`, so they read recorded signals from there alone.
+
+    """
+
+    name: str
+    words: str
+    tests: tuple[str, ...]
+    columns: tuple[str, ...]
+    channels: tuple[Channel, ...]
+    cut: Cut
+    state: State
+    measured: Measured
+    predicted: Predicted
+    observes: Observes
+    recorder: str | None = None
+    sensing: Sensing = field(default_factory=Sensing)
+    use: Use = field(default_factory=Use)
+    rank: int = 0
+
+    def channel(self, name: str) -> Channel:
+        """The channel of a signal; one that says nothing else where there is none."""
+        return next((one for one in self.channels if one.name == name), Channel(name))

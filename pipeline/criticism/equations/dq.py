@@ -1,0 +1,217 @@
+"""A drive's log of both axes: voltages in the rotor frame, and the torque of a loaded shaft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
+from pipeline.criticism.data.traces import (
+    ANGLES,
+    SMOOTHED,
+    even_angle,
+    even_clock,
+    prepared,
+    shaft_angle,
+    thinned,
+    whole_log,
+    window_of,
+    with_angle,
+)
+from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
+from pipeline.criticism.machine.model import Model, Pieces, ripple
+from pipeline.criticism.signals.shaft import TORQUE_RIPPLES, net_torque, sensed_torque, true_load
+from pipeline.criticism.signals.true_state import (
+    at_true_angle,
+    drive_current,
+    motion_of,
+    operating,
+)
+from pipeline.criticism.signals.voltage import (
+    RIPPLES,
+    ahead,
+    central,
+    forward,
+    held_voltage,
+    recorded_voltage,
+    rotor_voltage,
+)
+from pipeline.numerics.projection import projection
+from pipeline.records.capture import Capture
+
+VOLTS = ("vd_v", "vq_v")
+TORQUE = "torque_shaft_nm"
+_WINDOWS_MAP, _WINDOWS_LOG = 48, 32
+"""Windows of a map, and of a drive's log, at the most. By judgement: cost goes with them, and a
+programme has several logs."""
+
+
+def cut(capture: Capture, machine: Machine) -> Segment | None:
+    """Voltages, currents and angle of a log; with its torque where the shaft turns."""
+    temperatures = [name for name in SMOOTHED if capture.has(name)]
+    names = with_angle(capture, ["vd_v", "vq_v", "id_a", "iq_a", *temperatures])
+    turning = len(names) > 4 and any("theta" in n or "omega" in n for n in names)
+    angle = not ANGLES.isdisjoint(names)
+    torque = capture.has("torque_shaft_nm") and turning and angle
+    names += ["torque_shaft_nm"] if torque else []
+    period, found, keep = even_clock(capture, tuple(names))
+    shaft_angle(found, period, machine)
+    turned = float(np.ptp(found["theta_mech_rad"]))
+    channels: tuple[str, ...] = ("vd_v", "vq_v")
+    if torque and turned > 0.1:
+        channels += ("torque_shaft_nm",)
+    size = found["vd_v"].size
+    window = window_of(period, size)
+    orders = electrical_orders(machine) if angle and turned > 0.1 else ()
+    told = prepared(found, period)
+    if capture.meta.test == "torque_map":
+        noise = dict(told.noise)
+        noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
+        even_angle(found, noise, window)
+        told = replace(told, noise=noise)
+    most = _WINDOWS_MAP if capture.meta.test == "torque_map" else _WINDOWS_LOG
+    found["t_s"] = period * np.arange(size, dtype=np.float64)
+    logged = capture.meta.test == "drive" and len(channels) > 2
+    whole = {**found, "good": keep.astype(float)} if logged else None
+    log = whole_log(found, period)
+    found, starts = thinned(found, keep, window, most)
+    weak = projection(found["theta_mech_rad"], starts, window, orders)
+    made = segment_of(
+        capture, "dq", "drive", period, found=found, sensors=told, channels=channels, weak=weak
+    )
+    return replace(made, whole=whole, log=log)
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True currents, angle and speed [n] of a machine that a drive feeds and logs."""
+    motion = motion_of(segment, signals, model.machine)
+    current = drive_current(segment, signals, model, values, motion.theta_rad.size)
+    x = operating(segment, signals, model, values, current, motion)
+    return at_true_angle(segment, replace(x, inverter=True), model, values)
+
+
+def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+    """Recorded voltages, and the torque less the dynamics of its transducer [C, n]."""
+    rows = [signals[name] for name in VOLTS]
+    if TORQUE in segment.channels:
+        rows.append(true_load(segment, signals, model, values, inverter=True))
+    return np.stack(rows)
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Voltages v_d, v_q [V], and with its channel the torque at the shaft [N·m]: [C, n].
+
+    Notes
+    -----
+    v = R i + drops + dψ/dt + j ω_e ψ over what the log's voltage samples stand for;
+    T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags − J dω/dt.
+
+    """
+    voltage = _logged_voltage(segment, x, pieces, values)
+    voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
+    rows = [voltage.real, voltage.imag]
+    if TORQUE in segment.channels:
+        torque = net_torque(x, pieces)
+        if any(values[name] for name in TORQUE_RIPPLES):
+            torque = torque + _between(segment, x, pieces, values)
+        rows.append(sensed_torque(segment, x, torque, model, values))
+    return np.stack(rows)
+
+
+def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Complex:
+    """Rotor-frame voltage [n, V] that is held in the stationary frame while the rotor turns.
+
+    Its mean is shorter by sinc of half the turn; `ripple_edge` and `ripple_shift` are what the log
+    samples otherwise.
+    """
+    period, held = segment.ts_s, segment.timing == "held"
+    difference = forward if held else central
+    omega, turn, shrink = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
+    voltage = (held_voltage if held else rotor_voltage)(pieces, omega, period)
+    if any(values[name] for name in RIPPLES):
+        shrink = shrink - values["ripple_edge"] * turn**2
+        psi = ahead(pieces.psi_wb) if held else pieces.psi_wb
+        lag = values["ripple_shift"] * 1j * psi * np.gradient(turn) / period
+        mean: Complex = shrink * voltage - lag
+    else:
+        mean = shrink * voltage
+    return mean
+
+
+def _pace(
+    segment: Segment, x: Operating, difference: Callable[[Array, float], Array]
+) -> tuple[Array, Array, Any]:
+    """Electrical speed [n, rad/s], what it turns in a sample period [n, rad], and what is left of
+    a voltage's mean while it turns.
+    """
+    turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
+    shrink = np.sinc(turn / (2 * math.pi)) if segment.timing != "instant" else 1.0
+    return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn, shrink
+
+
+def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Array:
+    """Torque [n, N·m] of what current and flux do between samples.
+
+    The current moves on for a part of a period; and while a held voltage turns, both are off their
+    means. A free shaft is turned by the means; what a transducer tells of a held one is its own.
+    """
+    flux, current = ripple(x, values["ripple_held" if x.held else "ripple_mean"], values)
+    current = values["ripple_torque"] * segment.ts_s * central(x.i_a, segment.ts_s) - current
+    moved = np.conj(pieces.psi_wb) * current - np.conj(flux) * x.i_a
+    torque: Array = 1.5 * x.machine.pole_pairs * moved.imag
+    return torque
+
+
+def _reading(segment: Segment, channel: str, model: Model, values: Values) -> Array:
+    """Length of the voltage [n, V], or the torque of the current's length [n, N·m]."""
+    if channel == TORQUE:
+        kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+        torque: Array = kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"])
+        return torque
+    length: Array = np.sqrt(sum(segment.recorded[name] ** 2 for name in VOLTS))
+    return length
+
+
+EQUATION = Equation(
+    name="dq",
+    words="v = R i + drops + dψ/dt + j ω_e ψ, T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags − J dω/dt",
+    tests=("torque_map", "drive", "heat_run"),
+    columns=("t_s", "vd_v", "vq_v", "id_a", "iq_a"),
+    channels=(
+        Channel("vd_v", "voltage_v", beside=VOLTS),
+        Channel("vq_v", "voltage_v", beside=VOLTS),
+        Channel(TORQUE, "torque_nm"),
+    ),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        (
+            *("r_ohm", "ld_h", "lq_h"),
+            *("ripple_slope", "ripple_mean", "ripple_edge", "ripple_shift"),
+            *("ripple_torque", "ripple_held", "psi_wb", "j_kgm2", "b_nm_s_rad"),
+        ),
+        hooks=frozenset({"flux", "drop", "torque"}),
+        sensors=frozenset({"angle", "current", "voltage", "load", "clock"}),
+        torque_in=TORQUE,
+    ),
+    recorder="log",
+    sensing=Sensing(_reading, frozenset({"voltage_jumps", "encoder_lines", "standstill"})),
+    use=Use(
+        shows=frozenset({"current", "turning"}),
+        warms=frozenset({"drop", "flux"}),
+        free_runs=("torque_map", "drive"),
+        currents=("id_a", "iq_a"),
+        angle_maps=True,
+    ),
+)

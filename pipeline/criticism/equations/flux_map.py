@@ -1,0 +1,100 @@
+"""A table of flux linkages over currents, without a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.criticism.data.levels import levels_of
+from pipeline.criticism.data.segment import Segment, Sensors, segment_of
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.signals.true_state import at_rest, operating, table_current
+from pipeline.criticism.signals.voltage import recorded_voltage
+from pipeline.records.capture import Capture
+
+LINKAGES = ("psi_d_wb", "psi_q_wb")
+_FLUX_NOISE = 1e-3
+"""Noise of a table's column, as a share of its range: a table does not tell its own, and 0.1 % is
+what such tables are good to, by judgement."""
+_OTHER_AXIS = 0.1
+"""Share of the other axis's range that an axis has at the least: one that stands still has none."""
+_FEW_LEVELS = 4
+"""Levels of d current from which on they can be held out one by one: the others tell a curve."""
+
+
+def cut(capture: Capture, _: Machine) -> Segment | None:
+    """Flux linkages of both axes, or of a sweep along one, whose other axis stands still."""
+    names = ("id_a", "iq_a", *LINKAGES)
+    found = capture.arrays(*names)
+    noise = _axes_noise(found, names[:2]) | _axes_noise(found, names[2:])
+    if not all(noise.values()):
+        return None
+    levels = levels_of(found["id_a"])
+    # rows of one d current are held out together: a map is often its own mirror image in i_q
+    blocks = levels if levels.max(initial=0) + 1 >= _FEW_LEVELS else None
+    return segment_of(
+        capture,
+        "flux_map",
+        "drive",
+        1.0,
+        found=found,
+        sensors=Sensors(noise),
+        channels=LINKAGES,
+        weak=None,
+        blocks=blocks,
+    )
+
+
+def _axes_noise(found: Mapping[str, Array], names: tuple[str, ...]) -> dict[str, float]:
+    """A share of an axis's range, or a tenth of the other's at least: one instrument reads both."""
+    ranges = {name: float(np.ptp(found[name])) for name in names}
+    least = _OTHER_AXIS * max(ranges.values())
+    return {name: _FLUX_NOISE * max(own, least) for name, own in ranges.items()}
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True currents [n] of a table's rows."""
+    current = signals["id_a"] + 1j * signals["iq_a"]
+    rest = at_rest(current.size)
+    current = table_current(segment, current, rest.theta_rad, rest.omega_rad_s, model, values)
+    return operating(segment, signals, model, values, current, rest)
+
+
+def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+    """Both flux linkages [2, n, Wb]."""
+    return np.stack([signals[name] for name in LINKAGES])
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Both flux linkages [2, n, Wb]: ψ = ∂W/∂i. They are integrals of a voltage, so that the
+    voltmeter's gain is in them.
+    """
+    psi = recorded_voltage(pieces.psi_wb, segment, x, model, values)
+    return np.stack([psi.real, psi.imag])
+
+
+EQUATION = Equation(
+    name="flux_map",
+    words="ψ = ∂W/∂i",
+    tests=("flux_map",),
+    columns=("id_a", "iq_a", "psi_d_wb", "psi_q_wb"),
+    channels=(Channel("psi_d_wb", beside=LINKAGES), Channel("psi_q_wb", beside=LINKAGES)),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("ld_h", "lq_h", "psi_wb"),
+        hooks=frozenset({"flux"}),
+        sensors=frozenset({"current", "voltage"}),
+    ),
+    # where there are logs to predict it from, a table is held out as a whole
+    use=Use(shows=frozenset({"current", "turning"}), whole_beside=("dq",)),
+)

@@ -1,0 +1,192 @@
+"""A shaft without current: its coast, or the torque of a slow turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_orders
+from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.data.traces import (
+    coarse_steps,
+    decimated,
+    even_clock,
+    prepared,
+    shaft_angle,
+    smoothed,
+    thinned,
+    window_of,
+    with_angle,
+    with_travel,
+)
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces, clock_gain
+from pipeline.criticism.signals.shaft import (
+    net_torque,
+    sensed_torque,
+    true_load,
+    unexplained_acceleration,
+)
+from pipeline.criticism.signals.true_state import at_true_angle, finer_of, motion_of, operating
+from pipeline.numerics.coasting import coasting_rows
+from pipeline.numerics.projection import projection, window_starts
+from pipeline.records.capture import Capture
+
+SPEED, TORQUE, RECORDER = "omega_mech_rad_s", "torque_shaft_nm", "shaft"
+_LEAST_WINDOW = 8
+"""Samples of a window at the least: its test function vanishes at both ends."""
+_WINDOWS = 48
+"""Windows of a coast at the most; by judgement: cost goes with them."""
+_LEAD = 0.05
+"""Share of a coast from which on the time before it counts as driven. By judgement: the moment of
+letting go is shorter."""
+_FINEST = 48
+"""Parts of a coasting shaft's sample at the most: a bound of the cost, by judgement."""
+
+
+def cut(capture: Capture, machine: Machine) -> Segment | None:
+    """The angle of a coast; of a slow turn the torque, averaged to some samples a wave."""
+    names = with_angle(capture, [])
+    if not names:
+        return None
+    if capture.meta.test == "cogging":
+        if not capture.has("torque_shaft_nm"):
+            return None
+        names = [*names, "torque_shaft_nm"]
+    period, found, keep = even_clock(capture, tuple(names))
+    shaft_angle(found, period, machine)
+    channel = TORQUE if TORQUE in found else SPEED
+    if capture.meta.test == "cogging":
+        return _slow_turn(capture, machine, period, found, keep, channel)
+    window = window_of(period, keep.size)
+    keep = keep & _coasts(found["theta_mech_rad"], window)
+    told = prepared(found, period)
+    found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
+    found, starts = thinned(found, keep, window, _WINDOWS)
+    weak = projection(found["theta_mech_rad"], starts, window, ())
+    return segment_of(
+        capture, "shaft", "bench", period, found=found, sensors=told, channels=(channel,), weak=weak
+    )
+
+
+def _coasts(theta: Array, window: int) -> NDArray[np.bool_]:
+    """Samples [n] in which a shaft coasts.
+
+    These are all samples, unless the shaft is driven or held at its speed before some coast, for
+    more than a twentieth of that coast. Then they are those of the coasts alone.
+    """
+    speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
+    runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
+    ends = [0, *(stop for _, stop in runs)]
+    driven = any(
+        start - end > _LEAD * (stop - start) for (start, stop), end in zip(runs, ends, strict=False)
+    )
+    free = np.full(theta.size, not driven)
+    for start, stop in runs:
+        free[start:stop] = True
+    return free
+
+
+def _slow_turn(
+    capture: Capture,
+    machine: Machine,
+    period: float,
+    found: dict[str, Array],
+    keep: NDArray[np.bool_],
+    channel: str,
+) -> Segment | None:
+    orders = slow_orders(machine)
+    theta = found["theta_mech_rad"]
+    turns = float(np.ptp(theta)) / (2 * math.pi)
+    if turns <= 0.0:
+        return None
+    factor = max(int(theta.size / turns / (24 * max(orders))), 1)
+    if theta.size // factor < _LEAST_WINDOW + 2:
+        return None
+    noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
+    steps = coarse_steps(found, noise)
+    noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
+    found = {name: decimated(column, factor) for name, column in found.items()}
+    told = Sensors(noise, steps, with_travel(found, noise))
+    keep = decimated(keep.astype(float), factor) > 0.999
+    keep[:1] = keep[-1:] = False
+    size = keep.size
+    window = max(int(size / round(turns)), _LEAST_WINDOW) if turns > 1.2 else size - 2
+    window = min(window, size - 2)
+    # the first and the last sample have no neighbours
+    starts = 1 + window_starts(keep[1:-1], window)
+    weak = projection(found["theta_mech_rad"], starts, window, orders, cycles=0.9, margin=12.0)
+    return segment_of(
+        capture,
+        "shaft",
+        "bench",
+        period * factor,
+        found=found,
+        sensors=told,
+        channels=(channel,),
+        weak=weak,
+    )
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True angle and speed [n·m] of a shaft without current, m points a sample of a coast."""
+    slow = segment.test == "cogging"
+    finer = 1 if slow else finer_of(segment, model.machine, _FINEST)
+    motion = motion_of(segment, signals, model.machine, finer)
+    none = np.zeros(motion.theta_rad.size, dtype=complex)
+    x = operating(segment, signals, model, values, none, motion)
+    return at_true_angle(segment, x, model, values)
+
+
+def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+    """Nothing of a coast, whose angle is in the prediction; the torque of a slow turn: [1, n]."""
+    if SPEED in segment.channels:
+        return np.zeros((1, segment.size))
+    return true_load(segment, signals, model, values)[None]
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Acceleration that the drags leave unexplained [rad/s²], or the shaft's torque [N·m]: [1, n].
+
+    Notes
+    -----
+    −drags/J − d²θ/dt² of a coast; −drags − J d²θ/dt² where a transducer drives the shaft.
+
+    """
+    torque = net_torque(x, pieces)
+    if SPEED in segment.channels:
+        stretch = 1.0 + clock_gain(RECORDER, model, values)
+        return unexplained_acceleration(segment, x, torque, values, stretch)[None]
+    return sensed_torque(segment, x, torque, model, values)[None]
+
+
+EQUATION = Equation(
+    name="shaft",
+    words="J dω/dt = −drags",
+    tests=("spin_down", "cogging"),
+    columns=("t_s",),
+    channels=(
+        Channel(SPEED, "torque_nm", reported="alpha_mech_rad_s2", acceleration=True),
+        Channel(TORQUE, "torque_nm"),
+    ),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("j_kgm2", "b_nm_s_rad"),
+        hooks=frozenset({"torque"}),
+        sensors=frozenset({"angle", "load", "clock"}),
+        form="affine",
+    ),
+    recorder=RECORDER,
+    use=Use(shows=frozenset({"turning"}), free_runs=("spin_down",), angle_maps=True),
+)

@@ -1,0 +1,109 @@
+"""An LCR meter across a pair of terminals, over the rotor's angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment, Sensors, segment_of
+from pipeline.criticism.data.sensor_noise import resolution
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes
+from pipeline.criticism.machine.model import Model, Pieces, evaluate
+from pipeline.criticism.signals.true_state import Motion, operating
+from pipeline.records.capture import Capture
+
+_LEAST_METER_NOISE = 1e-4
+"""Share of its largest reading that a meter is known no better than, by judgement: with the
+scatter alone, a meter that reads the same at every angle had a noise of 1e-16."""
+_PROBE = 1e-3
+"""Current of the meter, as a share of the machine's: small against what saturates."""
+
+
+def cut(capture: Capture, _: Machine) -> Segment | None:
+    """A table over the angle. Its noise is the scatter about a mean and two waves a turn, but never
+    less than the rounding of its last digit, or a ten-thousandth of the largest reading.
+    """
+    names = ["theta_elec_deg", "lab_h"] + [n for n in ("rab_ohm", "freq_hz") if capture.has(n)]
+    found = capture.arrays(*names)
+    angle = 2 * np.radians(found["theta_elec_deg"])
+    basis = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
+    if angle.size < 6:
+        return None
+    noise = {}
+    for name in names[1:]:
+        fitted = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
+        scatter = math.sqrt(float(((found[name] - fitted) ** 2).sum()) / (angle.size - 3))
+        least = _LEAST_METER_NOISE * float(np.abs(found[name]).max())
+        noise[name] = max(scatter, resolution(found[name]) / math.sqrt(12), least)
+    channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
+    return segment_of(
+        capture,
+        "lcr",
+        "lcr",
+        1.0,
+        found=found,
+        sensors=Sensors(noise),
+        channels=channels,
+        weak=None,
+    )
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """A rotor at rest at each angle [n], without current, at the meter's frequency."""
+    eps = np.radians(signals["theta_elec_deg"])
+    zero = np.zeros(eps.size)
+    rest = Motion(zero, zero, signals.get("freq_hz", zero))
+    x = operating(segment, signals, model, values, zero.astype(np.complex128), rest)
+    return replace(x, eps_rad=eps)
+
+
+def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Values) -> Array:
+    """What the meter shows [C, n, H and ohm]."""
+    return np.stack([signals[channel] for channel in segment.channels])
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Incremental line inductance and resistance [C, n] at zero current, pair ab.
+
+    Notes
+    -----
+    A unit of current through ab is i = (2/√3) e^{−j(30° + ε)} in the rotor frame, and the line
+    voltage is √3 Re[v e^{j(30° + ε)}].
+
+    """
+    del pieces
+    probe = _PROBE * x.machine.scales["current_a"]
+    direction = 2 / math.sqrt(3) * np.exp(-1j * (math.pi / 6 + x.eps_rad))
+    sides = []
+    for sign in (1.0, -1.0):
+        at = replace(x, id_a=sign * probe * direction.real, iq_a=sign * probe * direction.imag)
+        sides.append(evaluate(model, at, values))
+    back = math.sqrt(3) * np.exp(1j * (math.pi / 6 + x.eps_rad))
+    rows = {
+        "lab_h": ((sides[0].psi_wb - sides[1].psi_wb) / (2 * probe) * back).real,
+        "rab_ohm": ((sides[0].drop_v - sides[1].drop_v) / (2 * probe) * back).real,
+    }
+    gain: Array = (1.0 + values["gain_lcr"]) * np.stack([rows[c] for c in segment.channels])
+    return gain
+
+
+EQUATION = Equation(
+    name="lcr",
+    words="L_ab, R_ab: slopes of flux and drop over a small current through ab",
+    tests=("lcr",),
+    columns=("theta_elec_deg", "lab_h"),
+    channels=(Channel("lab_h"), Channel("rab_ohm")),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(("r_ohm", "ld_h", "lq_h"), sensors=frozenset({"lcr"}), form="neither"),
+)

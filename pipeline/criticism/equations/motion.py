@@ -1,0 +1,104 @@
+"""The motion of a shaft that runs free under the q current of a drive's log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.criticism.data.q_log import in_time, q_log
+from pipeline.criticism.data.segment import Segment, segment_of
+from pipeline.criticism.data.traces import thinned, window_of
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes
+from pipeline.criticism.machine.model import Model, Pieces, clock_gain
+from pipeline.criticism.signals.shaft import net_torque, unexplained_acceleration
+from pipeline.criticism.signals.true_state import (
+    at_true_angle,
+    drive_current,
+    finer_of,
+    motion_of,
+    operating,
+)
+from pipeline.numerics.projection import projection
+from pipeline.records.capture import Capture
+
+TORQUE, RECORDER = "torque_shaft_nm", "log"
+_MOTION_WINDOWS, _PAD = 160, 8
+"""Windows of the motion at the most, and samples kept at either side. By judgement: cost goes with
+both, and the angle's second difference needs a few beyond a window."""
+_FINEST = 6
+"""Parts of a log's sample at the most: a bound of the cost, by judgement."""
+
+
+def cut(capture: Capture, machine: Machine) -> Segment | None:
+    """Angle and q current, in a selection of the windows: waves of the angle are dear at speed.
+
+    Only where there is an angle, and no transducer: with one the shaft is not known to run free.
+    """
+    log = None if capture.has(TORQUE) else q_log(capture, machine)
+    if log is None or not log.angle:
+        return None
+    shaft = {name: log.columns[name] for name in ("theta_mech_rad", "iq_a", "travel_rad", "run")}
+    shaft["row"] = np.arange(log.keep.size, dtype=float)
+    window = window_of(log.period_s, log.keep.size)
+    shaft, starts = thinned(shaft, log.keep, window, _MOTION_WINDOWS, _PAD)
+    weak = projection(shaft["theta_mech_rad"], starts, window, ())
+    blocks = in_time(shaft.pop("row")[starts + window // 2], log.keep.size)
+    return segment_of(
+        capture,
+        "motion",
+        "drive",
+        log.period_s,
+        found=shaft,
+        sensors=log.sensors,
+        channels=(TORQUE,),
+        weak=weak,
+        blocks=blocks,
+    )
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True current, angle and speed [n·m], m points a sample where the shaft turns fast."""
+    finer = finer_of(segment, model.machine, _FINEST)
+    motion = motion_of(segment, signals, model.machine, finer)
+    current = drive_current(segment, signals, model, values, motion.theta_rad.size)
+    x = operating(segment, signals, model, values, current, motion)
+    return at_true_angle(segment, x, model, values)
+
+
+def measured(segment: Segment, _: Mapping[str, Array], __: Model, ___: Values) -> Array:
+    """Nothing [1, n]: the angle is in the prediction."""
+    return np.zeros((1, segment.size))
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Acceleration that current and drags leave unexplained [1, n, rad/s²]: T/J − d²θ/dt²."""
+    stretch = 1.0 + clock_gain(RECORDER, model, values)
+    return unexplained_acceleration(segment, x, net_torque(x, pieces), values, stretch)[None]
+
+
+EQUATION = Equation(
+    name="motion",
+    words="J dω/dt = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags",
+    tests=("drive",),
+    columns=("t_s", "vq_v", "iq_a"),
+    channels=(Channel(TORQUE, "torque_nm", acceleration=True, as_torque=True),),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("psi_wb", "j_kgm2", "b_nm_s_rad"),
+        hooks=frozenset({"flux", "torque"}),
+        sensors=frozenset({"angle", "current", "clock"}),
+        form="affine",
+    ),
+    recorder=RECORDER,
+    # behind the voltage of the same log
+    rank=1,
+)

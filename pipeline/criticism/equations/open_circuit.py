@@ -1,0 +1,150 @@
+"""Open terminals of a driven shaft: the back-EMF in the rotor frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import PAIR_RAD, Segment, electrical_orders, segment_of
+from pipeline.criticism.data.traces import (
+    ANGLES,
+    LINES_V,
+    even_clock,
+    prepared,
+    shaft_angle,
+    thinned,
+    window_of,
+    with_angle,
+)
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
+from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage
+from pipeline.numerics.projection import Projection, projection
+from pipeline.physics.frames import vector_of_lines
+from pipeline.records.capture import Capture
+
+_WINDOWS = 48
+"""Windows at the most; by judgement: cost goes with them."""
+_LINE_RAD = {f"v{pair}_v": angle for pair, angle in PAIR_RAD.items()}
+"""Where each line voltage stands [rad, electrical]."""
+
+
+def cut(capture: Capture, machine: Machine) -> Segment | None:
+    """Line voltages and angle; the windows of steady speed."""
+    lines = [n for n in LINES_V if capture.has(n)]
+    if len(lines) < 2:
+        return None
+    extra = ["temp_magnet_degc"] if capture.has("temp_magnet_degc") else []
+    names = with_angle(capture, [*lines, *extra])
+    if not ANGLES.intersection(names):
+        # where the magnet stands at first is another in every spin, and no speed tells it
+        return None
+    period, found, keep = even_clock(capture, tuple(names))
+    shaft_angle(found, period, machine)
+    window = window_of(period, keep.size)
+    told = prepared(found, period)
+    found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
+    found, starts = thinned(found, keep, window, _WINDOWS)
+    weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
+    weak = weak.only(_steady(weak, found["theta_mech_rad"]))
+    return segment_of(
+        capture,
+        "open",
+        "bench",
+        period,
+        found=found,
+        sensors=told,
+        channels=("vd_v", "vq_v"),
+        weak=weak,
+    )
+
+
+def _steady(weak: Projection, theta: Array) -> NDArray[np.bool_]:
+    """The windows [W] of constant speed, which an open-circuit test is made of; all if too few.
+
+    An instantaneous voltage sample at a kink of the speed belongs to neither side of it.
+    """
+    half = weak.length // 2
+    first = theta[weak.starts + half] - theta[weak.starts]
+    second = theta[weak.starts + 2 * half - 1] - theta[weak.starts + half - 1]
+    calm = np.abs(second - first) < 2e-3 * np.abs(first + second)
+    return calm if calm.sum() >= 8 else np.ones(calm.size, dtype=bool)
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True angle and speed [n] without current; the bench's encoder has a zero of its own."""
+    motion = motion_of(segment, signals, model.machine)
+    none = np.zeros(motion.theta_rad.size, dtype=complex)
+    x = operating(segment, signals, model, values, none, motion)
+    x = replace(x, eps_rad=x.eps_rad - values["bench_angle_rad"])
+    return at_true_angle(segment, x, model, values)
+
+
+def measured(_: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+    """Line voltages [2, n, V], turned into the rotor's frame by the recorded angle."""
+    lines = vector_of_lines({name: signals[name] for name in LINES_V if name in signals})
+    voltage = lines * np.exp(-1j * _recorded_eps(signals, model, values))
+    return np.stack([voltage.real, voltage.imag])
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """Voltages v_d, v_q [2, n, V] of a winding without current: v = dψ/dt + j ω_e ψ."""
+    period = segment.ts_s
+    omega = x.once(x.theta_rad, "pace", lambda: central(x.machine.pole_pairs * x.theta_rad, period))
+    voltage = rotor_voltage(pieces, omega, period)
+    voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
+    return np.stack([voltage.real, voltage.imag])
+
+
+def _recorded_eps(signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+    eps: Array = model.machine.pole_pairs * signals["theta_mech_rad"] - values["bench_angle_rad"]
+    return eps
+
+
+def _reading(segment: Segment, _: str, __: Model, ___: Values) -> Array:
+    """Length [n, V] of two line voltages."""
+    present = [segment.recorded[n] for n in ("vab_v", "vbc_v") if n in segment.recorded]
+    length: Array = np.sqrt(sum(column**2 for column in present))
+    return length
+
+
+def _sensed(segment: Segment, left: Array, model: Model, values: Values) -> Mapping[str, Array]:
+    """A residual [2, n] in the rotor's frame, turned back to each line's voltage [n]."""
+    eps = _recorded_eps(segment.recorded, model, values)
+    winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))
+    lines = [name for name in LINES_V if name in segment.recorded]
+    return {name: (winding * np.exp(-1j * _LINE_RAD[name])).real for name in lines}
+
+
+EQUATION = Equation(
+    name="open",
+    words="v = dψ/dt + j ω_e ψ at no current",
+    tests=("open_circuit",),
+    columns=("t_s",),
+    channels=(
+        Channel("vd_v", "voltage_v", offset="none"),
+        Channel("vq_v", "voltage_v", offset="none"),
+    ),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("psi_wb", "bench_angle_rad"),
+        hooks=frozenset({"flux"}),
+        sensors=frozenset({"angle", "voltage", "clock"}),
+    ),
+    recorder="open",
+    sensing=Sensing(_reading, sensors=LINES_V, sensed=_sensed),
+    use=Use(shows=frozenset({"turning"}), warms=frozenset({"flux"}), angle_maps=True),
+)

@@ -1,0 +1,118 @@
+"""A drive's log of the q axis alone: its voltage, and the drive's own speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.q_log import in_time, q_log
+from pipeline.criticism.data.segment import Segment, segment_of
+from pipeline.criticism.data.traces import window_of
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces, values_of
+from pipeline.criticism.signals.true_state import (
+    at_true_angle,
+    drive_current,
+    motion_of,
+    operating,
+)
+from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage
+from pipeline.numerics.projection import projection, window_starts
+from pipeline.records.capture import Capture
+
+SPEED = "omega_mech_rad_s"
+
+
+def cut(capture: Capture, machine: Machine) -> Segment | None:
+    """The q voltage, and the drive's own speed beside an angle.
+
+    The d current is taken as held at zero, which is what a drive that logs the q axis alone does.
+    If the log holds the drive's own speed, the voltage is predicted from it, since both share one
+    clock, and the speed itself is compared with the angle; `sample_delay` says how late it is.
+    """
+    log = q_log(capture, machine)
+    if log is None:
+        return None
+    window = window_of(log.period_s, log.keep.size)
+    starts = window_starts(log.keep, window)
+    weak = projection(log.columns["theta_mech_rad"], starts, window, ())
+    return segment_of(
+        capture,
+        "q",
+        "drive",
+        log.period_s,
+        found=log.columns,
+        sensors=log.sensors,
+        channels=("vq_v", SPEED) if log.speed and log.angle else ("vq_v",),
+        weak=weak,
+        blocks=in_time(weak.starts + window // 2, log.keep.size),
+    )
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True current, angle and speed [n]; the drive's own speed where it is recorded."""
+    motion = motion_of(segment, signals, model.machine)
+    current = drive_current(segment, signals, model, values, motion.theta_rad.size)
+    motion = replace(motion, omega_rad_s=signals.get(SPEED, motion.omega_rad_s))
+    x = operating(segment, signals, model, values, current, motion)
+    return at_true_angle(segment, replace(x, inverter=True, q_alone=True), model, values)
+
+
+def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Values) -> Array:
+    """Voltage and speed as the drive logged them [C, n]."""
+    return np.stack([signals[channel] for channel in segment.channels])
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """The q voltage [V], and the angle's speed as the drive's estimate tells it [rad/s]: [C, n].
+
+    Notes
+    -----
+    v_q = Im(R i + drops + dψ/dt + j ω_e ψ), ω = dθ/dt.
+
+    """
+    turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
+    voltage = rotor_voltage(pieces, turn / segment.ts_s, segment.ts_s)
+    voltage = recorded_voltage(voltage, segment, x, model, values, in_frame=True)
+    rows = [voltage.imag]
+    if SPEED in segment.channels:
+        rows.append(_recorded_speed(segment, x, model, values))
+    return np.stack(rows)
+
+
+def _recorded_speed(segment: Segment, x: Operating, model: Model, values: Values) -> Array:
+    """Speed [n] of the angle as a drive's own estimate tells it [rad/s]."""
+    speed: Array = central(x.theta_rad, segment.ts_s)
+    for effect in model.effects:
+        if effect.speed is not None:
+            q = values_of(effect, model.machine, values)
+            speed = effect.speed(speed, q, segment.ts_s)
+    return speed
+
+
+EQUATION = Equation(
+    name="q",
+    words="v_q = Im(R i + drops + dψ/dt + j ω_e ψ)",
+    tests=("drive",),
+    columns=("t_s", "vq_v", "iq_a"),
+    channels=(Channel("vq_v", "voltage_v"), Channel(SPEED, "speed_rad_s")),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("r_ohm", "lq_h", "psi_wb"),
+        hooks=frozenset({"flux", "drop"}),
+        sensors=frozenset({"angle", "current", "voltage", "clock"}),
+        form="affine",
+    ),
+    recorder="log",
+    use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"drop", "flux"})),
+)

@@ -1,0 +1,108 @@
+"""A table of steady q voltages at levels of d current, each at several speeds, without a clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.criticism.data.levels import set_levels
+from pipeline.criticism.data.segment import Segment, Sensors, segment_of
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.signals.true_state import Motion, operating, table_current
+from pipeline.criticism.signals.voltage import recorded_voltage
+from pipeline.records.capture import Capture
+
+_LEAST_NOISE = 1e-5
+"""Share of the largest voltage that the noise is never below: straight lines may fit exactly."""
+
+
+def cut(capture: Capture, _: Machine) -> Segment | None:
+    """Levels of d current, each run at several speeds: v_q, the drop of i_q taken off.
+
+    Each level has a free offset of its own, since what the inverter drops along q depends on the
+    current. The noise is the scatter of a level's voltages about a straight line over speed.
+    """
+    if capture.has("id_a", "iq_a", "psi_d_wb", "psi_q_wb"):
+        return None
+    found = capture.arrays("id_a", "omega_mech_rad_s", "vq_v")
+    levels = set_levels(found["id_a"])
+    count = int(levels.max(initial=0)) + 1
+    freedom = found["vq_v"].size - 2 * count
+    if freedom < count:
+        return None
+    volts = found["vq_v"]
+    power = sum(
+        _scatter(found["omega_mech_rad_s"][levels == k], volts[levels == k]) for k in range(count)
+    )
+    least = _LEAST_NOISE * float(np.abs(volts).max())
+    noise = {"vq_v": max(math.sqrt(power / freedom), least)}
+    offsets = np.abs(volts).max() * (levels[None, :] == np.arange(count)[:, None])
+    return segment_of(
+        capture,
+        "steady",
+        "drive",
+        1.0,
+        found=found,
+        sensors=Sensors(noise),
+        channels=("vq_v",),
+        weak=None,
+        blocks=levels,
+        offsets=offsets.astype(float),
+    )
+
+
+def _scatter(speed: Array, volts: Array) -> float:
+    """Sum of squares of one level's voltages about a straight line over speed."""
+    design = np.column_stack([np.ones(speed.size), speed])
+    left = volts - design @ np.linalg.lstsq(design, volts, rcond=None)[0]
+    return float(left @ left)
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True currents and speed [n] of a table's rows."""
+    omega = signals["omega_mech_rad_s"]
+    zero = np.zeros(omega.size)
+    electrical = model.machine.pole_pairs * omega
+    rest = model.machine.pole_pairs * zero
+    current = signals["id_a"] + 1j * zero
+    current = table_current(segment, current, rest, electrical, model, values)
+    freq = np.abs(omega) * model.machine.pole_pairs / (2 * math.pi)
+    return operating(segment, signals, model, values, current, Motion(zero, omega, freq))
+
+
+def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+    """The q voltage [1, n, V]."""
+    return signals["vq_v"][None]
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """The q voltage [1, n, V]: Im(R i + drops + j ω_e ψ)."""
+    steady = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb
+    return recorded_voltage(steady, segment, x, model, values).imag[None]
+
+
+EQUATION = Equation(
+    name="steady",
+    words="v_q = Im(R i + drops + j ω_e ψ)",
+    tests=("flux_map",),
+    columns=("id_a", "omega_mech_rad_s", "vq_v"),
+    channels=(Channel("vq_v", "voltage_v"),),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("r_ohm", "ld_h", "psi_wb"),
+        hooks=frozenset({"flux", "drop"}),
+        sensors=frozenset({"current", "voltage"}),
+    ),
+    use=Use(shows=frozenset({"current", "turning"})),
+)

@@ -1,0 +1,129 @@
+"""Two terminals of a rotor at rest: resistance steps, and current steps at a known angle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import PAIR_RAD, Segment, segment_of
+from pipeline.criticism.data.traces import even_clock, prepared, window_of
+from pipeline.criticism.effect import Array, Machine, Operating, Recorded, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.signals.true_state import at_rest, operating, true_current
+from pipeline.criticism.signals.voltage import central, recorded_voltage
+from pipeline.numerics.projection import Projection, projection, window_starts
+from pipeline.records.capture import Capture
+
+_STEP_WINDOW_S = 0.002
+"""Window of a current step [s]: short, since all that it tells is over after a few L/R."""
+_LEAST_WINDOW = 8
+"""Samples of a window at the least: its test function vanishes at both ends."""
+
+
+def cut(capture: Capture, _: Machine) -> Segment | None:
+    """Voltage and current of one pair; the windows at rest, or those clear of the steps."""
+    pair = capture.meta.pair
+    if pair is None or not capture.has(f"v{pair}_v"):
+        return None
+    current = next((n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n)), None)
+    if current is None:
+        return None
+    sign = 1.0 if current[1] == pair[0] else -1.0
+    extra = ["temp_winding_degc"] if capture.has("temp_winding_degc") else []
+    period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra))
+    volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
+    found = {"v_pair_v": volts, "i_pair_a": amps, **found}
+    told = prepared(found, period)
+    fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
+    if capture.meta.test == "current_step":
+        if capture.meta.theta_elec_deg is None:
+            return None
+        fixed["theta_elec_rad"] = math.radians(capture.meta.theta_elec_deg)
+        edges = np.abs(np.diff(volts)) > 8 * told.noise["v_pair_v"]
+        keep[:-1] &= ~edges
+        keep[1:] &= ~edges
+        window = max(min(round(_STEP_WINDOW_S / period), keep.size // 4), _LEAST_WINDOW)
+    else:
+        window = window_of(period, keep.size)
+    weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
+    if capture.meta.test == "resistance":
+        weak = _settled(weak, amps, told.noise["i_pair_a"])
+    return segment_of(
+        capture,
+        "terminal",
+        "bench",
+        period,
+        found=found,
+        sensors=told,
+        channels=("v_pair_v",),
+        weak=weak,
+        blocks=None,
+        offsets=None,
+        **fixed,
+    )
+
+
+def _settled(weak: Projection, amps: Array, noise: float) -> Projection:
+    """The windows in which the current does not move: there the inductance does not matter."""
+    spread = np.array([np.ptp(amps[s : s + weak.length]) for s in weak.starts])
+    calm = spread < 8.0 * max(noise, 1e-12)
+    return weak.only(calm)
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True current [n] of a rotor at rest: i = (2/√3) i_pair e^{j(pair − 30° − ε)}."""
+    n = signals["i_pair_a"].size
+    zero, eps = np.zeros(n), np.full(n, segment.fixed.get("theta_elec_rad", 0.0))
+    stationary = (
+        2
+        / math.sqrt(3)
+        * signals["i_pair_a"]
+        * np.exp(1j * (segment.fixed["pair_rad"] - math.pi / 6))
+    )
+    phase = int(segment.fixed["phase"])
+    bench = Recorded(stationary, zero, eps, zero, segment.ts_s, False, segment.instrument, phase)
+    current = true_current(bench, segment.ammeter, model, values) * np.exp(-1j * eps)
+    return replace(operating(segment, signals, model, values, current, at_rest(n)), eps_rad=eps)
+
+
+def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+    """The pair's voltage [1, n, V]."""
+    return signals["v_pair_v"][None]
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """The pair's voltage [1, n, V]: √3 Re[(drop + dψ/dt) e^{j(ε + 30° − pair)}]."""
+    frame = x.once(x.eps_rad, "turn", lambda: np.exp(1j * x.eps_rad))
+    stationary = (pieces.drop_v + central(pieces.psi_wb, segment.ts_s)) * frame
+    stationary = recorded_voltage(stationary, segment, x, model, values)
+    turn = np.exp(1j * (math.pi / 6 - segment.fixed["pair_rad"]))
+    voltage: Array = math.sqrt(3) * (stationary * turn).real
+    return voltage[None]
+
+
+EQUATION = Equation(
+    name="terminal",
+    words="v_pair = √3 Re[(R i + drops + dψ/dt) e^{j(ε + 30° − pair)}] at rest",
+    tests=("resistance", "current_step"),
+    columns=("t_s",),
+    channels=(Channel("v_pair_v", offset="voltmeter"),),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("r_ohm", "ld_h", "lq_h"),
+        hooks=frozenset({"flux", "drop"}),
+        sensors=frozenset({"current", "voltage", "clock"}),
+    ),
+    recorder="step",
+    use=Use(shows=frozenset({"current"})),
+)

@@ -1,0 +1,134 @@
+"""A table of torque against current of a clamped shaft: no time, no voltage."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.levels import levels_of
+from pipeline.criticism.data.segment import Segment, Sensors, segment_of
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.signals.shaft import as_sensed, net_torque
+from pipeline.criticism.signals.true_state import Motion, operating, table_current
+from pipeline.records.capture import Capture
+
+TORQUE = "torque_shaft_nm"
+_BESIDE = ("id_a", "theta_mech_rad", "temp_magnet_degc")
+"""Columns that are used where they are there."""
+_LEAST_NOISE = 1e-4
+"""Share of the largest torque that the noise is never below, by judgement: a few rows may lie on
+their curve exactly."""
+_FEW_LEVELS = 4
+"""Levels of current from which on there is a slope and a scatter, and they can be held out."""
+_TERMS = 3
+"""Terms of the curve of torque over current that noise is told about: offset, slope, sag."""
+
+
+def cut(capture: Capture, _: Machine) -> Segment | None:
+    """Rows of the table; levels of current are held out one by one.
+
+    The noise is the scatter about T0 + k i + s i³, with a curve of its own for every rotor angle:
+    friction that holds torque back on the way up and down is in it. The transducer's zero, and the
+    weight of an arm, is an offset that the table may have.
+    """
+    names = ("iq_a", TORQUE, *(name for name in _BESIDE if capture.has(name)))
+    found = capture.arrays(*names)
+    fine = np.all([np.isfinite(column) for column in found.values()], axis=0)
+    found = {name: column[fine] for name, column in found.items()}
+    torque, levels = found[TORQUE], levels_of(found["iq_a"])
+    noise = None if levels.max(initial=0) + 1 < _FEW_LEVELS else _noise(found)
+    if noise is None:
+        return None
+    made = segment_of(
+        capture,
+        "torque_table",
+        "drive",
+        1.0,
+        found=found,
+        sensors=Sensors({TORQUE: noise}),
+        channels=(TORQUE,),
+        weak=None,
+        blocks=levels,
+        offsets=np.full((1, torque.size), float(np.abs(torque).max())),
+    )
+    # angles that were set stand apart by more than the encoder's step
+    return replace(made, angle_step_rad=0.0)
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True currents [n] of a shaft that is clamped at the rows' angles."""
+    zero = np.zeros(signals["iq_a"].size)
+    theta = signals.get("theta_mech_rad", zero)
+    current = signals.get("id_a", zero) + 1j * signals["iq_a"]
+    eps = model.machine.pole_pairs * theta
+    current = table_current(segment, current, eps, zero, model, values)
+    return operating(segment, signals, model, values, current, Motion(theta, zero, zero))
+
+
+def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -> Array:
+    """The torque [1, n, N·m]; without time its transducer has no dynamics."""
+    return signals[TORQUE][None]
+
+
+def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Values) -> Array:
+    """The torque that the transducer shows [1, n, N·m].
+
+    Notes
+    -----
+    1.5 p [Im(ψ* i) + ∂W/∂ε] − drags, which is Kt i_q with Kt = 1.5 p ψ_m at small current.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (tests of permanent magnet machines: torque of a blocked rotor).
+
+    """
+    return as_sensed(net_torque(x, pieces), model, values)[None]
+
+
+def _noise(found: Mapping[str, Array]) -> float | None:
+    """Standard deviation [N·m] of the torques about their curves; None with too few rows."""
+    torque, current = found[TORQUE], found["iq_a"] / float(np.abs(found["iq_a"]).max())
+    angles = found.get("theta_mech_rad")
+    place = np.zeros(torque.size, dtype=np.int64) if angles is None else levels_of(angles)
+    if torque.size < 2 * _TERMS * (int(place.max()) + 1):
+        place = np.zeros(torque.size, dtype=np.int64)
+    free = torque.size - _TERMS * (int(place.max()) + 1)
+    if free < 1:
+        return None
+    power = sum(_about_its_curve(current[place == k], torque[place == k]) for k in np.unique(place))
+    least = max(_LEAST_NOISE * float(np.abs(torque).max()), 1e-12)
+    return max(math.sqrt(power / free), least)
+
+
+def _about_its_curve(current: Array, torque: Array) -> float:
+    """Sum of squares [N²·m²] of torques about offset, slope and sag over current."""
+    design = np.column_stack([np.ones(current.size), current, current**3])
+    left = torque - design @ np.linalg.lstsq(design, torque, rcond=None)[0]
+    return float(left @ left)
+
+
+EQUATION = Equation(
+    name="torque_table",
+    words="T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags of a clamped shaft",
+    tests=("torque_table",),
+    columns=("iq_a", TORQUE),
+    channels=(Channel(TORQUE, "torque_nm"),),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("ld_h", "lq_h", "psi_wb"),
+        hooks=frozenset({"flux", "torque"}),
+        sensors=frozenset({"current", "load"}),
+        torque_in=TORQUE,
+    ),
+    use=Use(shows=frozenset({"current"}), whole_beside=("dq",)),
+)

@@ -1,0 +1,1 @@
+"""Segments of a campaign and their residuals, whatever the kind of test."""

@@ -1,0 +1,35 @@
+"""What the equation of a segment can tell of constants, hooks and sensors."""
+
+from __future__ import annotations
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.library.equations import equation_of
+
+
+def observes_sensor(segment: Segment, sensor: str) -> bool:
+    """Whether an error of a sensor is in a segment's equation."""
+    if sensor == "load" and "torque_shaft_nm" not in segment.channels:
+        return False
+    return sensor in equation_of(segment).observes.sensors
+
+
+def observes(segment: Segment, effect: Effect) -> bool:
+    """Whether what an effect does is in a segment's equation at all."""
+    if effect.hook == "sensor":
+        return any(observes_sensor(segment, sensor) for sensor in _sensors_of(effect))
+    seen = equation_of(segment).observes
+    if effect.hook == "torque" and seen.torque_in and seen.torque_in not in segment.channels:
+        return False
+    return effect.hook in seen.hooks
+
+
+def _sensors_of(effect: Effect) -> tuple[str, ...]:
+    hooks = {
+        "angle": (effect.angle,),
+        "current": (effect.current,),
+        "voltage": (effect.voltage,),
+        "load": (effect.load, effect.shaft),
+        "clock": (effect.clock,),
+    }
+    return tuple(name for name, any_of in hooks.items() if any(h is not None for h in any_of))

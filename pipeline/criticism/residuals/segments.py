@@ -1,0 +1,87 @@
+"""From captures to segments: the signals that each equation needs, on one even clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.instruments import gains_of
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.sensor_noise import is_rounded
+from pipeline.criticism.data.traces import PAD, tellable
+from pipeline.criticism.effect import Machine
+from pipeline.criticism.library.equations import equations
+from pipeline.records.capture import Campaign, Capture
+
+_FEW = 12
+"""Windows of a segment in a rough fit: enough to meet a sound J to a tenth."""
+
+
+def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
+    """Every usable capture as a segment, in path order; a capture that lacks what its test's
+    equation needs, is too short, or whose clock does not rise, is left out.
+    """
+    made: list[Segment] = []
+    gains = gains_of(campaign.captures)
+    for recorded in campaign.captures:
+        capture = tellable(recorded) if recorded.meta.test in known_tests() else None
+        if capture is not None:
+            own = gains[recorded.path]
+            cut = (_by_encoder(s, machine.encoder_rad) for s in _cut(capture, machine))
+            made += [_by_instruments(segment, own) for segment in cut]
+    kinds = {segment.kind for segment in made}
+    # a table that other captures can predict is held out as a whole
+    whole = {e.name for e in equations().values() if kinds.intersection(e.use.whole_beside)}
+    return tuple(replace(s, blocks=None) if s.kind in whole else s for s in made)
+
+
+def known_tests() -> frozenset[str]:
+    """Tests that have an equation."""
+    return frozenset(test for equation in equations().values() for test in equation.tests)
+
+
+def _cut(capture: Capture, machine: Machine) -> Iterator[Segment]:
+    """The segments of a capture, one an equation that can use it."""
+    for equation in equations().values():
+        if capture.meta.test not in equation.tests or not capture.has(*equation.columns):
+            continue
+        segment = equation.cut(capture, machine)
+        if segment is not None and (segment.weak is None or segment.weak.starts.size):
+            yield segment
+
+
+def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
+    """The segment with the gains of the instruments that recorded it, by kind."""
+    volts = gains.get("gain_commanded") or gains.get("gain_voltage", "gain_voltage")
+    amps = gains.get("gain_current") or gains.get("gain_current_bench", "gain_current")
+    return replace(segment, meter=volts, ammeter=amps)
+
+
+def _by_encoder(segment: Segment, step: float) -> Segment:
+    """The segment with the encoder step that drive logs show, if its angle is in such steps.
+
+    A shaft that turns by nearly whole steps a sample does not show the step itself, and its
+    rounding is then periodic in the angle, as an electrical order is.
+    """
+    theta = segment.recorded.get("theta_mech_rad")
+    known = theta is not None and is_rounded(theta, step)
+    return replace(segment, angle_step_rad=step) if known else segment
+
+
+def sparse(segment: Segment) -> Segment:
+    """The same segment with a few of its windows only, for a first, rough fit."""
+    weak = segment.weak
+    if weak is None or weak.starts.size <= _FEW:
+        return segment
+    chosen = np.linspace(0, weak.starts.size - 1, _FEW).round().astype(np.int64)
+    starts = weak.starts[chosen]
+    rows = starts[:, None] - PAD + np.arange(weak.length + 2 * PAD)[None, :]
+    rows = np.clip(rows, 0, segment.size - 1).ravel()
+    cut = {name: column[rows] for name, column in segment.recorded.items()}
+    moved = PAD + (weak.length + 2 * PAD) * np.arange(_FEW)
+    few = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
+    blocks = None if segment.blocks is None else segment.blocks[chosen]
+    lines = None if segment.lines is None else segment.lines[:, :, chosen]
+    return replace(segment, recorded=cut, weak=few, blocks=blocks, lines=lines)

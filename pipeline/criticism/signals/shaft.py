@@ -1,0 +1,127 @@
+"""The shaft: torque of the air gap less drags less inertia, and what a transducer says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Operating, Recorded, Values
+from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, values_of
+from pipeline.criticism.signals.true_state import ahead_in
+
+TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
+"""Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
+
+
+def net_torque(x: Operating, pieces: Pieces) -> Array:
+    """Torque of the air gap less the drags [n, N·m]: 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags."""
+    return air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
+
+
+def unexplained_acceleration(
+    segment: Segment, x: Operating, torque_nm: Array, values: Values, stretch: float
+) -> Array:
+    """Acceleration of a free shaft that its torque leaves unexplained.
+
+    Parameters
+    ----------
+    segment : Segment
+        The segment, on its true clock.
+    x : Operating
+        Its state, at one or more points a sample.
+    torque_nm : array [n·m], N·m
+        What turns the shaft, at the points of `x`.
+    values : mapping
+        Values of the model; `j_kgm2` is the inertia.
+    stretch : float, 1
+        Recorded time over true time.
+
+    Returns
+    -------
+    array [n], rad/s²
+        By the recorded clock.
+
+    Notes
+    -----
+    (T/J − d²θ/dt²)/stretch². It is told in the angle sensor's units, since a torque's noise floor
+    would shrink with the inertia, and by the recorded clock, since a gain must not win by making
+    its residual small.
+
+    """
+    finer = x.theta_rad.size // segment.size
+    torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
+    acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
+    left: Array = (torque / values["j_kgm2"] - acceleration) / stretch**2
+    return left
+
+
+def sensed_torque(
+    segment: Segment, x: Operating, torque_nm: Array, model: Model, values: Values
+) -> Array:
+    """Torque [n, N·m] that a transducer shows: T − J d²θ/dt², with its errors and its gain."""
+    finer = x.theta_rad.size // segment.size
+    torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
+    acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
+    return as_sensed(torque - values["j_kgm2"] * acceleration, model, values)
+
+
+def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
+    """A true torque [n, N·m] of the shaft as its transducer shows it."""
+    for effect in model.effects:
+        if effect.shaft is not None:
+            torque_nm = effect.shaft(torque_nm, values_of(effect, model.machine, values))
+    return torque_nm * (1.0 + values["gain_torque"])
+
+
+def true_load(
+    segment: Segment,
+    signals: Mapping[str, Array],
+    model: Model,
+    values: Values,
+    *,
+    inverter: bool = False,
+) -> Array:
+    """Recorded torque [n, N·m], the dynamics of its transducer taken out."""
+    hooks = [e for e in model.effects if e.load is not None]
+    torque = signals["torque_shaft_nm"]
+    if not hooks:
+        return torque
+    zero = np.zeros(torque.size)
+    r = Recorded(
+        zero.astype(np.complex128),
+        torque,
+        zero,
+        zero,
+        segment.ts_s,
+        inverter,
+        segment.instrument,
+        ahead=ahead_in(segment, signals, model.machine.pole_pairs),
+    )
+    for effect in hooks:
+        if effect.load is not None:
+            q = values_of(effect, model.machine, values)
+            r = replace(r, torque_nm=effect.load(r, q))
+    return r.torque_nm
+
+
+def _second_difference(theta: Array, period: float) -> Array:
+    bend = np.zeros(theta.size)
+    bend[1:-1] = np.diff(theta, 2) / period**2
+    return bend
+
+
+def _averaged(fine: Array, finer: int) -> Array:
+    """Means [n] of a signal [n·m] under a triangle of two samples around each sample.
+
+    The second difference of the angle over T² is the mean acceleration under that triangle.
+    """
+    ramp = np.arange(finer) / finer**2
+    cells = fine.reshape(-1, finer)
+    # the part of each cell that counts for its own sample, and for the next one
+    own, after = cells @ (1.0 / finer - ramp), cells @ ramp
+    mean: Array = own.copy()
+    mean[1:] += after[:-1]
+    return mean

@@ -1,0 +1,258 @@
+"""True currents, angle and speed of a segment: what the sensors said, their effects taken out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.criticism.data.segment import Segment, slow_orders
+from pipeline.criticism.data.traces import smoothed
+from pipeline.criticism.effect import (
+    Array,
+    Complex,
+    Machine,
+    Operating,
+    Recorded,
+    Values,
+    between,
+)
+from pipeline.criticism.machine.model import Model, clock_gain, values_of
+
+_SPEED_S = 0.002
+"""Length of the mean that makes a speed of differenced angles [s]. By judgement: shorter, and the
+encoder's rounding is in drags of the speed; longer, and a reversal is blurred."""
+_SAME_RAD, _PARTS, _PART_RAD = 0.2, 8, 3.0
+"""What the highest order turns in a coasting sample that is as good as an instant; how many parts a
+longer one is averaged over at least, and what that wave may turn in one: the steps that stand for
+the triangle are wrong by a third of a percent of the wave at most."""
+_ANGLE_ROUNDS = 2
+"""Times that an angle error is looked up at the angle it gives: each round leaves of the error its
+own size times its order a turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Angle [n, rad] and speed [n, rad/s] of the shaft, electrical frequency [n, Hz]."""
+
+    theta_rad: Array
+    omega_rad_s: Array
+    freq_hz: Array
+
+
+def on_true_clock(segment: Segment, recorder: str | None, model: Model, values: Values) -> Segment:
+    """The segment with its true sample period in place of the recorded one."""
+    gain = clock_gain(recorder, model, values)
+    return replace(segment, ts_s=segment.ts_s / (1.0 + gain)) if gain else segment
+
+
+def at_rest(size: int) -> Motion:
+    """The motion of a shaft that stands still [size]."""
+    zero = np.zeros(size)
+    return Motion(zero, zero, zero)
+
+
+def motion_of(
+    segment: Segment, signals: Mapping[str, Array], machine: Machine, finer: int = 1
+) -> Motion:
+    """The shaft's motion from its angle; `finer` points a sample where the shaft turns so far in
+    one that the samples alone would miss an order of the torque.
+    """
+    theta = signals["theta_mech_rad"]
+    if finer > 1:
+        at = np.arange(theta.size * finer) / finer
+        theta = np.interp(at, np.arange(theta.size), theta)
+    omega = _speed(theta, segment.ts_s, finer)
+    return Motion(theta, omega, np.abs(omega) * machine.pole_pairs / (2 * math.pi))
+
+
+def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
+    """How many points a sample the torque of a free shaft is averaged over."""
+    highest = max(*slow_orders(machine), 1)
+    turn = highest * float(np.abs(np.diff(segment.recorded["theta_mech_rad"])).max())
+    if turn < _SAME_RAD:
+        return 1
+    return min(max(int(np.ceil(turn / _PART_RAD)), _PARTS), finest)
+
+
+def operating(
+    segment: Segment,
+    signals: Mapping[str, Array],
+    model: Model,
+    values: Values,
+    current: Complex,
+    motion: Motion,
+) -> Operating:
+    """Where the machine is at each sample of a bench, its true current and motion known."""
+    theta = motion.theta_rad
+    return Operating(
+        machine=model.machine,
+        base=values,
+        id_a=current.real,
+        iq_a=current.imag,
+        eps_rad=model.machine.pole_pairs * theta,
+        theta_rad=theta,
+        omega_rad_s=motion.omega_rad_s,
+        winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
+        magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size, values),
+        travel_rad=_travel(signals, theta.size),
+        run=_run(signals, theta.size),
+        runs_rad=segment.runs_rad,
+        inverter=False,
+        ts_s=segment.ts_s,
+        freq_hz=motion.freq_hz,
+        held=segment.test == "torque_map",
+        finer=theta.size // segment.size,
+    )
+
+
+def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) -> Operating:
+    """The state with the errors of the angle's sensor taken out of angle, speed and frame."""
+    if not any(effect.angle is not None for effect in model.effects):
+        return x
+    theta, current = x.theta_rad, x.id_a + 1j * x.iq_a
+    error = np.zeros(theta.size)
+    for _ in range(_ANGLE_ROUNDS):
+        nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
+        error = angle_error(nearer, model, values)
+    turned = error / model.machine.pole_pairs
+    current = current * np.exp(1j * error)
+    return replace(
+        x,
+        id_a=current.real,
+        iq_a=current.imag,
+        eps_rad=x.eps_rad - error,
+        theta_rad=theta - turned,
+        omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, theta.size // segment.size),
+    )
+
+
+def drive_current(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values, size: int
+) -> Complex:
+    """True current [size, A] of a drive's log, between its samples on straight lines."""
+    current = true_current(_recorded(segment, signals, model), segment.ammeter, model, values)
+    if current.size < size:
+        at = np.arange(size) * (current.size / size)
+        current = np.interp(at, np.arange(current.size), current)
+    return current
+
+
+def table_current(
+    segment: Segment,
+    current: Complex,
+    eps_rad: Array,
+    omega_e_rad_s: Array,
+    model: Model,
+    values: Values,
+) -> Complex:
+    """True current [n, A] of a table's rows, at their electrical angle and speed [n]."""
+    nothing = np.zeros(current.size)
+    recorded = Recorded(
+        current, nothing, eps_rad, omega_e_rad_s, segment.ts_s, False, segment.instrument
+    )
+    return true_current(recorded, segment.ammeter, model, values)
+
+
+def _speed(theta: Array, period: float, finer: int) -> Array:
+    width = max(2 * round(_SPEED_S / period / 2) + 1, 5) * finer
+    return smoothed(np.gradient(theta, period / finer), width)
+
+
+def _warmth(
+    segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
+) -> Array:
+    if name not in signals:
+        return np.full(size, segment.fixed["ambient_k"])
+    return signals[name] - 25.0 - values["offset_temp_k"]
+
+
+def _travel(signals: Mapping[str, Array], size: int) -> Array:
+    since = signals.get("travel_rad")
+    if since is None:
+        return np.full(size, np.inf)
+    known = np.isfinite(since)
+    if since.size == size:
+        return np.where(known, since, np.inf)
+    at = np.arange(size) * since.size / size
+    turned = np.interp(at, np.arange(since.size), np.where(known, since, 0.0))
+    return np.where(known[at.astype(np.int64)], turned, np.inf)
+
+
+def _run(signals: Mapping[str, Array], size: int) -> NDArray[np.int64]:
+    run = signals.get("run")
+    if run is None:
+        return np.zeros(size, dtype=np.int64)
+    return np.repeat(run.astype(np.int64), size // run.size)
+
+
+def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> Recorded:
+    theta = signals["theta_mech_rad"]
+    eps = model.machine.pole_pairs * theta
+    return Recorded(
+        i_a=signals.get("id_a", np.zeros(theta.size)) + 1j * signals["iq_a"],
+        torque_nm=signals.get("torque_shaft_nm", np.zeros(theta.size)),
+        eps_rad=eps,
+        omega_e_rad_s=np.gradient(eps, segment.ts_s),
+        ts_s=segment.ts_s,
+        inverter=True,
+        instrument=segment.instrument,
+        ahead=ahead_in(segment, signals, model.machine.pole_pairs),
+    )
+
+
+def ahead_in(
+    segment: Segment, signals: Mapping[str, Array], pole_pairs: int
+) -> Callable[[float], tuple[Complex, Array, Array]] | None:
+    """What currents, torque and electrical angle are later in the whole log of a segment, less what
+    they are now; None where nothing was thinned. The segment is on its true clock.
+    """
+    log, rows = segment.log, segment.recorded.get("t_s")
+    if not log or rows is None:
+        return None
+    steps = np.diff(rows)
+    if not (steps > 0.0).any():
+        return None
+    at = np.rint(rows / float(np.median(steps[steps > 0.0])))
+
+    def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
+        later = at + delay_s / segment.ts_s
+        change = {
+            name: between(column, later) - between(column, at) for name, column in log.items()
+        }
+        zero = np.zeros(at.size)
+        current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)
+        return current, change.get("torque_shaft_nm", zero), pole_pairs * change["theta_mech_rad"]
+
+    return ahead if at.size == next(iter(signals.values())).size else None
+
+
+def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values) -> Complex:
+    """True complex current [n, A] of a recorded one: gain and effects of its sensors taken out."""
+    gain = 1.0 + values[ammeter]
+    ahead = recorded.ahead
+    recorded = replace(recorded, i_a=recorded.i_a / gain)
+    if ahead is not None:
+
+        def scaled(delay_s: float) -> tuple[Complex, Array, Array]:
+            current, torque, turned = ahead(delay_s)
+            return current / gain, torque, turned
+
+        recorded = replace(recorded, ahead=scaled)
+    for effect in model.effects:
+        if effect.current is not None:
+            q = values_of(effect, model.machine, values)
+            recorded = replace(recorded, i_a=effect.current(recorded, q))
+    return recorded.i_a
+
+
+def angle_error(x: Operating, model: Model, values: Values) -> Array:
+    """Recorded less true electrical angle [n, rad] by the sensor effects of a model."""
+    total = np.zeros(x.omega_rad_s.shape)
+    for effect in model.effects:
+        if effect.angle is not None:
+            total = total + effect.angle(x, values_of(effect, model.machine, values))
+    return total

@@ -1,0 +1,99 @@
+"""Voltages of the winding: what flux and drops make, and what a meter says of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.effect import Array, Complex, Operating, Values
+from pipeline.criticism.machine.model import Model, Pieces, values_of
+from pipeline.criticism.signals.true_state import angle_error
+
+RIPPLES = ("ripple_edge", "ripple_shift")
+"""Nuisances of the current's ripple that are in the voltage (`model.BASE`)."""
+
+
+def rotor_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Complex:
+    """Voltage in the rotor frame at each sample.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Flux linkage and voltage drop [n, Wb and V].
+    omega_e_rad_s : array [n], rad/s
+        Electrical speed.
+    period_s : float, s
+        Sample period.
+
+    Returns
+    -------
+    complex array [n], V
+        d + jq; without the slope of the flux at both ends.
+
+    Notes
+    -----
+    v = drop + dψ/dt + j ω_e ψ, the slope a central difference.
+
+    """
+    slope = central(pieces.psi_wb, period_s)
+    voltage: Complex = pieces.drop_v + slope + 1j * omega_e_rad_s * pieces.psi_wb
+    return voltage
+
+
+def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Complex:
+    """Voltage [n, V] in the rotor frame that is held from each sample to the next.
+
+    Notes
+    -----
+    v = mean of drop + dψ/dt + j ω_e mean of ψ, means and slope over the step to the next sample.
+
+    """
+    slope = forward(pieces.psi_wb, period_s)
+    psi, drop = ahead(pieces.psi_wb), ahead(pieces.drop_v)
+    voltage: Complex = drop + slope + 1j * omega_e_rad_s * psi
+    return voltage
+
+
+def recorded_voltage(
+    voltage: Complex,
+    segment: Segment,
+    x: Operating,
+    model: Model,
+    values: Values,
+    *,
+    in_frame: bool = False,
+) -> Complex:
+    """What the voltmeter says of a true voltage [n, V]: the effects of its errors, and its gain.
+
+    `in_frame`: the voltage was turned into the rotor's frame by the recorded angle, error and all.
+    """
+    for effect in model.effects:
+        if effect.voltage is not None:
+            q = values_of(effect, model.machine, values)
+            voltage = effect.voltage(voltage, x, q, segment.instrument)
+    if in_frame and any(effect.angle is not None for effect in model.effects):
+        voltage = voltage * np.exp(-1j * angle_error(x, model, values))
+    return voltage * (1.0 + values[segment.meter])
+
+
+def central(signal: Any, period_s: float) -> Any:
+    """Slope [n] by central differences, zero at both ends."""
+    slope = np.zeros_like(signal)
+    slope[1:-1] = (signal[2:] - signal[:-2]) / (2 * period_s)
+    return slope
+
+
+def forward(signal: Any, period_s: float) -> Any:
+    """Slope [n] to the next sample, zero at the last."""
+    slope = np.zeros_like(signal)
+    slope[:-1] = np.diff(signal) / period_s
+    return slope
+
+
+def ahead(signal: Any) -> Any:
+    """Mean [n] of each sample and the next; the last as it is."""
+    mean = signal.copy()
+    mean[:-1] = 0.5 * (signal[:-1] + signal[1:])
+    return mean

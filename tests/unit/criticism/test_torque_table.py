@@ -1,0 +1,100 @@
+"""A table of torque against current: Kt from it, what bends it, and what it says nothing of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.criticism.comparison import compare
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.criticism.residuals.segments import segments
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.design import EXACT
+from tests.recovery.simulated import BENCH, MOTOR, recorded
+
+EXACTLY = replace(BENCH, instruments=EXACT)
+KT_NM_A = 1.5 * MOTOR.pole_pairs * MOTOR.psi_pm_wb
+
+
+def table(**protocol) -> Campaign:
+    return recorded((("torque_table", "torque_table", protocol),), 3, bench=EXACTLY)[0]
+
+
+def with_torque(campaign: Campaign, torque) -> Campaign:
+    """The same table with a torque of its q current [A] and angle [rad]."""
+    (capture,) = campaign.captures
+    rows = capture.arrays("iq_a", "theta_mech_rad")
+    column = pl.Series("torque_shaft_nm", torque(rows["iq_a"], rows["theta_mech_rad"]))
+    changed = capture.tables[0].with_columns(column)
+    return replace(campaign, captures=(replace(capture, tables=(changed,)),))
+
+
+def fit_of(campaign: Campaign):
+    machine = machine_of(campaign, Constants())
+    found = segments(campaign, machine)
+    return first_fit(found, rough_fit(found, Model(machine, ())))
+
+
+def test_its_slope_is_kt():
+    """1.5 p psi, whatever the transducer's zero is."""
+    fitted, _ = fit_of(table())
+    assert 1.5 * 7 * fitted.values["psi_wb"] == pytest.approx(KT_NM_A, rel=2e-3)
+    moved = with_torque(table(), lambda iq, _: 0.2 + KT_NM_A * iq)
+    assert 1.5 * 7 * fit_of(moved)[0].values["psi_wb"] == pytest.approx(KT_NM_A, rel=1e-4)
+
+
+def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
+    random = np.random.default_rng(1)
+    noisy = with_torque(
+        table(),
+        lambda iq, theta: (
+            KT_NM_A * iq + 0.05 * np.sin(42 * theta + 1.0) + random.normal(0.0, 2e-3, iq.size)
+        ),
+    )
+    (segment,) = segments(noisy, machine_of(noisy, Constants()))
+    assert segment.noise["torque_shaft_nm"] == pytest.approx(2e-3, rel=0.25)
+    assert segment.angle_step_rad == 0.0
+
+
+def test_too_few_levels_are_no_table():
+    campaign = table(levels=(-1.0, 0.5, 1.0))
+    assert segments(campaign, machine_of(campaign, Constants())) == ()
+
+
+def test_diagnose_reads_it_beside_a_coast():
+    """A coast says nothing of the magnet: that there is enough comes of the table."""
+    plan = (("spin_down", "spin_down", {}), ("torque_table", "torque_table", {}))
+    both = recorded(plan, 3, bench=EXACTLY)[0]
+    model = ModelSpec("standard", ())
+    start = Constants()
+    assert diagnose(with_pole_pairs(both), model, start).ladder
+    alone = replace(both, captures=tuple(c for c in both.captures if c.meta.test == "spin_down"))
+    assert not diagnose(with_pole_pairs(alone), model, start).ladder
+
+
+def with_pole_pairs(campaign: Campaign) -> Campaign:
+    captures = (replace(c, meta=replace(c.meta, pole_pairs=7)) for c in campaign.captures)
+    return replace(campaign, captures=tuple(captures))
+
+
+def test_compare_maps_what_a_sagging_iron_takes_of_it():
+    """12 % less torque at full current: q current takes of the flux along d."""
+    sagging = with_torque(table(), lambda iq, _: KT_NM_A * iq * (1.0 - 8e-4 * iq**2))
+    errors = []
+    for effects in ((), ("cross_saturation",)):
+        told = compare(sagging, ModelSpec("ideal", effects), Constants()).errors
+        assert {(one.signal, one.capture) for one in told} == {
+            ("torque_shaft_nm", "torque_table.mcap")
+        }
+        errors.append(max(one.rmse for one in told))
+    plain, bent = errors
+    assert plain > 0.003
+    assert bent < 0.5 * plain
