@@ -49,9 +49,9 @@ class Source:
             return None
         term = self.terms.get(name)
         if term is None or term.unit != estimate.unit:
-            said = "is not in the glossary" if term is None else f"is stated in {estimate.unit}"
+            reason = "is not in the glossary" if term is None else f"is stated in {estimate.unit}"
             raise UsageError(
-                f"motor {self.sheet.motor_id!r}: the convention of {name} is unknown, it {said}",
+                f"motor {self.sheet.motor_id!r}: the convention of {name} is unknown, it {reason}",
                 "rename it to a name of docs/glossary.md, which says peak or rms, phase or line",
             )
         return estimate if estimate.known and estimate.status in USABLE else None

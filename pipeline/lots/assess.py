@@ -131,13 +131,13 @@ def _corrections(values: Sequence[Value], golden: Sequence[Value]) -> Correction
 
 def _linked(values: Sequence[Value], correction: Correction) -> tuple[list[Value], set[str], str]:
     """Values that can be compared; baseline lots that cannot; why nothing can, or nothing."""
-    mine = {label(v) for v in values if v.side == "candidate"}
-    theirs = {label(v) for v in values if v.side == "baseline"}
-    if not mine or not theirs:
+    candidate = {label(v) for v in values if v.side == "candidate"}
+    baseline = {label(v) for v in values if v.side == "baseline"}
+    if not candidate or not baseline:
         return list(values), set(), ""
-    sets = {correction.group[name] for name in mine}
+    sets = {correction.group[name] for name in candidate}
     if len(sets) > 1:
-        words = f"the candidate's stations {_names(mine)} are not linked to each other"
+        words = f"the candidate's stations {_names(candidate)} are not linked to each other"
         return list(values), set(), words
     unlinked = {
         v.lot for v in values if v.side == "baseline" and correction.group[label(v)] not in sets
@@ -146,7 +146,8 @@ def _linked(values: Sequence[Value], correction: Correction) -> tuple[list[Value
     if any(v.side == "baseline" for v in kept):
         return kept, unlinked, ""
     words = (
-        f"station {_names(mine)} of the candidate and {_names(theirs)} of the baseline are linked "
+        f"station {_names(candidate)} of the candidate and {_names(baseline)} of the baseline are "
+        "linked "
         "by nothing: no golden motor, no lot measured on both"
     )
     return list(values), set(), words

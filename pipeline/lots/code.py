@@ -1,6 +1,6 @@
 """The same captures under two versions of the pipeline, so that the new one can be approved.
 
-Nothing was measured anew, so nothing but the method can differ; each change is held against the
+Nothing was measured again, so only the method can differ; each change is held against the
 standard uncertainty that the old version stated. A change below a third of u hardly widens it (5 %
 if it were added in squares); one above u says that one of the two versions is wrong by its own
 account.
@@ -248,7 +248,7 @@ def _checks(pairs: Sequence[Pair]) -> tuple[EffectChange, ...]:
         worse = sorted(new - old)
         verdict: Verdict = "fail" if worse else "marginal"
         why = (
-            f"failing it anew: {counted(len(worse), 'motor')}, {', '.join(worse[:5])}"
+            f"failing it now: {counted(len(worse), 'motor')}, {', '.join(worse[:5])}"
             if worse
             else f"no longer failing it: {counted(len(old - new), 'motor')}"
         )

@@ -38,10 +38,10 @@ def order_levels(members: Sequence[Member]) -> tuple[OrderLevel, ...]:
     sides: tuple[Side, ...] = ("baseline", "candidate")
     spectra = {side: spectra_of(members, side) for side in sides}
     for order in _largest([*spectra["baseline"], *spectra["candidate"]]):
-        for side, own in spectra.items():
-            if not own:
+        for side, of_side in spectra.items():
+            if not of_side:
                 continue
-            sizes = [sum(o.amplitude for o in orders if o.order == order) for orders in own]
+            sizes = [sum(o.amplitude for o in orders if o.order == order) for orders in of_side]
             levels.append(
                 OrderLevel(
                     side,
@@ -73,21 +73,21 @@ def cogging_bands(members: Sequence[Member]) -> tuple[CoggingBand, ...]:
     bands = []
     sides: tuple[Side, ...] = ("baseline", "candidate")
     spectra = {side: [s for s in spectra_of(members, side) if s] for side in sides}
-    highest = max(_largest([s for own in spectra.values() for s in own]), default=0)
+    highest = max(_largest([s for of_side in spectra.values() for s in of_side]), default=0)
     if highest == 0:
         return ()
     points = min(POINTS_A_PERIOD * highest + 1, MOST_POINTS)
     theta = np.linspace(0.0, 2.0 * math.pi, points)
-    for side, own in spectra.items():
-        if not own:
+    for side, of_side in spectra.items():
+        if not of_side:
             continue
-        waves = np.array([_wave(orders, theta) for orders in own])
+        waves = np.array([_wave(orders, theta) for orders in of_side])
         mean = waves.mean(axis=0)
-        spread = waves.std(axis=0, ddof=1) if len(own) > 1 else np.zeros(points)
+        spread = waves.std(axis=0, ddof=1) if len(of_side) > 1 else np.zeros(points)
         bands.append(
             CoggingBand(
                 side,
-                len(own),
+                len(of_side),
                 tuple(theta.tolist()),
                 tuple(mean.tolist()),
                 tuple((mean - spread).tolist()),

@@ -51,7 +51,7 @@ class Family:
 class Material:
     """Everything known of one constant: values, repeats and golden motors with it."""
 
-    own: ConstantLimits
+    limits: ConstantLimits
     unit: str
     words: str
     found: Assessment
@@ -74,15 +74,17 @@ def result(
     conform = conformity(made.held, candidate, found.corrected, mean, spread)
     test = _test(found, family, limits)
     same = _equivalence(found, made.held.margin, limits.alpha)
-    told = judge(made.own, made.unit, found, conform, test, same, family.motor_p_holm, limits.alpha)
+    decided = judge(
+        made.limits, made.unit, found, conform, test, same, family.motor_p_holm, limits.alpha
+    )
     tolerance = made.held.tolerance
     return ConstantResult(
-        name=made.own.name,
+        name=made.limits.name,
         unit=made.unit,
         words=made.words,
-        verdict=told.verdict,
-        why=told.why,
-        decides=made.own.decides,
+        verdict=decided.verdict,
+        why=decided.why,
+        decides=made.limits.decides,
         temperature_degc=25.0,
         motors=_motors(found, made.held),
         lots=_lots(found, limits, started),
@@ -170,7 +172,7 @@ def _motors(found: Assessment, held: Held) -> tuple[MotorValue, ...]:
             by_lot.setdefault((value.side, value.lot), []).append(value)
     keys = {key: f"{key[0]}/{key[1]}" for key in by_lot}
     scores = robust_z(
-        {keys[key]: [found.corrected[v.motor_id] for v in own] for key, own in by_lot.items()}
+        {keys[key]: [found.corrected[v.motor_id] for v in of_lot] for key, of_lot in by_lot.items()}
     )
     limit = critical_z(len(found.values), len(by_lot))
     return tuple(
@@ -187,8 +189,8 @@ def _motors(found: Assessment, held: Held) -> tuple[MotorValue, ...]:
             outlier=abs(z) > limit,
             capture=value.captures[0] if value.captures else None,
         )
-        for key, own in by_lot.items()
-        for value, z in zip(own, scores[keys[key]], strict=True)
+        for key, of_lot in by_lot.items()
+        for value, z in zip(of_lot, scores[keys[key]], strict=True)
     )
 
 
@@ -206,7 +208,7 @@ def _lots(found: Assessment, limits: Limits, started: Mapping[str, str]) -> tupl
     drawn = []
     for i, (side, lot, values) in enumerate(sides):
         sd = float(np.std(values, ddof=1)) if len(values) > 1 else None
-        own = found.within_sd if sd is None else sd
+        within_sd = found.within_sd if sd is None else sd
         drawn.append(
             LotMean(
                 lot,
@@ -214,7 +216,7 @@ def _lots(found: Assessment, limits: Limits, started: Mapping[str, str]) -> tupl
                 started.get(lot),
                 len(values),
                 float(np.mean(values)),
-                (own or 0.0) / math.sqrt(len(values)),
+                (within_sd or 0.0) / math.sqrt(len(values)),
                 sd,
                 float(chart.ewma[i]) if charted else None,
                 float(chart.low[i]) if charted else None,
@@ -245,8 +247,8 @@ def gauge_of(repeats: Sequence[Value]) -> Gauge | None:
         if value.station is not None:
             cells.setdefault(value.motor_id, {}).setdefault(value.station, []).append(value.value)
     by_stations: dict[tuple[str, ...], list[str]] = {}
-    for motor, own in cells.items():
-        full = tuple(sorted(station for station, values in own.items() if len(values) > 1))
+    for motor, of_station in cells.items():
+        full = tuple(sorted(station for station, values in of_station.items() if len(values) > 1))
         if len(full) > 1:
             by_stations.setdefault(full, []).append(motor)
     if not by_stations:
@@ -267,14 +269,14 @@ def _stations(made: Material) -> tuple[StationBias, ...]:
         golden.setdefault(label(value), set()).add(value.motor_id)
     rows = []
     for name in sorted(seen):
-        told = found.correction.bias.get(name)
+        bias = found.correction.bias.get(name)
         motors = len(golden.get(name, ()))
-        by = "golden" if told is not None and motors else "lots" if told is not None else ""
+        by = "golden" if bias is not None and motors else "lots" if bias is not None else ""
         if not by:
             sides = {v.side for v in found.values if label(v) == name}
             both = sides >= {"baseline", "candidate"} and seen[name].station is not None
             by = "same_station" if both else "unreferenced"
-        u = found.correction.u_of(name) if told is not None else None
+        u = found.correction.u_of(name) if bias is not None else None
         shown = seen[name].station or "(not stated)"
-        rows.append(StationBias(shown, told, u, by, motors))  # type: ignore[arg-type]
+        rows.append(StationBias(shown, bias, u, by, motors))  # type: ignore[arg-type]
     return tuple(rows)

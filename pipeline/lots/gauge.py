@@ -131,7 +131,7 @@ def study(values: Array, level: float = LEVEL) -> Gauge:
     """Gauge R&R of readings [P, O, n], with the interval of its share of the study variation.
 
     The interval is the generalized one [2]: each mean square over its own chi-square draw, the
-    components and their ratio anew for each of the draws, from a fixed seed.
+    components and their ratio again for each of the draws, from a fixed seed.
     """
     table = anova(values)
     found = components(table)

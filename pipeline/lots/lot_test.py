@@ -41,12 +41,12 @@ def lot_test(
     lots = means.shape[-1]
     if lots < 2:
         raise ValueError("the scatter of lots needs two of them")
-    own = np.var(means, axis=-1, ddof=1) * (1.0 / new_lots + 1.0 / lots)
-    total = own + np.asarray(u_more, float) ** 2
+    scatter = np.var(means, axis=-1, ddof=1) * (1.0 / new_lots + 1.0 / lots)
+    total = scatter + np.asarray(u_more, float) ** 2
     gap = new - means.mean(axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(total > 0.0, gap / np.sqrt(total), np.where(gap == 0.0, 0.0, np.inf * gap))
-        dof = np.where(own > 0.0, (lots - 1) * (total / own) ** 2, lots - 1.0)
+        dof = np.where(scatter > 0.0, (lots - 1) * (total / scatter) ** 2, lots - 1.0)
     dof = np.minimum(dof, 1e9)
     return Tested(t, dof, 2.0 * stdtr(dof, -np.abs(t)))
 

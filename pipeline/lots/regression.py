@@ -35,7 +35,7 @@ WORDS: Mapping[Verdict, str] = {
     "undecided": "not shown to be the same as the baseline",
     "not_evaluated": "not evaluated",
     "INSUFFICIENT_HISTORY": "not decided: INSUFFICIENT_HISTORY, too few baseline lots",
-    "CONFOUNDED": "not decided: CONFOUNDED, the lot and its station cannot be told apart",
+    "CONFOUNDED": "not decided: CONFOUNDED, the lot and its station cannot be separated",
 }
 
 
@@ -65,7 +65,9 @@ def compare_lots(
     """The whole comparison; `terms` gives each constant its unit and words."""
     lots = lots_in_order(samples.members)
     order = [lot for lot, _ in lots]
-    materials = [_material(own, samples, limits, terms, order) for own in limits.family()]
+    materials = [
+        _material(one_limits, samples, limits, terms, order) for one_limits in limits.family()
+    ]
     constants = tuple(
         result(made, family, limits, dict(lots))
         for made, family in zip(materials, _families(materials, limits), strict=True)
@@ -104,25 +106,25 @@ def used(limits: Limits) -> LimitsUsed:
 
 
 def _material(
-    own: ConstantLimits,
+    of_constant: ConstantLimits,
     samples: Samples,
     limits: Limits,
     terms: Mapping[str, Term],
     order: Sequence[str],
 ) -> Material:
-    values, missing = values_of(own.name, samples.members)
-    golden, _ = values_of(own.name, samples.golden)
-    repeats, _ = values_of(own.name, samples.repeats)
+    values, missing = values_of(of_constant.name, samples.members)
+    golden, _ = values_of(of_constant.name, samples.golden)
+    repeats, _ = values_of(of_constant.name, samples.repeats)
     golden = independent(golden)
     found = assess(values, golden, order)
     mean = float(np.mean(found.base_means)) if found.base else None
-    term = terms.get(own.name)
+    term = terms.get(of_constant.name)
     return Material(
-        own,
+        of_constant,
         term.unit if term else "1",
-        term.words if term else own.name,
+        term.words if term else of_constant.name,
         found,
-        hold(own, values, found.corrected, mean, found.within_sd, limits.k),
+        hold(of_constant, values, found.corrected, mean, found.within_sd, limits.k),
         tuple(golden),
         tuple(independent(repeats)),
         tuple(missing) if values else (),
@@ -130,7 +132,7 @@ def _material(
 
 
 def _families(materials: Sequence[Material], limits: Limits) -> list[Family]:
-    """Holm over the constants, for the lot-level test and for the motors' own."""
+    """Holm over the constants, for the lot-level test and for that of the motors."""
     lots = [_lot_p(made.found, limits.min_lots) for made in materials]
     motors = [_motor_p(made.found) for made in materials]
     size = max(sum(p is not None for p in motors), 1)
@@ -217,5 +219,5 @@ def _notes(materials: Sequence[Material]) -> list[str]:
                 f"baseline lots {lots} are of stations that nothing links to the candidate's, "
                 "and are left out",
                 [],
-            ).append(made.own.name)
+            ).append(made.limits.name)
     return [f"{words} ({', '.join(names)})" for words, names in notes.items()]

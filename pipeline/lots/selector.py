@@ -51,11 +51,11 @@ class Wanted:
     text: str
     literal: bool = False
 
-    def fits(self, told: str | None) -> bool:
+    def fits(self, value: str | None) -> bool:
         """Whether a text is meant."""
-        if told is None:
+        if value is None:
             return False
-        return told == self.text or (not self.literal and fnmatchcase(told, self.text))
+        return value == self.text or (not self.literal and fnmatchcase(value, self.text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,17 +102,17 @@ def parse_selector(text: str, versions: Sequence[Version]) -> Query:
         raise UsageError("the selector is empty or too long", _example())
     terms: dict[str, list[Wanted]] = {}
     field: str | None = None
-    for said, one in _terms(text):
-        if said is not None:
-            field = ALIASES.get(said.lower(), said.lower())
+    for name, term in _terms(text):
+        if name is not None:
+            field = ALIASES.get(name.lower(), name.lower())
             if field not in FIELDS:
                 raise UsageError(
-                    f"selector {text!r}: no field {said!r}", f"known are {', '.join(FIELDS)}"
+                    f"selector {text!r}: no field {name!r}", f"known are {', '.join(FIELDS)}"
                 )
         elif field is None:
-            field = _looked_up(text, one, versions)
-        _checked(text, field, one)
-        terms.setdefault(field, []).append(one)
+            field = _looked_up(text, term, versions)
+        _checked(text, field, term)
+        terms.setdefault(field, []).append(term)
     return Query(text, {name: tuple(wanted) for name, wanted in terms.items()})
 
 
@@ -144,21 +144,23 @@ def _looked_up(text: str, one: Wanted, versions: Sequence[Version]) -> str:
 
 
 def known(versions: Sequence[Version], most: int = 12) -> str:
-    """What there is to choose from, in one line."""
-    own = [version.published for version in versions]
+    """The available choices, in one line."""
+    published = [version.published for version in versions]
     groups = (
-        ("lots", {row.lot for row in own}),
-        ("types", {row.motor_type for row in own}),
-        ("stations", {station for row in own for station in row.stations}),
+        ("lots", {row.lot for row in published}),
+        ("types", {row.motor_type for row in published}),
+        ("stations", {station for row in published for station in row.stations}),
         ("tags", {tag for version in versions for tag in version.tags}),
     )
-    told = []
+    parts = []
     for name, texts in groups:
         names = sorted(text for text in texts if text)
         if names:
             more = f" and {len(names) - most} more" if len(names) > most else ""
-            told.append(f"{name} {', '.join(names[:most])}{more}")
-    return "there are " + "; ".join(told) if told else "the registry names no lot, type or station"
+            parts.append(f"{name} {', '.join(names[:most])}{more}")
+    return (
+        "there are " + "; ".join(parts) if parts else "the registry names no lot, type or station"
+    )
 
 
 def _checked(text: str, field: str, one: Wanted) -> None:

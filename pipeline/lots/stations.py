@@ -1,7 +1,7 @@
 """What part of a difference is the station's: links between stations, their biases, with u.
 
 A station reads all its motors too high or too low by one amount. A lot that was measured on one
-station alone tells nothing of it; what links stations are golden motors measured on all of them,
+station alone says nothing of it; what links stations are golden motors measured on all of them,
 lots that were split over them, and a station that measured both sides.
 
 Model: y = block + station + error, a block being a lot or a golden motor; solved by weighted least
@@ -82,8 +82,8 @@ def station_correction(readings: Sequence[Reading], stations: Iterable[str]) -> 
     for number in sorted(set(group.values())):
         members = [name for name in names if group[name] == number]
         if len(members) > 1:
-            own = [r for r in readings if r.station in members and len(blocks[r.block]) > 1]
-            _solve(own, members, bias, covariance)
+            linked = [r for r in readings if r.station in members and len(blocks[r.block]) > 1]
+            _solve(linked, members, bias, covariance)
     return Correction(group, bias, covariance)
 
 
@@ -118,11 +118,11 @@ def _solve(
     for reading in readings:
         by_block.setdefault(reading.block, []).append(reading)
     floor = 1e-12 * max((abs(r.value) for r in readings), default=1.0) or 1e-12
-    for own in by_block.values():
-        weight = np.array([1.0 / max(r.sd, floor) ** 2 for r in own])
-        design = np.zeros((len(own), size))
-        design[np.arange(len(own)), [column[r.station] for r in own]] = 1.0
-        value = np.array([r.value for r in own])
+    for block in by_block.values():
+        weight = np.array([1.0 / max(r.sd, floor) ** 2 for r in block])
+        design = np.zeros((len(block), size))
+        design[np.arange(len(block)), [column[r.station] for r in block]] = 1.0
+        value = np.array([r.value for r in block])
         share = weight / weight.sum()
         design -= share @ design
         value = value - share @ value
@@ -150,9 +150,9 @@ def _misfit(
 ) -> float:
     """Sum of squares of the weighted residuals."""
     total = 0.0
-    for own in blocks:
-        weight = np.array([1.0 / max(r.sd, floor) ** 2 for r in own])
-        left = np.array([r.value - solution[column[r.station]] for r in own])
-        left -= np.sum(weight * left) / weight.sum()
-        total += float(np.sum(weight * left**2))
+    for block in blocks:
+        weight = np.array([1.0 / max(r.sd, floor) ** 2 for r in block])
+        residual = np.array([r.value - solution[column[r.station]] for r in block])
+        residual -= np.sum(weight * residual) / weight.sum()
+        total += float(np.sum(weight * residual**2))
     return total

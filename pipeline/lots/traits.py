@@ -88,21 +88,21 @@ def effects_shown(
     """The effects that each diagnosed motor's model lacks; motors of too little data are out."""
     found = []
     for member in members:
-        told = diagnoses.get(member.sheet.motor_id)
-        if member.side is None or told is None or told.verdict == "insufficient":
+        diagnosis = diagnoses.get(member.sheet.motor_id)
+        if member.side is None or diagnosis is None or diagnosis.verdict == "insufficient":
             continue
         sizes: dict[str, float | None] = {}
         units: dict[str, str] = {}
-        for effect in told.missing:
-            own = told.parameters.get(effect, {})
-            waves = _orders(own)
+        for effect in diagnosis.missing:
+            parameters = diagnosis.parameters.get(effect, {})
+            waves = _orders(parameters)
             # Of several parameters none is the size.
-            only = next(iter(own.values())) if len(own) == 1 else None
+            only = next(iter(parameters.values())) if len(parameters) == 1 else None
             sizes[effect] = None if only is None else only[0]
             units[effect] = "" if only is None else only[1]
             sizes |= {f"{order_name(k)} (diagnosed)": size for k, size in waves.items()}
             units |= {f"{order_name(k)} (diagnosed)": "N·m" for k in waves}
-        if told.verdict == "unknown":
+        if diagnosis.verdict == "unknown":
             sizes["unknown structure"] = None
         found.append(Shown(member.sheet.motor_id, member.lot, member.side, sizes, units))
     return found

@@ -71,10 +71,10 @@ def parted(
     if motor is not None and capture is not None:
         motor = max(0.0, motor - capture)
     station = float(np.var(biases, ddof=1)) if len(biases) > 1 else None
-    told = "from linked stations" if station is not None else "one station, or none linked"
+    origin = "from linked stations" if station is not None else "one station, or none linked"
     sized = (
         ("lot", among.between, among.dof_between, "needs two lots" * (among.between is None)),
-        ("station", station, max(len(biases) - 1, 0), told),
+        ("station", station, max(len(biases) - 1, 0), origin),
         ("motor", motor, among.dof_within, "needs two motors in a lot" * (motor is None)),
         ("capture", capture, dof, note),
     )

@@ -1,7 +1,7 @@
 """Means of an error over cells, with p-values that autocorrelation does not fool.
 
 The independent units are visits: stretches of a record that stay in one cell. How far apart visits
-of the same cell lie tells what chance does to a cell's mean, whatever the correlation inside a
+of the same cell lie shows what chance does to a cell's mean, whatever the correlation inside a
 visit is.
 
 References: [1] Cameron, Gelbach & Miller, Rev. Econ. Stat. 90 (2008), inference by clusters; [2]
@@ -23,7 +23,7 @@ FEWEST_VISITS = 8
 
 @dataclass(frozen=True, slots=True)
 class CellMeans:
-    """Means [C, unit of the error], counts [C] and p-values [C] of cells; NaN where not told.
+    """Means [C, unit of the error], counts [C] and p-values [C] of cells; NaN where unknown.
 
     `p_value` is that of a mean this far from zero, `p_all` that of means this far from each other;
     `explained` is the share of the error's variance that lies between the cells.

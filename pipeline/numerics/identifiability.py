@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 TIED = 1e-10
 """Singular value, over the largest, of unit columns that are taken for tied. By judgement: exact
 ties of columns from finite differences come out at 1e-14."""
-_UNHEARD = 1e-6
+_UNOBSERVED = 1e-6
 """Standard deviations of the data that a parameter must make when it moves by its own size."""
 _TOUCHED = 0.1
 """Standard uncertainties by which a direction without information moves what it leaves alone."""
@@ -106,19 +106,19 @@ def identify(rows: Array, sizes: Array) -> Identified:
     if not (sizes > 0.0).all():
         raise ValueError("every parameter needs a size above zero")
     length = np.linalg.norm(rows, axis=0)
-    heard = length * sizes > _UNHEARD
+    observed = length * sizes > _UNOBSERVED
     count = sizes.size
     root = np.zeros((count, count))
-    null = [np.eye(count)[:, ~heard]]
-    if heard.any():
-        scale = length[heard]
-        triangle = np.linalg.qr(rows[:, heard] / scale, mode="r")
+    null = [np.eye(count)[:, ~observed]]
+    if observed.any():
+        scale = length[observed]
+        triangle = np.linalg.qr(rows[:, observed] / scale, mode="r")
         _, singular, right = np.linalg.svd(triangle, full_matrices=False)
-        told = singular > TIED * singular[0]
-        root[heard, : int(told.sum())] = (right[told] / scale).T / singular[told]
+        known = singular > TIED * singular[0]
+        root[observed, : int(known.sum())] = (right[known] / scale).T / singular[known]
         # fewer rows than columns leave directions that the decomposition does not give
-        tied = np.zeros((count, int(heard.sum()) - int(told.sum())))
-        tied[heard] = _complement(right[told]) / (scale * sizes[heard])[:, None]
+        tied = np.zeros((count, int(observed.sum()) - int(known.sum())))
+        tied[observed] = _complement(right[known]) / (scale * sizes[observed])[:, None]
         null.append(tied)
     free = np.column_stack(null)
     axes_of_sizes, _ = np.linalg.qr(free)
@@ -166,8 +166,8 @@ def known_combinations(
     """
     kept: list[Combination] = []
     for one in (*_products(found, values, places, positive), *_sums(found, values, places)):
-        told = [*(other.gradient * found.sizes for other in kept), one.gradient * found.sizes]
-        if within(np.array(one.u), np.array(one.size)) and _new(told):
+        gradients = [*(other.gradient * found.sizes for other in kept), one.gradient * found.sizes]
+        if within(np.array(one.u), np.array(one.size)) and _new(gradients):
             kept.append(one)
     return tuple(kept)
 

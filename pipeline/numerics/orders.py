@@ -124,7 +124,7 @@ def largest_order(turns: Sequence[Turn], ceiling: int) -> int:
 def even_positions(turns: Sequence[Turn]) -> int | None:
     """How many evenly spaced positions every turn was sampled at; None where they are uneven.
 
-    On n even positions the orders k, n - k, n + k, ... cannot be told apart.
+    On n even positions the orders k, n - k, n + k, ... cannot be separated.
     """
     counts = set()
     for turn in turns:

@@ -72,7 +72,7 @@ def window_starts(
 ) -> NDArray[np.int64]:
     """First samples [W] of the windows that hold usable samples only, one every `hop`.
 
-    `hop` is half a window unless told; of more than `most` windows an even selection stays.
+    `hop` is half a window by default; of more than `most` windows an even selection stays.
     """
     starts: NDArray[np.int64] = np.arange(
         0, max(keep.size - length, -1) + 1, hop or max(length // 2, 1)

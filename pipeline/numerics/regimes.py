@@ -59,13 +59,13 @@ def stretches(
     """Equal states in a row [b] become one stretch; shorter ones than `shortest` join the last."""
     cuts = np.flatnonzero(np.concatenate([[True], states[1:] != states[:-1]]))
     lengths = np.diff(np.append(cuts, states.size))
-    told: list[Stretch] = []
+    stretches: list[Stretch] = []
     for cut, length in zip(cuts, lengths, strict=True):
         state = str(states[cut])
-        if told and (length < shortest or state == told[-1].state):
+        if stretches and (length < shortest or state == stretches[-1].state):
             continue
-        told.append(Stretch(int(starts[cut]), state))
-    return tuple(told)
+        stretches.append(Stretch(int(starts[cut]), state))
+    return tuple(stretches)
 
 
 def _means(values: Array, starts: NDArray[np.int64]) -> Array:

@@ -149,7 +149,7 @@ def smooth_speed(t_s: Array, angle: Array, width_s: float) -> Array:
 def _slopes(t_s: Array, y: Array, size: int) -> Array:
     """Slopes [n - size + 1] of the lines through every `size` neighbouring samples.
 
-    Sums over a window are differences of running sums. These start anew, about the mean, every
+    Sums over a window are differences of running sums. These start again, about the mean, every
     `STRETCH` windows: over a long record they grow until rounding hides what one window adds.
     """
     count, step = t_s.size - size + 1, STRETCH * size

@@ -199,7 +199,7 @@ class Trace:
 class Comparison:
     """One model of one motor: parameters, errors, and where the error lives.
 
-    `moved` tells parameters with and without the effects that were added; `bare` the held-out
+    `moved` holds parameters with and without the effects that were added; `bare` the held-out
     error without them, None where none were. `combinations` are known where their parameters are
     not. `traces` are for looking, not for the document. `before` are the errors of the equations
     without the effects that were added.

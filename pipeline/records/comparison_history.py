@@ -28,7 +28,7 @@ class Earlier:
 
 
 def history_of(document: Mapping[str, Any] | None) -> tuple[Earlier, ...]:
-    """The comparisons that a document tells; none where it is none of ours."""
+    """The comparisons of a document; none where it has another form."""
     if document is None or document.get("schema") != SCHEMA:
         return ()
     try:
@@ -53,5 +53,5 @@ def with_latest(earlier: Sequence[Earlier], latest: Earlier) -> tuple[Earlier, .
 
 def document_of(motor_id: str, history: Sequence[Earlier]) -> dict[str, Any]:
     """The JSON form."""
-    told = [{**asdict(one), "effects": list(one.effects)} for one in history]
-    return {"schema": SCHEMA, "motor_id": motor_id, "comparisons": told}
+    documents = [{**asdict(one), "effects": list(one.effects)} for one in history]
+    return {"schema": SCHEMA, "motor_id": motor_id, "comparisons": documents}

@@ -62,8 +62,8 @@ def _column(column: Any) -> list[Any]:
     """Name, kind, missing rows and values of one column of a table."""
     missing = _bytes_digest(column.is_null().to_numpy()) if column.null_count() else None
     values = column.to_numpy()
-    told = column.to_list() if values.dtype.hasobject else _bytes_digest(values)
-    return [column.name, str(column.dtype), missing, told]
+    values_form = column.to_list() if values.dtype.hasobject else _bytes_digest(values)
+    return [column.name, str(column.dtype), missing, values_form]
 
 
 def _bytes_digest(array: np.ndarray[Any, Any]) -> str:

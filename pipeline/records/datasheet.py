@@ -55,7 +55,7 @@ class CaptureReference:
     """Which file a datasheet rests on.
 
     `sha256` is that of its bytes, `read_sha256` that of what was read from them: columns, metadata
-    and masks, after units, signs and gates. None in datasheets of before it was told.
+    and masks, after units, signs and gates. None in datasheets written before it existed.
     """
 
     path: str

@@ -32,7 +32,7 @@ class Separation:
 
 @dataclass(frozen=True, slots=True)
 class RankedEffect:
-    """One effect's evidence. `score`: fall of −2 log likelihood less the price of its parameters.
+    """One effect's evidence. `score`: fall of the deviance less the BIC penalty of its parameters.
 
     `held_out_drop`: share of the removable held-out error that goes with it. `parameters`: value
     and standard uncertainty by name, where it was fitted. Of an effect that is not called for,

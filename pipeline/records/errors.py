@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 MOST_CHARS = 1500
-"""Of what is said of one file, which may quote it."""
+"""Most characters of a message on one file, which may quote it."""
 
 
 class PipelineError(Exception):
@@ -74,7 +74,7 @@ def merged(faults: Sequence[CaptureError]) -> CaptureError:
     return CaptureError(first.code, first.message + others, first.remedy, first.rows)
 
 
-def _beside(fault: CaptureError, said: str) -> str:
+def _beside(fault: CaptureError, remedy: str) -> str:
     more = [] if fault.rows is None else [f"rows {fault.rows[0]}-{fault.rows[1]}"]
-    more += [fault.remedy] if fault.remedy != said else []
+    more += [fault.remedy] if fault.remedy != remedy else []
     return f"[{fault.code}] {fault.message}" + (f" ({'; '.join(more)})" if more else "")

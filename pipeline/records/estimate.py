@@ -39,7 +39,7 @@ class Estimate:
     glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used,
     `orders` the spectrum behind it, where it has one. `impossible`: it came out where no motor is,
     by more than its uncertainty explains, so a clock, a sign or a unit of `captures` is wrong.
-    `settled`: it was looked for and is not there, down to what the note tells.
+    `settled`: it was searched for and is absent, down to the size in the note.
     """
 
     name: str

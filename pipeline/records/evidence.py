@@ -15,7 +15,7 @@ PlotKind = Literal["line", "scatter", "bars"]
 class Series:
     """One measured curve with its fit: `x`, `measured`, `fitted` are [n]; `fitted` may be empty.
 
-    The residual is measured - fitted. `label` tells series of one plot apart.
+    The residual is measured - fitted. `label` distinguishes the series of one plot.
     """
 
     label: str

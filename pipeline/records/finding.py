@@ -44,8 +44,8 @@ class Finding:
     def line(self) -> str:
         """The one line that standard error carries."""
         rows = "" if self.rows is None else f" rows {self.rows[0]}-{self.rows[1]}"
-        said = f"{self.severity}: {self.file}{rows}: {self.message}; {self.remedy} [{self.code}]"
-        return printable(said)
+        line = f"{self.severity}: {self.file}{rows}: {self.message}; {self.remedy} [{self.code}]"
+        return printable(line)
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""

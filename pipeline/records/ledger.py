@@ -58,9 +58,9 @@ class Event:
 
 
 def _link(event: Event, before: str) -> str:
-    said = {f.name: getattr(event, f.name) for f in fields(event) if f.name != "chain"}
-    said["recorded_at"] = event.recorded_at.isoformat(timespec="microseconds")
-    text = json.dumps([before, said], sort_keys=True, allow_nan=False)
+    content = {f.name: getattr(event, f.name) for f in fields(event) if f.name != "chain"}
+    content["recorded_at"] = event.recorded_at.isoformat(timespec="microseconds")
+    text = json.dumps([before, content], sort_keys=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -176,7 +176,7 @@ class Capability:
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """One part of the variance: standard deviation [unit] and share; None if it cannot be told."""
+    """One part of the variance: standard deviation [unit] and share; None if it is unknown."""
 
     name: Literal["lot", "station", "motor", "capture"]
     sd: float | None

@@ -153,8 +153,8 @@ class ModelVerdict:
             effects=tuple(document.get("effects", ())),
             missing={
                 one["effect"]: {
-                    name: (said["value"], said["u"], said["unit"])
-                    for name, said in one["parameters"].items()
+                    name: (parameter["value"], parameter["u"], parameter["unit"])
+                    for name, parameter in one["parameters"].items()
                 }
                 for one in document["missing"]
             },

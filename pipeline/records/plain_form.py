@@ -25,12 +25,12 @@ def plain_of(value: Any) -> Any:
     return value
 
 
-def record_of(kind: type[Record], said: Any) -> Record:
+def record_of(kind: type[Record], document: Any) -> Record:
     """The record that `plain_of` wrote; keys that it has no field for are passed over.
 
-    Raises LookupError, TypeError or ValueError where `said` is no such record.
+    Raises LookupError, TypeError or ValueError where `document` is no such record.
     """
-    made: Record = _made(kind, said)
+    made: Record = _made(kind, document)
     return made
 
 
@@ -40,27 +40,27 @@ def hints_of(kind: type) -> Mapping[str, Any]:
     return get_type_hints(kind)
 
 
-def _made(kind: Any, said: Any) -> Any:
+def _made(kind: Any, document: Any) -> Any:
     origin, inner = get_origin(kind), get_args(kind)
     if is_dataclass(kind) and isinstance(kind, type):
-        return kind(**{n: _made(hint, said[n]) for n, hint in hints_of(kind).items()})
+        return kind(**{n: _made(hint, document[n]) for n, hint in hints_of(kind).items()})
     if origin in (Union, types.UnionType):
         one = next(one for one in inner if one is not type(None))
-        return None if said is None and type(None) in inner else _made(one, said)
+        return None if document is None and type(None) in inner else _made(one, document)
     if origin is tuple:
-        if not isinstance(said, list):
-            raise TypeError(f"{said!r} is no list")
-        return tuple(_made(inner[0], item) for item in said)
-    return _scalar(kind, said)
+        if not isinstance(document, list):
+            raise TypeError(f"{document!r} is no list")
+        return tuple(_made(inner[0], item) for item in document)
+    return _scalar(kind, document)
 
 
-def _scalar(kind: Any, said: Any) -> Any:
+def _scalar(kind: Any, document: Any) -> Any:
     if get_origin(kind) is Literal:
-        if said not in get_args(kind):
-            raise ValueError(f"{said!r} is none of {', '.join(map(str, get_args(kind)))}")
-        return said
-    if kind is float and isinstance(said, int) and not isinstance(said, bool):
-        return float(said)
-    if not isinstance(said, kind) or (isinstance(said, bool) and kind is not bool):
-        raise TypeError(f"{said!r} is no {kind.__name__}")
-    return said
+        if document not in get_args(kind):
+            raise ValueError(f"{document!r} is none of {', '.join(map(str, get_args(kind)))}")
+        return document
+    if kind is float and isinstance(document, int) and not isinstance(document, bool):
+        return float(document)
+    if not isinstance(document, kind) or (isinstance(document, bool) and kind is not bool):
+        raise TypeError(f"{document!r} is no {kind.__name__}")
+    return document

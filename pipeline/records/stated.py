@@ -32,16 +32,16 @@ def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
     found = []
     names = {key for c in campaign.captures for key in c.meta.extra} | set(campaign.stated)
     for name in sorted(filter(may_be_stated, names)):
-        said = _said(campaign.stated, name)
+        stated = _said(campaign.stated, name)
         paths: tuple[str, ...] = ()
-        if said is None:
+        if stated is None:
             pairs = {c.path: _pair(c.meta.extra, name) for c in campaign.captures}
             counts = Counter(pair for pair in pairs.values() if pair is not None)
             if not counts:
                 continue
-            said = max(counts, key=counts.__getitem__)
-            paths = tuple(path for path, pair in pairs.items() if pair == said)
-        found.append(_estimate(name, *said, paths))
+            stated = max(counts, key=counts.__getitem__)
+            paths = tuple(path for path, pair in pairs.items() if pair == stated)
+        found.append(_estimate(name, *stated, paths))
     return tuple(found)
 
 

@@ -35,7 +35,7 @@ Budget = tuple[Contribution, ...]
 
 BETWEEN = "between:"
 """Begins the source of what independent equations, captures or methods of one constant scatter
-beyond their own uncertainties: part of u like any other, and told apart to say why u is wide."""
+beyond their own uncertainties: part of u like any other, kept separate to show why u is wide."""
 
 
 def type_a(source: str, u: float, dof: float = math.inf) -> Budget:

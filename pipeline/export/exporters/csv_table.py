@@ -26,7 +26,7 @@ def render(source: Source, options: Options) -> str:
     for estimate in source.all():
         term = source.terms[estimate.name]
         value = estimate.value if isinstance(estimate.value, int) else estimate.number
-        at = "; ".join(f"{key}={told}" for key, told in sorted(estimate.at.items()))
+        at = "; ".join(f"{key}={value}" for key, value in sorted(estimate.at.items()))
         writer.writerow(
             (
                 estimate.name,

@@ -32,9 +32,9 @@ def render(source: Source, options: Options) -> str:
 def read(text: str) -> Values:
     """The constants of such lines."""
     rows = (line.split() for line in text.splitlines() if line.startswith("conf set "))
-    said = {row[2]: float(row[3]) for row in rows}
-    values = {name: said[field] for field, name, _ in FIELDS}
-    return {**values, "pole_pairs": said["motor.poles"] / 2.0}
+    settings = {row[2]: float(row[3]) for row in rows}
+    values = {name: settings[field] for field, name, _ in FIELDS}
+    return {**values, "pole_pairs": settings["motor.poles"] / 2.0}
 
 
 EXPORTER = Exporter("moteus", "cfg", "moteus `conf set` lines", render, read)

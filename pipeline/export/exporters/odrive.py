@@ -36,13 +36,13 @@ def render(source: Source, options: Options) -> str:
 
 def read(text: str) -> Values:
     """The constants of such settings; both inductances are the one that is there."""
-    said = json.loads(text)
-    inductance = float(said[PATH + "phase_inductance"])
+    settings = json.loads(text)
+    inductance = float(settings[PATH + "phase_inductance"])
     return {
-        "pole_pairs": float(said[PATH + "pole_pairs"]),
-        "r_phase_ohm": float(said[PATH + "phase_resistance"]),
+        "pole_pairs": float(settings[PATH + "pole_pairs"]),
+        "r_phase_ohm": float(settings[PATH + "phase_resistance"]),
         "mean_inductance_h": inductance,
-        "kt_peak_nm_a": float(said[PATH + "torque_constant"]),
+        "kt_peak_nm_a": float(settings[PATH + "torque_constant"]),
     }
 
 

@@ -51,14 +51,14 @@ def render(source: Source, options: Options) -> str:
 def read(text: str) -> Values:
     """The constants of such a document that we wrote."""
     root = Xml.fromstring(text)  # noqa: S314 (our own text)
-    said = {child.tag: float(child.text or "nan") for child in root}
-    half = said["foc_motor_ld_lq_diff"] / 2.0
+    settings = {child.tag: float(child.text or "nan") for child in root}
+    half = settings["foc_motor_ld_lq_diff"] / 2.0
     return {
-        "r_phase_ohm": said["foc_motor_r"],
-        "ld_h": said["foc_motor_l"] - half,
-        "lq_h": said["foc_motor_l"] + half,
-        "psi_pm_wb": said["foc_motor_flux_linkage"],
-        "pole_pairs": said["si_motor_poles"] / 2.0,
+        "r_phase_ohm": settings["foc_motor_r"],
+        "ld_h": settings["foc_motor_l"] - half,
+        "lq_h": settings["foc_motor_l"] + half,
+        "psi_pm_wb": settings["foc_motor_flux_linkage"],
+        "pole_pairs": settings["si_motor_poles"] / 2.0,
     }
 
 
