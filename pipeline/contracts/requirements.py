@@ -72,7 +72,10 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
     ),
     "torque_table": _all("iq_a", "torque_shaft_nm"),
     "drive": (
-        Requirement((DQ, ("vq_v", "iq_a"), ("iq_a",)), "iq_a, with id_a, vd_v, vq_v where there"),
+        Requirement(
+            (DQ, ("vq_v", "iq_a"), ("iq_a",), ("vq_v",)),
+            "iq_a, with id_a, vd_v, vq_v where there; or vq_v alone",
+        ),
         _any("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad"),
     ),
 }

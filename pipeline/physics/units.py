@@ -23,6 +23,7 @@ SUFFIX_UNITS: dict[str, str] = {
     "nm_s_rad": "N·m·s/rad",
     "nm_sqrt_w": "N·m/sqrt(W)",
     "v_s_rad": "V·s/rad",
+    "v_s2_rad": "V·s²/rad",
     "v_krpm": "V/krpm",
     "rpm_v": "rpm/V",
     "k_w": "K/W",

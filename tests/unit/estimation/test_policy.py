@@ -24,7 +24,7 @@ ROOT = Path(pipeline.estimation.__file__).parent
 NO_JUDGEMENT = {
     "BETWEEN", "BUMPS", "COAST", "DRIVE", "KNOTS", "LD", "LEAST_LEVELS", "LEAST_ROWS", "LQ",
     "ORDERS", "RANGE_OF_THREE", "REFERENCE_DEGC", "SAME", "SPACE", "STEP_1_K", "TERMS", "TURN",
-    "TURN_RAD",
+    "TURN_RAD", "WHOLE", "WITHOUT_ACCELERATION",
 }  # fmt: skip
 
 

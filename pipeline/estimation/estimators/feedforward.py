@@ -1,0 +1,343 @@
+"""What voltage a speed and an acceleration take, from a drive log without current: kS, kV, kA."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.method import Method
+from pipeline.estimation.policy import policy
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import (
+    instrument_uncertainties,
+    unstated_note,
+    voltage_source,
+)
+from pipeline.estimation.uncertainty.regimes import (
+    Partition,
+    Regression,
+    disagreement,
+    halves,
+    information,
+    signs,
+)
+from pipeline.numerics.clusters import cluster_covariance
+from pipeline.numerics.integrals import trapezoid
+from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
+from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
+from pipeline.physics.glossary import Term
+from pipeline.records.capture import Campaign, Capture
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence
+from pipeline.records.uncertainty import Contribution
+
+Array = NDArray[np.float64]
+
+TERMS = (
+    Term("ks_v", "V", "q voltage against dry friction: R T_c / Kt", "constant", -1e3, 1e3),
+    Term("kv_v_s_rad", "V·s/rad", "q voltage per speed: Ke + R B / Kt", "constant", 0.0, 1e3),
+    Term("ka_v_s2_rad", "V·s²/rad", "q voltage per acceleration: R J / Kt", "constant", 0.0, 1e3),
+    Term("voltage_delay_s", "s", "by how much the motion follows the voltage late", "constant",
+         -1.0, 1.0),
+)  # fmt: skip
+GIVES = tuple(term.name for term in TERMS)
+METHOD = Method("feedforward", TERMS)
+# Columns of `voltage`: of all four, and of those that a log too slow for kA determines.
+WHOLE, WITHOUT_ACCELERATION = (0, 1, 2, 3), (0, 1, 3)
+EXPERIMENT = (
+    "record a drive with vq_v and theta_mech_rad at several speeds of both senses, and with steps "
+    "of voltage, sampled ten times in the time that the speed takes to follow"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One log [n] on its own clock, with its windows; `quiet` says that they resolve dω/dt."""
+
+    capture: Capture
+    t_s: Array
+    voltage_v: Array
+    theta_rad: Array
+    speed_rad_s: Array
+    weak: WeakRows
+    quiet: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Window means [w] of several logs: the columns of `voltage`, and what they belong to."""
+
+    design: Array
+    voltage_v: Array
+    capture: NDArray[np.int64]
+    cluster: NDArray[np.int64]
+    time_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The fit of the rows, their noise [w, V] and the delay about which they were linearised."""
+
+    rows: Rows
+    found: LinearFit
+    sigma: Array
+    delay_s: float
+
+
+def voltage(part: Part, delay_s: float) -> tuple[Array, Array]:
+    """The derivatives of a log's voltage by what is fitted: it is linear in all four.
+
+    Parameters
+    ----------
+    part
+        The log.
+    delay_s
+        Delay about which the equation is linearised.
+
+    Returns
+    -------
+    design : array [w, 4]
+        Columns of kS [1], kV [rad/s], kA [rad/s²] and of what the delay is longer [V/s].
+    voltage_v : array [w], V
+        Window means of the voltage, `delay_s` earlier.
+
+    Notes
+    -----
+    v(t - τ) = kS sign(ω) + kV ω + kA dω/dt, and v(t - τ - δ) = v(t - τ) - δ dv/dt.
+
+    It follows from v = R i + Ke ω and J dω/dt = Kt i - T_c sign(ω) - B ω, where the current
+    settles much sooner than the speed: kS = R T_c / Kt, kV = Ke + R B / Kt, kA = R J / Kt. All
+    derivatives are those of windows (weak form).
+
+    References
+    ----------
+    WPILib, System Identification: the permanent-magnet DC motor feedforward equation.
+    Messenger and Bortz, Multiscale Model. Simul. 19(3), 2021, 1474, doi:10.1137/20M1343166.
+
+    """
+    weak = part.weak
+    early = np.interp(part.t_s - delay_s, part.t_s, part.voltage_v)
+    columns = [
+        weak.integral(np.sign(part.speed_rad_s)),
+        weak.integral(part.theta_rad, 1),
+        weak.integral(part.theta_rad, 2),
+        weak.integral(early, 1),
+    ]
+    return np.column_stack(columns), weak.integral(early)
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """kS, kV, kA and the delay by `voltage` over the windows of all drives without current.
+
+    The delay is found in a few rounds. Windows in which the shaft may stand are left out, for the
+    sign of friction is not known there. What regimes of the rows disagree by beyond chance is in
+    the uncertainty. Nothing else is corrected: all hold at the winding's and the magnets'
+    temperature of the log, and with whatever load it had. Logs count by what they leave.
+    """
+    del known
+    parts = [p for p in map(_part, campaign.of("drive")) if p is not None]
+    if not parts:
+        note = "of drives of voltage and motion alone; current tells j_rotor_kgm2 and more"
+        return METHOD.nothing(GIVES, note)
+    solved = _solve(parts, WHOLE)
+    if isinstance(solved, str):
+        return METHOD.nothing(GIVES, f"{solved}; {EXPERIMENT}")
+    return Fit(tuple(_estimates(parts, solved, options["level"])), _plots(parts, solved))
+
+
+def _solve(parts: Sequence[Part], columns: Sequence[int]) -> Solved | str:
+    """The fit of some of the columns of `voltage`, about its own delay; or why there is none."""
+    delay = 0.0
+    longest = 0.5 * max(float(np.ptp(p.t_s[: int(p.weak.sizes[0])])) for p in parts)
+    for _ in range(6):
+        rows = _rows(parts, delay, columns)
+        if rows.voltage_v.size < policy().evidence.rows:
+            return f"{rows.voltage_v.size} windows at speed"
+        sigma = _noise_v(rows)
+        found = linear_fit(rows.design, rows.voltage_v, sigma)
+        if not found.full_rank:
+            return "speed and voltage stay as they are"
+        step = float(found.coefficients[-1])
+        if abs(delay + step) > longest:
+            break
+        delay += step
+    return Solved(rows, found, sigma, delay)
+
+
+def _part(capture: Capture) -> Part | None:
+    """The log where it holds voltage and motion, and neither current nor a load's torque."""
+    angle = "theta_mech_rad" if capture.has("theta_mech_rad") else "omega_mech_rad_s"
+    if not capture.has("t_s", "vq_v", angle) or capture.has("iq_a"):
+        return None
+    data = capture.arrays("t_s", "vq_v", angle)
+    fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
+    t, volts, theta = (data[name][fine] for name in ("t_s", "vq_v", angle))
+    if t.size < 3 * LEAST_SAMPLES:
+        return None
+    if angle == "omega_mech_rad_s":
+        theta = trapezoid(t, theta)
+    period = float(np.median(np.diff(t)))
+    try:
+        weak, quiet = _windows(t, theta, period)
+        speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
+    except ValueError:
+        return None
+    return Part(capture, t, volts, theta, speed, weak, quiet)
+
+
+def _windows(t_s: Array, theta_rad: Array, period_s: float) -> tuple[WeakRows, bool]:
+    """The shortest windows in which the angle's noise is quiet beside the acceleration."""
+    limits = policy().shaft_rows
+    sigma, shortest = white_noise_sigma(theta_rad), 1.5 * LEAST_SAMPLES * period_s
+    for usual in limits.drive_windows_s:
+        weak = weak_rows(t_s, max(usual, shortest), limits.overlap)
+        noise = sigma * weak.noise_gain(2)
+        if noise < limits.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
+            return weak, True
+    return weak, False
+
+
+def _rows(parts: Sequence[Part], delay_s: float, columns: Sequence[int]) -> Rows:
+    fastest = max(float(np.max(np.abs(p.speed_rad_s))) for p in parts)
+    pieces = []
+    for index, part in enumerate(parts):
+        design, volts = voltage(part, delay_s)
+        weak = part.weak
+        ends = zip(weak.starts, weak.starts + weak.sizes, strict=True)
+        slowest = np.array([np.min(np.abs(part.speed_rad_s[a:b])) for a, b in ends])
+        turning = slowest > policy().shaft_rows.slowest_share * fastest
+        cluster = np.floor((weak.centres_s - weak.centres_s[0]) / policy().evidence.cluster_s)
+        number = np.full(weak.count, float(index))
+        piece = [design[:, columns], volts, number, cluster + 1e6 * index, weak.centres_s]
+        pieces.append([column[turning] for column in piece])
+    design, volts, number, cluster, time = (
+        np.concatenate(one) for one in zip(*pieces, strict=True)
+    )
+    return Rows(design, volts, number.astype(np.int64), cluster.astype(np.int64), time)
+
+
+def _noise_v(rows: Rows) -> Array:
+    """Standard deviation [w] of each row: one a log, by what a fit of all leaves of it."""
+    sigma = np.ones(rows.voltage_v.size)
+    floor = max(1e-6 * float(np.std(rows.voltage_v)), 1e-300)
+    for _ in range(3):
+        left = linear_fit(rows.design, rows.voltage_v, sigma).residuals
+        for index in np.unique(rows.capture):
+            own = rows.capture == index
+            sigma[own] = max(float(np.sqrt(np.mean(left[own] ** 2))), floor)
+    return sigma
+
+
+def _partitions(rows: Rows, paths: Sequence[str], told: Array) -> list[Partition]:
+    """Regimes of the rows by speed, sense, acceleration and capture."""
+    speed, every = rows.design[:, 1], np.ones(rows.voltage_v.size, dtype=bool)
+    gaining = rows.design[:, 2] * np.sign(speed)
+    return [
+        halves("speed", np.abs(speed), "slow", "fast", told, every),
+        signs("sense of rotation", speed, "backward", "forward", every),
+        signs("acceleration", gaining, "braking", "accelerating", every),
+        Partition("capture", rows.capture, tuple(f"in {path}" for path in paths)),
+    ]
+
+
+def _scatter(rows: Rows, found: LinearFit, regression: Regression) -> tuple[Array, Array]:
+    """Standard deviations [4] of the coefficients, and their degrees of freedom [4].
+
+    By clusters, and by how many windows count as one; the larger counts. A delay rests on the few
+    windows in which the voltage steps, so of clusters only as many count as hold the information.
+    Reference: Carter, Schnepel and Steigerwald, Rev. Econ. Stat. 99(4), 2017, 698 (effective
+    number of clusters).
+    """
+    tau = autocorrelation_time(found.residuals / regression.sigma, policy().evidence.memory_rows)
+    tau = max(tau, 1.0 / (1.0 - policy().shaft_rows.overlap))
+    scatter = np.sqrt(np.diag(found.covariance) * found.chi2_dof * tau)
+    _, cluster = np.unique(rows.cluster, return_inverse=True)
+    shares = [np.bincount(cluster, information(regression, k)) for k in range(scatter.size)]
+    groups = np.maximum([1.0 / float(share @ share) for share in shares], 2.0)
+    covariance, _ = cluster_covariance(rows.design, found.residuals, regression.sigma, rows.cluster)
+    robust = np.sqrt(np.diag(covariance) * groups / (groups - 1.0))
+    return np.maximum(scatter, robust), np.minimum(max(found.dof / tau, 1.0), groups - 1.0)
+
+
+def _estimates(parts: Sequence[Part], solved: Solved, level: float) -> list[Estimate]:
+    rows, found = solved.rows, solved.found
+    used = [part.capture for part in parts]
+    regression = Regression(rows.design, rows.voltage_v, solved.sigma, rows.cluster)
+    deviation, dof = _scatter(rows, found, regression)
+    values = [*(float(c) for c in found.coefficients[:3]), solved.delay_s]
+    split = partial(_partitions, rows, [c.path for c in used])
+    gains = instrument_uncertainties(used, ("voltage",))
+    shares = {s: np.mean([voltage_source(c.meta) == s for c in used]) for s in gains}
+    notes = [
+        f"{rows.voltage_v.size} windows, {np.std(found.residuals):.2g} V left; at the temperatures "
+        "and the load of the log",
+        unstated_note(used, ("voltage",)),
+    ]
+    at = {"omega_mech_rad_s": float(np.max(np.abs(rows.design[:, 1])))}
+    seen = found.coefficients[:3] > policy().evidence.sigmas * deviation[:3]
+    if not seen[1]:
+        return [
+            METHOD.missing(n, f"voltage and speed do not go together; {EXPERIMENT}") for n in GIVES
+        ]
+    period = max(float(np.median(np.diff(p.t_s))) for p in parts)
+    resolved = values[2] > policy().shaft_rows.resolved_periods * period * values[1]
+    clear = seen[2] and resolved and all(p.quiet for p in parts)
+    missing = {} if clear else _hidden(parts)
+    estimates = []
+    for k, (name, value) in enumerate(zip(GIVES, values, strict=True)):
+        u = float(deviation[k])
+        if name in missing:
+            note = f"{value:.3g} ± {u:.2g} {METHOD.unit(name)} by the fit; {missing[name]}"
+            estimates.append(METHOD.missing(name, note))
+            continue
+        contributions = [METHOD.scatter(name, u, float(dof[k]))]
+        doubt = disagreement(regression, k, split, level) if k < 3 else None
+        words = []
+        if doubt is not None:
+            contributions.append(doubt.part(f"{METHOD.name}:{name}", value))
+            words.append(doubt.words("the value"))
+        if k < 3:
+            contributions += [
+                Contribution(s, value * u_rel * float(shares[s]), "B") for s, u_rel in gains.items()
+            ]
+        estimates.append(METHOD.measured(name, value, contributions, used, at, [*words, *notes]))
+    return estimates
+
+
+def _hidden(parts: Sequence[Part]) -> dict[str, str]:
+    """Why kA and the delay are not determined.
+
+    Where the speed follows sooner than the log shows, dω/dt is dv/dt / kV: then only the sum of
+    the time constant kA / kV and the delay is determined.
+    """
+    late = _solve(parts, WITHOUT_ACCELERATION)
+    seen = "" if isinstance(late, str) else f" = {late.delay_s:.3g} s"
+    note = f"only ka_v_s2_rad / kv_v_s_rad + voltage_delay_s{seen} is seen; {EXPERIMENT}"
+    return dict.fromkeys(("ka_v_s2_rad", "voltage_delay_s"), note)
+
+
+def _plots(parts: Sequence[Part], solved: Solved) -> tuple[Evidence, ...]:
+    rows = solved.rows
+    captures = [part.capture for part in parts]
+    titles = ["Voltage by speed and acceleration"] * len(captures)
+    columns = rows.capture, rows.time_s, rows.voltage_v, rows.voltage_v - solved.found.residuals
+    return tuple(METHOD.traces(captures, titles, "vq_v", columns, "window means"))
+
+
+ESTIMATOR = Estimator(
+    name=METHOD.name,
+    gives=GIVES,
+    tests=("drive",),
+    experiment=EXPERIMENT,
+    fit=fit,
+    rank=40,
+    terms=TERMS,
+    clock_powers={"kv_v_s_rad": 1, "ka_v_s2_rad": 2, "voltage_delay_s": 1},
+    options={"level": 0.001},
+)
