@@ -151,7 +151,7 @@ def test_all_failures_at_once(rng: np.random.Generator) -> None:
         ("heat_run", "id_a"),
         ("holding_current", "iq_a"),
         ("flux_map", "psi_q_wb"),
-        ("drive", "iq_a"),
+        ("drive", "iq_a vq_v"),
         ("torque_table", "torque_shaft_nm"),
         ("drive", "theta_mech_rad omega_mech_rad_s"),
     ],
@@ -174,6 +174,7 @@ def test_missing_column(test: str, dropped: str, rng: np.random.Generator) -> No
         ("open_circuit", "vca_v"),
         ("hand_turn", "theta_mech_rad vbc_v"),
         ("drive", "vd_v id_a torque_shaft_nm omega_mech_rad_s"),
+        ("drive", "vd_v id_a iq_a torque_shaft_nm"),
         ("spin_down", "theta_mech_rad"),
     ],
 )

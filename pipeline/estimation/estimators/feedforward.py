@@ -317,7 +317,7 @@ def _hidden(parts: Sequence[Part]) -> dict[str, str]:
     the time constant kA / kV and the delay is determined.
     """
     late = _solve(parts, WITHOUT_ACCELERATION)
-    seen = "" if isinstance(late, str) else f" = {late.delay_s:.3g} s"
+    seen = "" if isinstance(late, str) else f" = about {late.delay_s:.2g} s"
     note = f"only ka_v_s2_rad / kv_v_s_rad + voltage_delay_s{seen} is seen; {EXPERIMENT}"
     return dict.fromkeys(("ka_v_s2_rad", "voltage_delay_s"), note)
 

@@ -72,15 +72,15 @@ def test_intervals_hold_over_seeds() -> None:
 
 def test_a_time_constant_between_two_samples_is_not_told() -> None:
     """The speed follows within a millisecond, the log has ten: kS and kV stand, of kA and the
-    delay only what both make together.
+    delay only what both make together, to a fifth of a sample.
     """
     found = estimates(ESTIMATOR, log(3, 20.0, 100.0, 2e-5))
     for name in ("ka_v_s2_rad", "voltage_delay_s"):
         assert not found[name].known
         assert "steps of voltage" in found[name].note
-        seen = re.search(r"voltage_delay_s = ([0-9.e-]+) s is seen", found[name].note)
+        seen = re.search(r"voltage_delay_s = about ([0-9.e-]+) s is seen", found[name].note)
         assert seen is not None
-        assert float(seen[1]) == pytest.approx(DELAY_S + 2e-5 / KV_V_S_RAD, abs=5e-4)
+        assert float(seen[1]) == pytest.approx(DELAY_S + 2e-5 / KV_V_S_RAD, abs=2e-3)
     low, high = found["kv_v_s_rad"].interval()
     assert low < KV_V_S_RAD < high
 
