@@ -29,6 +29,22 @@ def estimator_of(name: str, formulas: Mapping[str, Formula]) -> Estimator:
 
     Sources that the inputs share cancel or add; a product of powers has the slope
     power · value / input (GUM 5.1.6). It runs whatever tests the campaign holds.
+
+    Parameters
+    ----------
+    name
+        Of the estimator.
+    formulas
+        By the name of the constant that each gives.
+
+    Notes
+    -----
+    y = Π x_i^p_i has ∂y/∂x_i = p_i y / x_i.
+
+    References
+    ----------
+    JCGM 100:2008, 5.1.6.
+
     """
 
     def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:

@@ -142,6 +142,15 @@ class Method:
 
 
 def over_x(label: str, x: Array, measured: Array, fitted: Array) -> Series:
-    """A series of points [n], sorted by x."""
+    """A series of points [n], sorted by x.
+
+    Parameters
+    ----------
+    label
+        Tells series of one plot apart.
+    x, measured, fitted : array [n]
+        In the units of the plot's axes.
+
+    """
     order = np.argsort(x, kind="stable")
     return Series(label, x[order], measured[order], fitted[order])

@@ -78,6 +78,16 @@ def fit_all(
 
     Returns all estimates in order of preference (rank, then dependency order), the evidence, and
     the estimators that broke on this data: their constants are then not_identifiable.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+    options
+        By estimator, and `policy` by section.
+    recall
+        Gives a fit that was cached; None fits anew.
+
     """
     with under(changed(options)) as changes:
         return _fit_all(campaign, options, changes, recall)

@@ -70,6 +70,19 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
     """The voltages of a capture, line to line where there, else phase; rows with NaN left out.
 
     Raises KeyError where no voltage is there.
+
+    Parameters
+    ----------
+    capture
+        Of a spin with open terminals.
+    temp_column
+        The temperature that the magnets are taken at, None where none was logged.
+
+    Raises
+    ------
+    KeyError
+        Where no terminal voltage is there.
+
     """
     lines = {f"v{p}_v": (math.sqrt(3.0), PAIR_AXES_RAD[p]) for p in PAIRS}
     phases = {f"v{p}_v": (1.0, k * TURN / 3.0) for k, p in enumerate("abc")}
@@ -125,6 +138,19 @@ def steady_stretches(spin: Spin, change: float) -> list[Stretch]:
 
     Where they hold less than a fifth of the spinning rows, the speed is taken as it comes and
     `change` is widened; ramps are left out where steady speeds are there.
+
+    Parameters
+    ----------
+    spin
+        The voltages of one capture.
+    change
+        Largest change of the speed within a stretch [1, relative].
+
+    Returns
+    -------
+    list of Stretch
+        Rows with the voltage's own phase [rad] and its rate [rad/s].
+
     """
     for allowed in (change, policy().back_emf.widened * change, math.inf):
         stretches, spinning = _stretches(spin, allowed)
@@ -273,6 +299,21 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
     v = omega sum_k c_k e^{j k phase}, k = 1, its mirror -1 (unequal gains) and -5, 7, -11, 13 ...,
     and an offset a channel; psi = |c_1|. Orders beyond the sampling rate are left out. The
     standard error counts correlated residuals by their autocorrelation time.
+
+    Parameters
+    ----------
+    spin
+        The voltages of one capture.
+    stretch
+        Rows of one steady speed.
+    orders
+        Harmonics that are fitted beside the fundamental.
+
+    Returns
+    -------
+    StretchFlux
+        Flux linkage [Wb], its standard error [Wb], and the relative complex harmonics [1].
+
     """
     step = float(np.median(np.abs(np.diff(stretch.phase_rad))))
     ranks = [1, -1] + [k if k % 6 == 1 else -k for k in orders if k * step < 0.8 * math.pi]
@@ -323,6 +364,21 @@ def electrical_per_mechanical(spin: Spin, stretches: Sequence[Stretch]) -> tuple
 
     From the angle where there, else the bench's speed; nan where neither is. Positive where a
     positive rotation runs through a, b, c in this order.
+
+    Parameters
+    ----------
+    spin
+        The voltages of one capture, with angle or speed where there.
+    stretches
+        Its steady speeds.
+
+    Returns
+    -------
+    ratio : float
+        Cycles a turn [1].
+    by_angle : bool
+        False where it rests on the bench's speed.
+
     """
     electrical = mechanical = 0.0
     for stretch in stretches:

@@ -52,6 +52,21 @@ def direct_current_points(
     Plateaus below `zero_crossing` times the largest current of all are left out: the sign of their
     current, and what an inverter adds there, is in doubt. Temperature is the plateau's own, else
     the capture's ambient, else `temp_assumed_degc`.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+    options
+        `zero_crossing` [1], of the largest current, and `temp_assumed_degc` [degC].
+
+    Returns
+    -------
+    points : list of Point
+        Means [V, A, degC] with standard errors.
+    notes : list of str
+        What had to be assumed.
+
     """
     points: list[Point] = []
     notes: list[str] = []
@@ -102,7 +117,16 @@ def _standard_error(samples: Array) -> float:
 
 
 def shifted(points: Sequence[Point], shift: Shift) -> list[Point]:
-    """The points as read by instruments that are off by `shift`."""
+    """The points as read by instruments that are off by `shift`.
+
+    Parameters
+    ----------
+    points
+        Plateaus as read.
+    shift
+        By source: gains of voltage and current [1, relative], offsets of thermometers [K].
+
+    """
     return [
         replace(
             p,

@@ -28,7 +28,21 @@ class Flux:
 
 
 def frame_of(points: Sequence[Point], pole_pairs: int) -> tuple[float, float]:
-    """Angle of the drive's frame against the magnet's [rad] and delay of its currents [s]."""
+    """Angle of the drive's frame against the magnet's [rad] and delay of its currents [s].
+
+    Parameters
+    ----------
+    points
+        Settled points at speed.
+    pole_pairs
+        Of the motor.
+
+    Returns
+    -------
+    angle_rad, delay_s : float
+        By the pairs of points without d current.
+
+    """
     matched, largest = _matched(points)
     offset = _lateness(matched, pole_pairs, largest)[0]
     return -offset, current_lag(points, pole_pairs, offset)
@@ -55,6 +69,23 @@ def flux_pairs(points: Sequence[Point], pole_pairs: int) -> list[Flux]:
     instant (`voltage_timing`) and turned back by the angle delta + tau w_e that the pairs without
     d current show: there v+ + v- = 2 j w_e psi_d, whatever R and L. What of that angle differs
     from pair to pair (an eccentric encoder) goes into the uncertainty.
+
+    Parameters
+    ----------
+    points
+        Settled points at speed, with voltages.
+    pole_pairs
+        Of the motor.
+
+    Returns
+    -------
+    list of Flux
+        Flux linkages [Wb] with standard errors [Wb], and the currents [A] that they hold for.
+
+    Notes
+    -----
+    ψ_d = (v_q⁺ + v_q⁻) / (2 ω_e), ψ_q = (v_d⁻ - v_d⁺) / (2 ω_e), superscripts for the sign of i_q.
+
     """
     matched, largest = _matched(points)
     offset, late_s, wobble = _lateness(matched, pole_pairs, largest)
@@ -118,6 +149,23 @@ def instant_voltage(point: Point, pole_pairs: int) -> complex:
 
     Over one period T the mean of a vector turning at w is sinc(w T / 2) exp(j w T / 2) of what it
     is at the start of the period, and sinc alone of what it is in the middle.
+
+    Parameters
+    ----------
+    point
+        Means of a settled point, and when its voltages are valid (`voltage_timing`).
+    pole_pairs
+        Of the motor.
+
+    Returns
+    -------
+    complex, V
+        v_d + j v_q.
+
+    Notes
+    -----
+    v̄ = v sinc(ω_e T / 2) e^{jω_e T / 2} over the period that follows, sinc alone about its middle.
+
     """
     voltage = complex(point.vd_v, point.vq_v)
     timing = point.capture.meta.voltage_timing
@@ -164,6 +212,25 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
     not show it, the torque does: T = K (i_q cos a + i_d sin a) with a = w_e d beside the `offset`
     [rad] of the frame. Without it R d counts as inductance on both axes. Only a delay past four
     times its own scatter is taken out.
+
+    Parameters
+    ----------
+    points
+        Settled points at speed, with torque.
+    pole_pairs
+        Of the motor.
+    offset
+        Angle of the drive's frame [rad].
+
+    Returns
+    -------
+    float, s
+        0 where it is not seen.
+
+    Notes
+    -----
+    T = K (i_q cos a + i_d sin a) + ..., a = offset + ω_e d: the slope of torque in ω_e i_d is K d.
+
     """
     torque = np.array([p.torque_nm for p in points])
     i_d, i_q = (np.array([getattr(p, name) for p in points]) for name in ("id_a", "iq_a"))

@@ -37,7 +37,23 @@ class Turn:
 
 
 def turns_of(spin: Spin) -> list[Turn]:
-    """What each loud voltage channel says of the turn, by its angle, by two channels, or alone."""
+    """What each loud voltage channel says of the turn, by its angle, by two channels, or alone.
+
+    Parameters
+    ----------
+    spin
+        The voltages of one turn by hand, and the angle where there.
+
+    Returns
+    -------
+    list of Turn
+        Cycles a turn [1] and flux amplitude [Wb, phase peak] a channel; empty where none is loud.
+
+    Notes
+    -----
+    λ = ∫(v - v_0) dt, so the speed of the hand does not enter.
+
+    """
     loud = [
         c
         for c in spin.channels

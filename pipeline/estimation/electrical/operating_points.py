@@ -106,6 +106,19 @@ def operating_points(captures: Sequence[Capture], pole_pairs: int | None) -> Poi
     A stretch is settled where i_d, i_q and the torque all are; where the torque never is (it rings
     on in a soft coupling), the currents decide. It is cut to whole turns, or to
     whole electrical cycles where that would cost too much, so that ripple averages out.
+
+    Parameters
+    ----------
+    captures
+        Of a dynamometer that holds the speed while currents are stepped.
+    pole_pairs
+        For whole electrical cycles; None where not known.
+
+    Returns
+    -------
+    PointTable
+        Means with standard errors, and how many rows they rest on.
+
     """
     found: list[Point] = []
     total = 0
@@ -158,7 +171,21 @@ def magnet_temperature(capture: Capture) -> tuple[float, str]:
 
 
 def pole_pairs_of(known: Constants, nameplate: object) -> int | None:
-    """Measured pole pairs, else those of the nameplate."""
+    """Measured pole pairs, else those of the nameplate.
+
+    Parameters
+    ----------
+    known
+        Constants found so far.
+    nameplate
+        What the captures state, of any type.
+
+    Returns
+    -------
+    int or None
+        None where neither is there.
+
+    """
     pairs = known.best("pole_pairs")
     if pairs is not None:
         return round(pairs.number)

@@ -32,7 +32,21 @@ class Group:
 
 
 def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate, Estimate]:
-    """P and the phase order from electrical over mechanical speed of each capture."""
+    """P and the phase order from electrical over mechanical speed of each capture.
+
+    Parameters
+    ----------
+    method
+        The estimator whose results these are.
+    groups
+        Steady speeds of all captures.
+
+    Returns
+    -------
+    pole_pairs, phase_order : Estimate
+        Either `not_identifiable` where the captures do not say, or disagree.
+
+    """
     ratios: list[float] = []
     words = ""
     paths = []
@@ -74,6 +88,25 @@ def angle_offset(
 
     v leads the d axis by a quarter turn in the sense of rotation. The spread between speeds is
     the standard error: a delay shows as a drift with speed, and is not averaged away by chance.
+
+    Parameters
+    ----------
+    method
+        The estimator whose result it is.
+    groups
+        Steady speeds of all captures.
+    pairs, order
+        As `count_pole_pairs` gives them.
+
+    Returns
+    -------
+    Estimate
+        [rad, electrical].
+
+    Notes
+    -----
+    θ_0 = arg mean exp j(phase - s π/2 - order p θ), s the sense of rotation.
+
     """
     name = "angle_offset_elec_rad"
     own = [g for g in groups if g.spin.theta_rad is not None]

@@ -30,6 +30,19 @@ def gains(name: str, solution: Solution) -> list[Contribution]:
     stays from day to day: of captures of several days half its variance is taken as the
     instrument's, half as each day's own, so that a ratio of d of one day and q of the next does
     not lose it.
+
+    Parameters
+    ----------
+    name
+        `ld_h` or `lq_h`.
+    solution
+        The fit.
+
+    Returns
+    -------
+    list of Contribution
+        [H], signed, one a source and day.
+
     """
     records = solution.model.records
     days = sorted({_day(record) for record in records})
@@ -83,6 +96,21 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
 
     One error for all captures of one stated angle, as the rotor was locked once. On an axis only
     its square counts, c δ² with a root mean square of √3 c u² for a normal δ.
+
+    Parameters
+    ----------
+    name
+        `ld_h` or `lq_h`.
+    solution
+        The fit.
+    u_theta_rad
+        Standard uncertainty of an angle at which the rotor was locked [rad, electrical].
+
+    Returns
+    -------
+    list of Contribution
+        [H], one an angle and station.
+
     """
     lever, now = _lever(name, solution), _weighted(solution, solution.model)
     records = solution.model.records
@@ -144,6 +172,21 @@ def birge_ratio(solution: Solution) -> float:
 
     Each capture gets a factor of its own on both inductances, by one Gauss-Newton step; their chi
     square over what the axes leave of the captures. Reference: Birge, Phys. Rev. 40, 1932, 207.
+
+    Parameters
+    ----------
+    solution
+        The fit of all captures.
+
+    Returns
+    -------
+    float
+        [1], by which the scatter is widened.
+
+    References
+    ----------
+    Birge, Phys. Rev. 40, 1932, 207, doi:10.1103/PhysRev.40.207.
+
     """
     where = np.flatnonzero(solution.free)
     axes = [k for k in (LD, LQ) if solution.free[k]]

@@ -58,6 +58,23 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
     A term pays where it lowers the weighted sum of squares by more than log n (BIC). Terms are
     proposed by the score of the present fit under white noise, one an axis and round, and judged
     after a fit with them by their own standard error, which counts correlated residuals.
+
+    Parameters
+    ----------
+    model
+        The records and their equation.
+    axes
+        `ld_h`, `lq_h` or both: which inductances the rotor angles tell apart.
+
+    Returns
+    -------
+    Solution
+        Parameters with covariance, and which of them are free.
+
+    References
+    ----------
+    Schwarz, Ann. Statist. 6(2), 1978, 461, doi:10.1214/aos/1176344136 (BIC).
+
     """
     free = np.ones(model.layout.size, dtype=bool)
     free[: len(SHARED)] = False
@@ -131,6 +148,22 @@ def between_models(solution: Solution, offers: Sequence[Offer]) -> float:
     """Standard deviation of L between the chosen model and those with one term more.
 
     Each is weighted by exp(-BIC/2), the chosen one by 1.
+
+    Parameters
+    ----------
+    solution
+        The chosen model.
+    offers
+        Gain in weighted squares, term and change of L of each model with one term more.
+
+    Returns
+    -------
+    float, H
+
+    References
+    ----------
+    Hoeting et al., Statist. Sci. 14(4), 1999, 382, doi:10.1214/ss/1009212519, eq. 5.
+
     """
     price = price_of(solution.model)
     weights = [math.exp(-0.5 * max(price - gain, 0.0)) for gain, _, _ in offers]
@@ -165,7 +198,27 @@ def _weights(
 def row_variance(
     read: Array, count: Array, noise: Noise, sigma: float, used: Flags
 ) -> tuple[Array, Array]:
-    """Variance of the means [n] of `count` samples of a channel, and white noise's part of it."""
+    """Variance of the means [n] of `count` samples of a channel, and white noise's part of it.
+
+    Parameters
+    ----------
+    read : array [n]
+        What the model says that a channel reads [its unit].
+    count : array [n]
+        Samples in each mean.
+    noise
+        The channel's rounding.
+    sigma
+        Its scatter from sample to sample [its unit].
+    used : array [n] of bool
+        Rows that count.
+
+    Returns
+    -------
+    total, white : array [n]
+        [unit squared].
+
+    """
     white = sigma**2 / count
     if noise.rounding**2 * float(count[used].sum()) < (policy().steps.unseen_share * sigma) ** 2:
         return white, white

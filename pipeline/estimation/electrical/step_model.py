@@ -103,7 +103,18 @@ class Drive:
 
 
 def drive_of(record: StepRecord, own: Own, values: Array) -> Drive:
-    """The drive of a capture from the columns of its own parameters [m, size]."""
+    """The drive of a capture from the columns of its own parameters [m, size].
+
+    Parameters
+    ----------
+    record
+        The capture.
+    own
+        Where its own parameters sit.
+    values : array [m, size]
+        Variants of them.
+
+    """
     wave, none = record.wave, np.zeros(values.shape[0])
 
     def column(place: int | None) -> Array:
@@ -259,6 +270,21 @@ class StepModel:
 
         Of each capture first the currents, then the voltages, each times its row of `weights`
         [2, rows]. One-sided differences of width 1e-6 of each parameter's natural scale.
+
+        Parameters
+        ----------
+        parameters : array [k]
+            All parameters.
+        weights : arrays [2, n]
+            Of each capture 1/standard deviation of its currents and voltages; 0 leaves a row out.
+        jacobian : array [k] of bool
+            Which parameters are free.
+
+        Returns
+        -------
+        residuals : array [n]
+        jacobian : array [n, free]
+
         """
         widths = self._widths(parameters)
         free = np.flatnonzero(jacobian)

@@ -64,6 +64,22 @@ def read_step(capture: Capture) -> StepRecord | None:
     """The record of a capture, or None where it holds no step to speak of.
 
     Raises KeyError where voltage, current, pair or rotor angle is missing.
+
+    Parameters
+    ----------
+    capture
+        A voltage step on a locked rotor.
+
+    Returns
+    -------
+    StepRecord or None
+        None where no step stands out of the noise.
+
+    Raises
+    ------
+    KeyError
+        Where voltage, current, pair or rotor angle is missing.
+
     """
     pair, angle = pair_of(capture), rotor_angle_rad(capture)
     if pair is None or angle is None:
@@ -124,6 +140,17 @@ def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] |
     The integrated form takes no derivative; solved for i, in which alone the noise is white. A
     start for the fit, not an estimate: the trapezoid across an edge reads L up to half a sample of
     the time constant high. None where the two integrals are not told apart.
+
+    Parameters
+    ----------
+    t_s, v_v, i_a : array [n]
+        Times [s], voltage [V] and current [A] of one pair.
+
+    Returns
+    -------
+    (L, R) or None
+        [H] and [ohm], None where the two integrals are not told apart.
+
     """
     volts, amps = trapezoid(t_s, v_v), trapezoid(t_s, i_a)
     fit = linear_fit(np.column_stack([volts, amps, np.ones(t_s.size)]), i_a)

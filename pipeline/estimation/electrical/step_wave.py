@@ -69,7 +69,19 @@ class Waveform:
 
 
 def noise_of(signal: Array) -> Noise:
-    """The noise of a channel [n], at least 1e-6 of its span."""
+    """The noise of a channel [n], at least 1e-6 of its span.
+
+    Parameters
+    ----------
+    signal : array [n]
+        In the channel's unit.
+
+    Returns
+    -------
+    Noise
+        Scatter, what rounding leaves in a level's mean, and the converter's step.
+
+    """
     step = resolution(signal)
     sigma = noise_after_rounding(signal, step)
     rounding = rounding_rms(step, noise_before_rounding(sigma, step))
@@ -79,7 +91,23 @@ def noise_of(signal: Array) -> Noise:
 def waveform_of(
     t_s: Array, v_v: Array, i_a: Array, timing: VoltageTiming, ideal: bool = False
 ) -> Waveform:
-    """Levels and edges of a sampled voltage [n]; an `ideal` supply has no resistance."""
+    """Levels and edges of a sampled voltage [n]; an `ideal` supply has no resistance.
+
+    Parameters
+    ----------
+    t_s, v_v, i_a : array [n]
+        Times [s], voltage [V] and current [A] of one pair.
+    timing
+        When a voltage that no supply describes is valid.
+    ideal
+        Whether the supply has no resistance, as an inverter's command.
+
+    Returns
+    -------
+    Waveform
+        Levels [V] between edges [s], and which edges move together.
+
+    """
     period = float(np.median(np.diff(t_s)))
     noise = noise_of(v_v)
     jumps = np.flatnonzero(np.abs(np.diff(v_v)) > max(8.0 * noise.sigma, 0.1 * float(np.ptp(v_v))))

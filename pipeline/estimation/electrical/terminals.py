@@ -37,6 +37,26 @@ def pair_signals(capture: Capture, pair: str, *others: str) -> dict[str, Array]:
     The current is positive into the pair's first terminal; where both line currents are there,
     i = (i_first - i_second) / 2. Rows with a missing value in any of t, v, i are left out.
     Raises KeyError where a voltage or a current is missing.
+
+    Parameters
+    ----------
+    capture
+        Of one terminal pair, or of all three phases.
+    pair
+        `ab`, `bc` or `ca`.
+    others
+        Further columns, where they are there.
+
+    Returns
+    -------
+    dict of array [n]
+        `t_s` [s], `v_v` [V], `i_a` [A] and the others.
+
+    Raises
+    ------
+    KeyError
+        Where a voltage or a current is missing.
+
     """
     volts, amps = voltage_columns(capture, pair), current_columns(capture, pair)
     if not volts or not amps or not capture.has("t_s"):
@@ -52,7 +72,21 @@ def pair_signals(capture: Capture, pair: str, *others: str) -> dict[str, Array]:
 
 
 def first_temperature(capture: Capture, *places: str) -> str | None:
-    """The first of the temperature columns of these places that holds a finite value."""
+    """The first of the temperature columns of these places that holds a finite value.
+
+    Parameters
+    ----------
+    capture
+        Where to look.
+    places
+        `winding`, `magnet`, `case` or `ambient`, in order of preference.
+
+    Returns
+    -------
+    str or None
+        The column's name, None where none of them holds a value.
+
+    """
     for place in places:
         name = f"temp_{place}_degc"
         if capture.has(name) and np.isfinite(capture.arrays(name)[name]).any():
@@ -65,6 +99,19 @@ def bridged(t_s: Array, values: Array) -> Array:
 
     A temperature before its first and after its last reading is that reading. As it was where no
     value is there.
+
+    Parameters
+    ----------
+    t_s : array [n], s
+        Times of all rows.
+    values : array [n]
+        NaN where the slow channel holds no reading.
+
+    Returns
+    -------
+    array [n]
+        In the unit of `values`.
+
     """
     there = np.isfinite(values)
     if not there.any():

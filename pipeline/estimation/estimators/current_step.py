@@ -105,7 +105,22 @@ def _polynomial(terms: Array, flux: Array) -> Array:
 
 
 def along_ramp(shared: Array, cos_g: float, current_a: Array) -> Array:
-    """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0."""
+    """Incremental inductance [n] between the terminals as the current follows a ramp [n] from 0.
+
+    Parameters
+    ----------
+    shared : array [10]
+        Inductances and saturation of both axes.
+    cos_g
+        Cosine of the angle from the d axis to the pair's current.
+    current_a : array [n], A
+        Pair current, from 0.
+
+    Returns
+    -------
+    array [n], H
+
+    """
     one, sin_g = shared[None, :], math.sqrt(max(1.0 - cos_g**2, 0.0))
     flux_d, flux_q = np.zeros(1), np.zeros(1)
     found = np.empty(current_a.size)

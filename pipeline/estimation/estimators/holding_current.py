@@ -110,6 +110,14 @@ def held_out_residual(turns: Sequence[Turn], orders: Sequence[int]) -> Array | N
     fitted to those whose number is a square modulo the prime and judged on the others, then the
     other way round. That pattern has a flat spectrum, so it starves no order of its phases.
     Reference: Schroeder, Number Theory in Science and Communication, 15.
+
+    Parameters
+    ----------
+    turns
+        Whole turns: angle [rad] and holding current [A].
+    orders
+        A mechanical turn, which are fitted.
+
     """
     angle = np.concatenate([turn.theta_rad for turn in turns])
     value = np.concatenate([turn.value for turn in turns])

@@ -34,6 +34,23 @@ def angle_doubt(
     exp(6 j p theta) does, those of a turning shaft count as 0. References: Jahns and Soong, IEEE
     Trans. Ind. Electron. 43(2), 1996 (torque ripple); JCGM 101:2008, 6.4.6 (a cosine of unknown
     phase).
+
+    Parameters
+    ----------
+    points
+        That the torque constant rests on.
+    kt_nm_a
+        The torque constant [N·m/A].
+    pole_pairs
+        None where not known.
+    known
+        Constants found so far: harmonics of the back-EMF.
+
+    Returns
+    -------
+    tuple of Contribution
+        [N·m/A]; empty where all points turn.
+
     """
     angles = np.array([p.angle_rad for p in points if p.standing])
     if not angles.size:
@@ -46,6 +63,21 @@ def ripple_share(angles_rad: Array, pole_pairs: int | None, known: Constants) ->
     """Relative standard uncertainty of a torque constant over these mechanical angles [n, rad].
 
     Angles that are not known (NaN), and any angle without pole pairs, cancel nothing.
+
+    Parameters
+    ----------
+    angles_rad : array [n], rad
+        Mechanical angles at which the rotor was held.
+    pole_pairs
+        None where not known.
+    known
+        Constants found so far: harmonics of the back-EMF.
+
+    Returns
+    -------
+    float
+        [1].
+
     """
     alone = pole_pairs is None or not np.all(np.isfinite(angles_rad))
     parts, usual = [], {6: policy().ripple.usual_6, 12: policy().ripple.usual_12}

@@ -52,6 +52,16 @@ def drag_disagreements(
     """What regimes scatter in the inertia, and in Coulomb and viscous drag over it, each or None.
 
     With the drag curve left free only the inertia is one number.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+    found
+        Their fit.
+    level
+        Chance of any partition to be named where the law is whole [1].
+
     """
     regression = Regression(found.design, found.target, found.sigma, rows.cluster)
     names = ("torque",) if found.free else ("torque", "coulomb", "viscous")

@@ -93,6 +93,21 @@ def shaft_rows(
     torque against angle, the latter in proportion to q current.
     Windows in which the shaft all but stands (friction undetermined), and those of a coast-down in
     which it is still being driven or held at its speed, are dropped and counted.
+
+    Parameters
+    ----------
+    captures
+        Drives and coast-downs.
+    speed_functions
+        By name: f(ω/ω_max) [n] of [n].
+    cogging_orders, ripple_orders
+        Orders a mechanical turn.
+
+    Returns
+    -------
+    ShaftRows or None
+        Window means; None where no window is left.
+
     """
     parts = [part for part in map(_part, captures) if part is not None]
     if not parts:

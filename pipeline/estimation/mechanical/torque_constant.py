@@ -13,6 +13,17 @@ def torque_constant(known: Constants) -> Estimate | None:
     """Kt per peak q ampere: of the torque test, else 1.5 p psi, else 1.5 Ke; None without any.
 
     Kt_peak = 1.5 Ke_phase_peak in the amplitude-invariant frame, whatever the pole pairs.
+
+    Parameters
+    ----------
+    known
+        Constants found so far.
+
+    Returns
+    -------
+    Estimate or None
+        [N·m/A].
+
     """
     found = known.best("kt_peak_nm_a") or known.best("kt_from_ke_nm_a")
     if found is not None:

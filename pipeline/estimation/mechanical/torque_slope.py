@@ -48,6 +48,23 @@ def slope_without_d(
     the currents allow no further one. `turned` frames add an even power (reluctance at the d
     current that a wrong angle makes), `rubbing` load friction. K is that of a magnet at 25 degC.
 
+
+    Parameters
+    ----------
+    points
+        Settled points.
+    alpha_1_k
+        Coefficient of the magnet's flux at 25 degC [1/K].
+    turned
+        Whether the frame may be turned.
+    rubbing
+        Whether friction may go with torque.
+
+    Returns
+    -------
+    Slope or None
+        [N·m/A].
+
     """
     largest = max(abs(p.iq_a) for p in points)
     rows = [p for p in points if abs(p.id_a) < policy().flux_pairs.same_current * largest]

@@ -56,6 +56,28 @@ def read_heat(capture: Capture, known: Constants) -> HeatRecord | None:
 
     Raises KeyError where voltage, current or winding temperature is missing, or where the rotor
     turns and the flux, pole pairs or inductances needed to take its back-EMF off are unknown.
+
+    Parameters
+    ----------
+    capture
+        Of a heat run: rotor frame, or one terminal pair.
+    known
+        Constants found so far: flux, pole pairs and inductances, where the rotor turns.
+
+    Returns
+    -------
+    HeatRecord or None
+        Block means of resistance [ohm], current [A] and temperatures [degC].
+
+    Raises
+    ------
+    KeyError
+        Where voltage, current or winding temperature is missing, or the back-EMF is not known.
+
+    Notes
+    -----
+    R = (v_d i_d + v_q i_q - ω_e (ψ_d i_q - ψ_q i_d)) / (i_d² + i_q²)
+
     """
     if first_temperature(capture, "winding") is None:
         raise KeyError(f"{capture.path}: no temp_winding_degc")
@@ -107,6 +129,19 @@ def reference_resistance(record: HeatRecord, known: Constants) -> Estimate | Non
 
     Where the phases or their mix are not known, the best R of the mean phase, whatever told it: a
     resistance test, else a heat run or a drive log. None where nothing did.
+
+    Parameters
+    ----------
+    record
+        The run, with the phases' shares in the resistance that its current saw.
+    known
+        Constants found so far.
+
+    Returns
+    -------
+    Estimate or None
+        [ohm, at 25 degC].
+
     """
     phases = [known.best(f"r_{phase}_ohm") for phase in "abc"]
     if record.shares is None or any(one is None for one in phases):

@@ -13,6 +13,19 @@ def magnet_coefficient(known: Constants) -> tuple[float, Budget]:
     """The coefficient of psi at 25 degC [1/K] and where its uncertainty comes from.
 
     What is assumed of one motor's magnets is one error in all that is brought to 25 degC by it.
+
+    Parameters
+    ----------
+    known
+        Constants found so far.
+
+    Returns
+    -------
+    value : float
+        [1/K].
+    budget : Budget
+        [1/K].
+
     """
     found = known.best("temp_coeff_magnet_1_k")
     if found is None:

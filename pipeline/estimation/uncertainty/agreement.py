@@ -31,6 +31,16 @@ def reconciled(constants: Constants) -> Constants:
     A measured value is judged by the other methods that hold for like conditions and are precise
     enough to tell something of it. What they scatter beyond chance joins its budget with k - 1
     degrees of freedom, and its note names methods and values.
+
+    Parameters
+    ----------
+    constants
+        All estimates so far.
+
+    References
+    ----------
+    Particle Data Group, Review of Particle Physics, 2024, 5.2.2 (scale factors).
+
     """
     judged = tuple(
         _widened(e, judges(constants, e)) if e.known and e.status == "measured" else e
@@ -40,7 +50,16 @@ def reconciled(constants: Constants) -> Constants:
 
 
 def judges(constants: Constants, estimate: Estimate) -> list[Estimate]:
-    """Other methods' estimates of the same constant that can be held against this one."""
+    """Other methods' estimates of the same constant that can be held against this one.
+
+    Parameters
+    ----------
+    constants
+        All estimates so far.
+    estimate
+        The one that is judged.
+
+    """
     names = (estimate.name, *SAME.get(estimate.name, ()))
     others: list[Estimate] = []
     for one in (e for name in names for e in constants.all_of(name)):

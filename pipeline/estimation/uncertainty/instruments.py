@@ -68,6 +68,19 @@ def instrument_uncertainties(
 
     The largest that the captures of a station state; what is usual (`UNSTATED_U`) where none
     states it.
+
+    Parameters
+    ----------
+    captures
+        That a fit rests on.
+    kinds
+        Of instruments: keys of `SOURCES`.
+
+    Returns
+    -------
+    dict of float
+        By source, sorted.
+
     """
     wanted = tuple(kinds)
     stated: dict[str, float] = {}
@@ -106,6 +119,23 @@ def contributions(
     `evaluate` refits with each source shifted by the amounts given (a relative gain error, an
     offset [K], whatever `uncertainties` counts); half the central difference of plus and minus
     one standard uncertainty is the signed contribution.
+
+    Parameters
+    ----------
+    evaluate
+        Gives the k results [k, their units] with each source shifted.
+    uncertainties
+        One standard uncertainty a source.
+
+    Returns
+    -------
+    list of list of Contribution
+        One list a result [its unit].
+
+    References
+    ----------
+    JCGM 100:2008, 5.1.3 note 2 (numerical sensitivity).
+
     """
     size = evaluate({}).size
     budgets: list[list[Contribution]] = [[] for _ in range(size)]
@@ -123,6 +153,16 @@ def with_clock(estimate: Estimate, power: int, captures: Iterable[Capture]) -> E
 
     A clock fast by a share g shows (1 + g)^power of the constant. The time bases of several
     stations count in full each: never too little. Reference: GUM 5.1.6, u(X)/X = p u(t)/t.
+
+    Parameters
+    ----------
+    estimate
+        A measured constant.
+    power
+        Of the clock in it.
+    captures
+        Whose time bases it rests on.
+
     """
     gains = instrument_uncertainties(captures, ("clock",))
     parts = [Contribution(name, power * estimate.number * u, "B") for name, u in gains.items()]

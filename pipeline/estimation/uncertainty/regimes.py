@@ -81,7 +81,21 @@ def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_
 
 
 def information(regression: Regression, column: int) -> Array:
-    """What each row [n] tells of one coefficient beside the others: its share of 1/variance."""
+    """What each row [n] tells of one coefficient beside the others: its share of 1/variance.
+
+    Parameters
+    ----------
+    regression
+        Rows with their noise.
+    column
+        The coefficient, by its place in the design.
+
+    Returns
+    -------
+    array [n]
+        Sums to 1.
+
+    """
     others = np.delete(regression.design, column, axis=1)
     own = linear_fit(others, regression.design[:, column], regression.sigma).residuals
     told: Array = (own / regression.sigma) ** 2
@@ -99,6 +113,23 @@ def disagreement(
     `partitions` makes them from the rows' information [n]. The coefficient is fitted once a regime
     with all else common. `level` is the chance of any partition to be named where the law is whole
     (Bonferroni).
+
+    Parameters
+    ----------
+    regression
+        Rows with their noise and clusters.
+    column
+        The coefficient, by its place in the design.
+    partitions
+        Of the rows, from their information [n].
+    level
+        Chance of a false alarm [1].
+
+    Returns
+    -------
+    Disagreement or None
+        The values of the regimes, relative to the common one [1], and what they scatter.
+
     """
     told = information(regression, column)
     tried = [_of_partition(regression, column, told, p) for p in partitions(told)]
