@@ -36,8 +36,8 @@ def main(settings: ExportSettings) -> Outcome:
     registry = Registry(place, {k: str(v) for k, v in settings.registry_options.items()})
     version, notes = _version(registry, settings)
     (sheet,) = registry.datasheets([version])
-    own = {term.name: term for estimator in estimators() for term in estimator.terms}
-    text = exporter.render(Source(sheet, version.revision, {**own, **CONSTANTS}), options)
+    of_estimators = {term.name: term for estimator in estimators() for term in estimator.terms}
+    text = exporter.render(Source(sheet, version.revision, {**of_estimators, **CONSTANTS}), options)
     ending = dict.fromkeys((exporter.name, exporter.extension))
     name = ".".join((file_stem(version.motor_id), *ending))
     path = output_folder(settings.output) / "export" / name
@@ -49,15 +49,15 @@ def main(settings: ExportSettings) -> Outcome:
 def _exporter(settings: ExportSettings) -> Exporter:
     known = exporters()
     if settings.format not in known:
-        said = f"no format {settings.format!r}" if settings.format else "format= is missing"
-        raise UsageError(f"export: {said}", f"known are {', '.join(known)}")
+        problem = f"no format {settings.format!r}" if settings.format else "format= is missing"
+        raise UsageError(f"export: {problem}", f"known are {', '.join(known)}")
     if not settings.motor.strip():
         raise UsageError("export: motor= is missing", "name the motor by its serial number")
     return known[settings.format]
 
 
 def _version(registry: Registry, settings: ExportSettings) -> tuple[Version, tuple[str, ...]]:
-    """The version asked for, or the newest released one; raises UsageError for none released."""
+    """The requested version, or the newest released one; raises UsageError for none released."""
     history = registry.history(settings.motor)
     if not history:
         raise UsageError(

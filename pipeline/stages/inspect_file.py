@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class InspectTask:
-    """A stranger's file to look into; `refused` is why it must not be read."""
+    """An untrusted file to inspect; `refused` is why it must not be read."""
 
     file: str
     limits: ReadLimits
@@ -46,25 +46,25 @@ class InspectTask:
 def main(settings: InspectSettings) -> Outcome:
     """Prints what the file holds; exit code 3 and one line where `run` would refuse it."""
     if not settings.file or not Path(settings.file).exists():
-        raise UsageError(f"file={settings.file or ''} is no file", "name the file to look into")
+        raise UsageError(f"file={settings.file or ''} is no file", "name the file to inspect")
     if Path(settings.file).is_dir():
         raise UsageError(f"{settings.file} is a folder", "name one file of it")
     task = InspectTask(settings.file, ReadLimits(settings.read_seconds, settings.read_memory_mb))
     pool = open_pool("local", Cluster())
     with TemporaryDirectory() as progress, WorkerPool(pool, 1, Path(progress) / "work") as workers:
         try:
-            (seen,) = workers.map_tasks(look_into, [task])
+            (seen,) = workers.map_tasks(inspect, [task])
         except CaptureError as error:
-            told = f"{printable(settings.file)}: {error.message}"
-            raise CaptureError(error.code, told, error.remedy, error.rows) from error
+            message = f"{printable(settings.file)}: {error.message}"
+            raise CaptureError(error.code, message, error.remedy, error.rows) from error
     if isinstance(seen, MachineError):
         raise seen
     text, refusals = seen
     return Outcome(CaptureError.exit_code if refusals else 0, text, refusals)
 
 
-def look_into(task: InspectTask) -> tuple[str, tuple[str, ...]]:
-    """What a file holds, as text for people, and the lines by which `run` would refuse it.
+def inspect(task: InspectTask) -> tuple[str, tuple[str, ...]]:
+    """The content of a file as text, and the lines by which `run` would refuse it.
 
     In a worker, under its limits.
     """
@@ -79,8 +79,8 @@ def look_into(task: InspectTask) -> tuple[str, tuple[str, ...]]:
         report = describe(path, sources)
         refusals = _refusals(path, sources)
         if not report.faults:
-            told = tuple(f"{one.message}; {one.remedy}" for one in refusals)
-            report = replace(report, faults=told)
+            faults = tuple(f"{one.message}; {one.remedy}" for one in refusals)
+            report = replace(report, faults=faults)
     return render(report), tuple(finding.line() for finding in refusals)
 
 
@@ -108,12 +108,12 @@ def render(report: InspectReport) -> str:
         f"checksums: {report.checksums}",
     ]
     lines += [f"fault: {fault}" for fault in report.faults]
-    said = dict(report.metadata)
+    metadata = dict(report.metadata)
     if report.source:
         lines.append(f"recognised by the source map: {report.source}")
-    elif "contract" in said and report.faults:
+    elif "contract" in metadata and report.faults:
         lines.append("it says `contract`, but `run` refuses it as it stands")
-    elif "contract" in said:
+    elif "contract" in metadata:
         lines.append("in the form of the contract: no source map is needed")
     lines += [f"  {key}: {value}" for key, value in report.metadata]
     for stream in report.streams:
@@ -122,7 +122,7 @@ def render(report: InspectReport) -> str:
         lines += [f"  {_field(seen)}" for seen in stream.fields]
     if report.streams:
         when = "tests, once a source map reads it" if report.starter else "tests"
-        lines += [f"{when}:", *(f"  {line}" for line in _tests(report, said.get("pair")))]
+        lines += [f"{when}:", *(f"  {line}" for line in _tests(report, metadata.get("pair")))]
     if report.starter:
         lines += ["a source map to start from:", "", report.starter.rstrip("\n")]
     return "\n".join(lines) + "\n"

@@ -50,8 +50,8 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
         recall.save()
     findings = (*findings, *found.findings)
     datasheet = superseding(work.assemble(job, campaign, found, stamp), job.revoked)
-    said = (*job.findings, *findings)
-    files = _write(job, campaign, datasheet, found.evidence, said, watch)
+    all_findings = (*job.findings, *findings)
+    files = _write(job, campaign, datasheet, found.evidence, all_findings, watch)
     return Finished(findings, files)
 
 
@@ -129,8 +129,8 @@ def _recordings(
     shown += evidence
     yield f"recordings/motor-{stem}.rrd", motor_bytes(campaign, datasheet, shown, findings)
     for capture in campaign.captures:
-        own = tuple(f for f in findings if f.file == capture.path)
-        content = recording_bytes(capture, shown, datasheet, own)
+        of_capture = tuple(f for f in findings if f.file == capture.path)
+        content = recording_bytes(capture, shown, datasheet, of_capture)
         yield f"recordings/{stem}/{_place(capture.path)}.rrd", content
 
 

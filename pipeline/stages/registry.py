@@ -33,8 +33,8 @@ TAG = re.compile("[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 def main(settings: RegistrySettings) -> Outcome:
     """Does one action; raises UsageError for an action or a key that is missing or wrong."""
     if settings.action not in ACTIONS:
-        said = f"no action {settings.action!r}" if settings.action else "the action is missing"
-        raise UsageError(f"registry: {said}", f"one of {', '.join(ACTIONS)}")
+        problem = f"no action {settings.action!r}" if settings.action else "the action is missing"
+        raise UsageError(f"registry: {problem}", f"one of {', '.join(ACTIONS)}")
     options = {name: str(value) for name, value in settings.registry_options.items()}
     return ACTIONS[settings.action](Registry(settings.registry, options), settings)
 
@@ -67,8 +67,8 @@ def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
         wanted = Selection(motor_id=motor, revision=number)
         pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
     one, other = registry.datasheets(pair)
-    told = changes(one.constants, other.constants)
-    return Outcome(text=difference_text(pair[0], pair[1], told))
+    found = changes(one.constants, other.constants)
+    return Outcome(text=difference_text(pair[0], pair[1], found))
 
 
 def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -81,10 +81,10 @@ def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
     until = moment(date)
     motors = histories(registry.events(), until)
     if motor is not None:
-        motors = {motor_id: own for motor_id, own in motors.items() if motor_id == motor}
+        motors = {motor_id: history for motor_id, history in motors.items() if motor_id == motor}
     if not motors:
         return Outcome(text=f"nothing was published by {when(until)}")
-    rows = [(motor_id, in_force(own), own[-1]) for motor_id, own in motors.items()]
+    rows = [(motor_id, in_force(history), history[-1]) for motor_id, history in motors.items()]
     valid = sum(version is not None for _, version, _ in rows)
     text = f"{counted(len(rows), 'motor')}, {valid} with a released datasheet at {when(until)}"
     return Outcome(text="\n".join([in_force_table(rows), "", text]))
@@ -114,8 +114,8 @@ def _decide(
     _, _, by, why = _needed(settings, "motor", which, "by", "why")
     wanted = _wanted(settings)
     version, new = registry.decide(kind, wanted, by, why, datetime.now(UTC))
-    said = "" if new else " (already so)"
-    text = f"{safe(version.motor_id)} revision {version.revision} is {version.status}{said}: "
+    already = "" if new else " (already so)"
+    text = f"{safe(version.motor_id)} revision {version.revision} is {version.status}{already}: "
     lines = [text + decision(version.decisions[-1])]
     lines += [f"  stands: {safe(reason)}" for reason in status_of(version, None).why]
     try:
@@ -140,7 +140,7 @@ def _name(registry: Registry, settings: RegistrySettings, kind: Literal["tag", "
     if not TAG.fullmatch(tag):
         raise UsageError(f"tag={tag} is no name", "letters, digits and - _ . up to 64")
     if settings.select is not None:
-        versions = [v for own in histories(registry.events()).values() for v in own]
+        versions = [v for history in histories(registry.events()).values() for v in history]
         query = parse_selector(settings.select, versions)
         if any(name in query.terms for name in OF_CONTENT):
             raise UsageError("registry tag: select by what a version's row says", "use `lot:...`")

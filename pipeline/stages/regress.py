@@ -70,9 +70,9 @@ def _place(settings: RegressSettings) -> str:
 
 
 def _terms() -> dict[str, Term]:
-    """Every constant of the glossary and of the estimators' own files."""
-    own = {term.name: term for estimator in estimators() for term in estimator.terms}
-    return {**own, **CONSTANTS}
+    """Every constant of the glossary and of the estimators' files."""
+    of_estimators = {term.name: term for estimator in estimators() for term in estimator.terms}
+    return {**of_estimators, **CONSTANTS}
 
 
 def _compare(

@@ -1,7 +1,7 @@
-"""A capture played through its own datasheet: what the published constants do not explain.
+"""A capture compared with its datasheet: what the published constants do not explain.
 
-An estimator's evidence shows how well one fit went; this shows what the datasheet as a whole says
-of every everyday record, so that the eye meets what no single fit had to answer for.
+An estimator's evidence shows one fit. This shows the datasheet as a whole on ordinary records, and
+so what no single fit covers.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def replay(capture: Capture, datasheet: Datasheet) -> tuple[Evidence, ...]:
     """Voltages (window means) and shaft torque (samples) of a capture beside the datasheet's.
 
     Empty where the capture lacks the columns or the datasheet the constants. Losses, saturation
-    and cogging are left out on purpose: they are what the residual is there to show.
+    and cogging are left out on purpose, so that the residual shows them.
     """
     known = {n: e.number for n, e in datasheet.constants.items() if e.known}
     return (*_torque(capture, known), *_voltages(capture, known))
@@ -83,19 +83,19 @@ def _voltages(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, .
     magnet = 1.0 + known.get("temp_coeff_magnet_1_k", 0.0) * _warm(record, cut, "magnet")
     r_ohm, psi_wb = known["r_phase_ohm"] * copper, known["psi_pm_wb"] * magnet
     model = dq_voltages(state, r_ohm, known["ld_h"], known["lq_h"], psi_wb)
-    told = []
+    evidence = []
     for name, fitted in zip(("vq_v", "vd_v"), model[::-1], strict=True):
         measured = cut.mean(record[name])
         kept = cut.whole
         series = Series("", cut.middle_s[kept], measured[kept], fitted[kept])
-        told.append(_evidence(capture, name, series, "window means"))
-    return tuple(told)
+        evidence.append(_evidence(capture, name, series, "window means"))
+    return tuple(evidence)
 
 
 def _torque(capture: Capture, known: Mapping[str, float]) -> tuple[Evidence, ...]:
     """The shaft's torque: what the currents make, less friction and what accelerates the rotor.
 
-    Where the acceleration jumps between windows nothing is said: it is not known within them.
+    Where the acceleration jumps between windows the model is NaN: it is unknown within them.
     """
     currents = () if capture.meta.test in _ZERO_CURRENT else ("iq_a",)
     record = _record(capture, ("torque_shaft_nm", *currents))
@@ -173,6 +173,6 @@ def _speed(record: Mapping[str, Array], cut: _Windows) -> Array:
 
 
 def _warm(record: Mapping[str, Array], cut: _Windows, place: str) -> Array:
-    """Kelvin above 25 degC [w]; 0 where the capture tells no temperature of that place."""
+    """Kelvin above 25 degC [w]; 0 where the capture has no temperature of that place."""
     column = record.get(f"temp_{place}_degc")
     return np.zeros(cut.whole.size) if column is None else cut.mean(column) - 25.0

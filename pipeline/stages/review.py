@@ -68,7 +68,7 @@ def main(settings: ReviewSettings) -> Outcome:
 
 
 def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
-    """Servers run once their addresses are told; the window or the page follows the telling."""
+    """Starts the servers and prints their addresses; then opens the window or serves the page."""
     page, table = _ports(settings.port)
     used = ([page] if settings.web else []) + ([table] if chosen.table else [])
     for port in used if settings.port else []:
@@ -81,7 +81,7 @@ def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
         if settings.web:
             origin = f"http://127.0.0.1:{table}"
             server = stack.enter_context(page_server(chosen.files, page, [origin]))
-        text = _said(settings, chosen, (page, table), catalogues)
+        text = _text(settings, chosen, (page, table), catalogues)
         text = "\n".join([text, *_decided(Path(settings.output), chosen.all)])
         kept = stack.pop_all()
 
@@ -163,7 +163,7 @@ def _ports(first: int) -> tuple[int, int]:
 
 
 def _decided(output: Path, shown: Sequence[Path]) -> list[str]:
-    """What people decided of the motors that are shown, whose recordings are of before that."""
+    """Decisions on the shown motors, made after their recordings."""
     versions = histories_of(Registry((output / "registry").as_posix()))
     lines = []
     for path in sorted((output / "datasheets").glob("*.json")) if versions else ():
@@ -172,33 +172,33 @@ def _decided(output: Path, shown: Sequence[Path]) -> list[str]:
             continue
         sheet = read_datasheet(path)
         current = status_now(output, sheet, versions)
-        said = "; ".join(status_lines(current))
-        if said:
-            lines.append(f"{printable(sheet.motor_id)} is {current.status} now: {said}")
+        statuses = "; ".join(status_lines(current))
+        if statuses:
+            lines.append(f"{printable(sheet.motor_id)} is {current.status} now: {statuses}")
     return lines
 
 
-def _said(
+def _text(
     settings: ReviewSettings,
     chosen: Opened,
     ports: tuple[int, int],
     catalogues: Sequence[str],
 ) -> str:
-    """What is opened, where, and how to see it from another machine."""
+    """The opened recordings, their addresses, and the command for another machine."""
     page, table = ports
     count = len(chosen.all)
     lines = [f"{count} recording{'s' if count != 1 else ''} verified; analytics off, loopback only"]
-    here = f"{getpass.getuser()}@{socket.gethostname()}"
+    host = f"{getpass.getuser()}@{socket.gethostname()}"
     used = ([page] if settings.web else []) + ([table] if chosen.table else [])
     tunnel = " ".join(f"-L {port}:127.0.0.1:{port}" for port in used)
     if settings.web:
         files = [recording_address(page, n, path) for n, path in enumerate(chosen.files)]
         lines.append(f"open {page_address(page, [*files, *catalogues])}")
-        lines.append(f"on another machine: ssh -N {tunnel} {here}, then the same address there")
+        lines.append(f"on another machine: ssh -N {tunnel} {host}, then the same address there")
         lines.append("Ctrl-C ends it")
     elif chosen.table:
-        lines.append(f"on another machine: ssh -N {tunnel} {here}, then rerun {catalogues[-1]}")
+        lines.append(f"on another machine: ssh -N {tunnel} {host}, then rerun {catalogues[-1]}")
     if not settings.web and chosen.files:
-        folder = shlex.quote(f"{here}:{chosen.files[-1].parent.resolve()}")
+        folder = shlex.quote(f"{host}:{chosen.files[-1].parent.resolve()}")
         lines.append(f"on another machine: scp -r {folder} review, then rerun review/*.rrd")
     return "\n".join(lines)

@@ -49,7 +49,7 @@ def choose(
 
     Of a motor the newest version on a side counts. Golden motors stand in no lot.
     """
-    versions = [v for own in histories(registry.events()).values() for v in own]
+    versions = [v for history in histories(registry.events()).values() for v in history]
     queries = {
         "baseline": parse_selector(baseline, versions),
         "candidate": parse_selector(candidate, versions),
@@ -62,7 +62,7 @@ def choose(
     for side, query in queries.items():
         if not sides[side]:
             raise UsageError(f"{side}={query.text} selects nothing", known(versions))
-    newest = {side: _newest(own) for side, own in sides.items()}
+    newest = {side: _newest(versions) for side, versions in sides.items()}
     same = _same_captures(newest["baseline"], newest["candidate"])
     if mode == "code" and not same:
         raise UsageError(
@@ -193,8 +193,10 @@ def _lots(
 
 
 def _few(names: Iterable[str], most: int = 8) -> str:
-    told = sorted(names)
-    return ", ".join(told[:most]) + (f" and {len(told) - most} more" if len(told) > most else "")
+    ordered = sorted(names)
+    return ", ".join(ordered[:most]) + (
+        f" and {len(ordered) - most} more" if len(ordered) > most else ""
+    )
 
 
 def _of_one_type(
@@ -206,14 +208,17 @@ def _of_one_type(
     baseline that has none of theirs.
     """
     types = {one.sheet.motor_type for one in candidate.values()}
-    told = _few(name or "(not stated)" for name in types)
+    names_of_types = _few(name or "(not stated)" for name in types)
     if len(types) > 1:
-        raise UsageError(f"the candidate's motors are of several types: {told}", "add type:NAME")
+        raise UsageError(
+            f"the candidate's motors are of several types: {names_of_types}", "add type:NAME"
+        )
     kept = {m: one for m, one in base.items() if one.sheet.motor_type in types}
     if not kept:
         has = _few({one.sheet.motor_type or "(not stated)" for one in base.values()})
         raise UsageError(
-            f"the candidate is of type {told}, the baseline of {has}", "name lots of one type"
+            f"the candidate is of type {names_of_types}, the baseline of {has}",
+            "name lots of one type",
         )
     return kept, sorted(set(base) - set(kept))
 
@@ -224,7 +229,9 @@ def _repeats(shelf: _Shelf, versions: Sequence[Version], motors: set[str]) -> li
     for version in versions:
         if version.motor_id in motors and version.status != "revoked":
             by_motor.setdefault(version.motor_id, []).append(version)
-    wanted = [v for own in by_motor.values() for v in sorted(own, key=lambda v: -v.revision)]
+    wanted = [
+        v for history in by_motor.values() for v in sorted(history, key=lambda v: -v.revision)
+    ]
     return [Member(one.sheet, None, one.when) for one in shelf.sheets(wanted)]
 
 
