@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.records.policy import entries
+
 CRITICISM = Path(__file__).resolve().parents[2] / "pipeline" / "criticism"
 IN_POLICY = ("selection", "regression", "discovery", "validation", "design")
 ARITHMETIC = {
@@ -61,3 +64,15 @@ def test_a_number_at_the_top_of_a_module_is_no_judgement(name: str) -> None:
 def test_a_threshold_is_seen() -> None:
     tree = ast.parse("_SHARE, _MOST = 0.5, 3\nNAMES = ('a',)\n_LEAST: float = 1e-3\n")
     assert set(numbers(tree)) == {"_SHARE", "_MOST", "_LEAST"}
+
+
+def test_every_number_of_the_policy_is_used() -> None:
+    """By its attribute, or by its name in a table of names."""
+    modules = [p for p in CRITICISM.rglob("*.py") if p.parent.name != "policy"]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in modules]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    used = {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    used |= {node.value for node in nodes if isinstance(node, ast.Constant) and node.value}
+    idle = {"quick_starts", "quick_rounds", "thorough_starts", "thorough_rounds"}  # by pairs
+    names = {entry.name.rpartition(".")[2] for entry in entries(DEFAULT)}
+    assert names - used - idle == set()
