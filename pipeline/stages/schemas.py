@@ -7,7 +7,8 @@ from pathlib import Path
 import pipeline
 from pipeline.contracts.glossary_page import glossary_page
 from pipeline.contracts.json_schema import build_schemas
-from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.policy.policy import DEFAULT as MODELS
+from pipeline.estimation.policy import DEFAULT as ESTIMATORS
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
@@ -17,6 +18,7 @@ from pipeline.settings import Settings
 SCHEMA_FOLDER = "pipeline/contracts/json"
 GLOSSARY_PAGE = "docs/glossary.md"
 POLICY_PAGE = "docs/policy.md"
+POLICIES = {"Models": MODELS, "Estimators": ESTIMATORS}
 
 
 def build() -> dict[str, bytes]:
@@ -25,7 +27,7 @@ def build() -> dict[str, bytes]:
         f"{SCHEMA_FOLDER}/{stem}.schema.json": canonical_json(schema)
         for stem, schema in build_schemas().items()
     }
-    pages = {GLOSSARY_PAGE: glossary_page(), POLICY_PAGE: policy_page(DEFAULT)}
+    pages = {GLOSSARY_PAGE: glossary_page(), POLICY_PAGE: policy_page(POLICIES)}
     return files | {name: page.encode() for name, page in pages.items()}
 
 
