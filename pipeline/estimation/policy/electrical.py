@@ -29,7 +29,7 @@ class BackEmf:
     )  # fmt: skip
     standing_share: float = chosen(
         0.02, unit="1", meaning="of the largest voltage, below which the rotor counts as standing",
-        why="a fiftieth of the speed tells a fiftieth of what the fastest tells",
+        why="at a fiftieth of the speed the signal is a fiftieth of the fastest one",
     )  # fmt: skip
 
 

@@ -45,7 +45,7 @@ class Agreement:
     )  # fmt: skip
     precise: float = derived(
         3.0, unit="1", meaning="u of a method over another's, times the root of their number, "
-        "beyond which it tells nothing of that one",
+        "beyond which it says nothing of that one",
         source="Particle Data Group, Review of Particle Physics, 2024, 5.2.2 (scale factors)",
     )  # fmt: skip
     speed_ratio: float = chosen(
