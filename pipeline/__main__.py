@@ -5,14 +5,14 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TextIO
 
-from pipeline.commands import COMMANDS, Command, overview, usage
-from pipeline.configuration import load_settings
-from pipeline.records.errors import PipelineError
-from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.cli.commands import COMMANDS, Command, overview, program, usage
+from pipeline.cli.flags import Flags, parted
+from pipeline.records.errors import PipelineError, UsageError, meant
+from pipeline.records.outcome import INTERRUPTED, Outcome, first_that_applies
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -22,36 +22,89 @@ def main(arguments: list[str] | None = None) -> int:
     for name in THREADS:
         # A sum split over threads depends on their number; results must not.
         os.environ.setdefault(name, "1")
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words or words[0] in ("-h", "--help", "help"):
-        return _show(Outcome(0 if words else 2, overview()))
-    command = COMMANDS.get(words[0])
-    if command is None:
-        known = ", ".join(COMMANDS)
-        return _show(Outcome(2, errors=(f"error: no command {words[0]!r}; known are {known}",)))
-    if "--help" in words[1:] or "-h" in words[1:]:
-        return _show(Outcome(0, usage(command)))
-    return _show(_guarded(command, words[1:]))
+    given = sys.argv[1:] if arguments is None else arguments
+    return _show(_guarded(lambda: _perform(given)))
 
 
-def _guarded(command: Command, words: list[str]) -> Outcome:
-    """The command's outcome, its expected failures turned into one line and their exit code."""
+def _guarded(perform: Callable[[], Outcome]) -> Outcome:
+    """The outcome of a command; an expected failure becomes one line and its exit code."""
     try:
-        return _perform(command, words)
+        return perform()
     except PipelineError as error:
         return Outcome(error.exit_code, errors=(f"error: {error}",))
     except OSError as error:
         what = error.filename or "the system"
         return Outcome(5, errors=(f"error: {what}: {error.strerror}",))
     except KeyboardInterrupt:
-        return Outcome(5, errors=("error: interrupted; rerun the same command to go on",))
+        again = "error: interrupted; rerun the same command to go on"
+        return Outcome(INTERRUPTED, errors=(again,))
 
 
-def _perform(command: Command, words: list[str]) -> Outcome:
-    settings = load_settings(command, words)
-    stage = importlib.import_module(f"pipeline.stages.{command.stage}")
-    outcome: Outcome = stage.main(settings)
-    return outcome if settings.timings else replace(outcome, timings=())
+def _perform(arguments: Sequence[str]) -> Outcome:
+    flags, words = parted(arguments)
+    if flags.version:
+        from pipeline import __version__
+
+        return Outcome(text=f"motor-datasheets {__version__}")
+    if flags.shell_completion:
+        from pipeline.cli.completion import completed
+
+        return Outcome(text=completed(flags.shell_completion))
+    if not words or words[0] == "help":
+        return Outcome(0 if words or flags.help else 2, overview())
+    command = _command(words[0])
+    if flags.help:
+        return Outcome(text=usage(command))
+    if flags.multirun:
+        from pipeline.cli.multirun import sweep
+
+        return sweep(command, words[1:], lambda each: _run(command, flags, each))
+    return _run(command, flags, words[1:])
+
+
+def _command(word: str) -> Command:
+    if word in COMMANDS:
+        return COMMANDS[word]
+    raise UsageError(f"no command {word!r}", meant(word, COMMANDS))
+
+
+def _run(command: Command, flags: Flags, words: Sequence[str]) -> Outcome:
+    """One run of a command: its settings made, and its stage performed."""
+    from pipeline.cli.configuration import load_settings, origin_text, settings_text
+    from pipeline.report.waiting import waiting
+
+    settings = load_settings(command, words, flags.config_dir)
+    if flags.cfg is not None:
+        return Outcome(text=settings_text(settings))
+    if flags.info:
+        return Outcome(text=origin_text(command, settings))
+    with waiting("" if command.shows_progress else command.name):
+        stage = importlib.import_module(f"pipeline.stages.{command.stage}")
+        outcome: Outcome = stage.main(settings)
+    if not settings.timings:
+        outcome = replace(outcome, timings=())
+    return _as_json(command, outcome) if settings.json else outcome
+
+
+def _as_json(command: Command, outcome: Outcome) -> Outcome:
+    """The outcome with one JSON object for its text; errors stay on standard error as well."""
+    import json
+
+    from pipeline.cli.plain import plain
+
+    document = {
+        "schema": "outcome/1",
+        "command": command.name,
+        "exit_code": outcome.exit_code,
+        "result": outcome.result,
+        "text": outcome.text.splitlines(),
+        "messages": list(outcome.errors),
+        "wrote": outcome.wrote or None,
+        "next": outcome.next or None,
+        "seconds": dict(outcome.timings),
+    }
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False, default=plain)
+    return replace(outcome, text=text, wrote="", next="", timings=())
 
 
 def _show(outcome: Outcome) -> int:
@@ -59,6 +112,10 @@ def _show(outcome: Outcome) -> int:
         _print(line, sys.stderr)
     if outcome.text:
         _print(outcome.text, sys.stdout)
+    if outcome.wrote:
+        _print(f"wrote {outcome.wrote}", sys.stdout)
+    if outcome.next:
+        _print(f"next: {program()} {outcome.next}", sys.stdout)
     if outcome.timings:
         rows = [f"  {name:<12} {seconds:8.3f} s" for name, seconds in outcome.timings]
         _print("\n".join(["timings", *rows]), sys.stdout)

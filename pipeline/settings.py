@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pipeline
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import UsageError, meant
 
 
 def key(
@@ -44,7 +44,11 @@ def key(
 class Settings:
     """Keys that every command shares; a command's own are in its subclass."""
 
+    json: bool = key(False, "print one JSON object in place of the text", result=False)
     timings: bool = key(False, "print the wall time of each stage", result=False)
+    config_dir: str | None = key(
+        None, "a conf/ of your own, as --config-dir: its files come first", result=False, place=True
+    )
 
 
 @dataclass(kw_only=True)
@@ -285,6 +289,23 @@ def result_document(settings: Settings) -> dict[str, Any]:
     """The settings that can change a result, as plain data for a digest."""
     kept = {f.name for f in fields(settings) if f.metadata.get("result", True)}
     return {name: value for name, value in sorted(asdict(settings).items()) if name in kept}
+
+
+def named_file(group: str, name: str, config_dir: str | None = None) -> Path:
+    """The file `GROUP/NAME.yaml` of the user's configuration folder, or of the package's.
+
+    Raises UsageError where neither holds it, with the names that there are.
+    """
+    places = (
+        [configuration_folder()]
+        if config_dir is None
+        else [Path(config_dir), configuration_folder()]
+    )
+    found = {path.stem: path for at in reversed(places) for path in (at / group).glob("*.yaml")}
+    if name in found:
+        return found[name]
+    noun = "limits file" if group == "limits" else group
+    raise UsageError(f"no {noun} {name!r}", meant(name, sorted(found)))
 
 
 def configuration_folder() -> Path:

@@ -23,7 +23,7 @@ from pipeline.io.storage.limits import limits_file, required_constants
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.outcome import Stopwatch
-from pipeline.settings import ModelSettings, RunSettings, configuration_folder
+from pipeline.settings import ModelSettings, RunSettings
 from pipeline.views.tables import CONSTANT_SCHEMA, constant_rows
 
 DATASHEET_SCHEMA = {
@@ -148,7 +148,7 @@ def check(
         model=ModelSettings(name=model or "standard", effects=list(effects)),
     )
     check_options(settings)
-    required = required_constants(limits_file(configuration_folder() / "limits", limits))
+    required = required_constants(limits_file(limits))
     sheets = {name: _datasheet(one, settings, required) for name, one in fits.motors.items()}
     return Datasheets(sheets)
 

@@ -18,7 +18,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-from pipeline.settings import SimulateSettings, configuration_folder
+from pipeline.settings import SimulateSettings, named_file
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.catalogue import (
     bench_from,
@@ -131,7 +131,7 @@ Job = tuple[str, Motor, Bench, int, Plan]
 
 def single(settings: SimulateSettings) -> Iterable[Job]:
     """The one motor that the settings ask for; raises ValueError or KeyError for what is wrong."""
-    document = _document("motor", settings.motor)
+    document = _document("motor", settings.motor, settings.config_dir)
     motor = motor_from(document)
     name = settings.motor_id or f"{settings.motor}-{settings.seed}"
     motor = with_effects(replace(motor, lot=settings.lot, motor_id=name), settings.effects)
@@ -145,8 +145,8 @@ def single(settings: SimulateSettings) -> Iterable[Job]:
 
 def fleet(settings: SimulateSettings) -> Iterable[Job]:
     """Every motor on one station, whose gains are drawn once from the fleet's seed."""
-    words = _document("fleet", str(settings.fleet))
-    document = _document("motor", str(words.get("motor")))
+    words = _document("fleet", str(settings.fleet), settings.config_dir)
+    document = _document("motor", str(words.get("motor")), settings.config_dir)
     many = fleet_from(words, document)
     settled = {**(document.get("bench") or {}), **(words.get("bench") or {})}
     bench = replace(bench_from(settled), station=many.station)
@@ -171,12 +171,9 @@ def _plan(tests: Sequence[str]) -> Plan:
     return tuple(step for step in CAMPAIGN if step[0] in tests)
 
 
-def _document(kind: str, name: str) -> dict[str, Any]:
-    folder = configuration_folder() / kind
-    known = sorted(path.stem for path in folder.glob("*.yaml"))
-    if name not in known:
-        raise UsageError(f"no {kind} {name!r} in conf/{kind}", f"known are {', '.join(known)}")
-    document = load_plain((folder / f"{name}.yaml").read_bytes(), f"{kind}/{name}.yaml")
+def _document(kind: str, name: str, config_dir: str | None) -> dict[str, Any]:
+    path = named_file(kind, name, config_dir)
+    document = load_plain(path.read_bytes(), f"{kind}/{name}.yaml")
     if not isinstance(document, dict):
         raise UsageError(f"conf/{kind}/{name}.yaml holds no keys", "write `key: value` lines")
     return document

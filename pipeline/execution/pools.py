@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
-from multiprocessing import get_context
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
 from pipeline.execution.task import begin_worker
@@ -80,11 +81,45 @@ def core_count() -> int:
 def local_pool(workers: int) -> Iterator[Pool]:
     """Spawned processes of this machine; the driver itself reads no untrusted file."""
     share = str(max(1, core_count() // max(workers, 1)))
-    executor = ProcessPoolExecutor(workers, get_context("spawn"), begin_worker, (share,))
+    context = _Context()
+    executor = ProcessPoolExecutor(workers, context, begin_worker, (share,))
     try:
         yield Pool(executor, (BrokenExecutor,))
+    except KeyboardInterrupt:
+        for process in context.started:
+            process.terminate()
+        raise
     finally:
         executor.shutdown(wait=True, cancel_futures=True)
+
+
+class _Context(SpawnContext):
+    """Spawned processes that leave a Ctrl-C to the driver, which ends them; `started` are all."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.started: list[SpawnProcess] = []
+
+    def Process(  # type: ignore[override] # noqa: N802 - a class there, made by calling it
+        self, *args: Any, **kwargs: Any
+    ) -> SpawnProcess:
+        """A process that has not been started yet."""
+        process = _Process(*args, **kwargs)
+        self.started.append(process)
+        return process
+
+
+class _Process(SpawnProcess):
+    def start(self) -> None:
+        """Starts with SIGINT blocked, which the process inherits; one that comes now waits."""
+        if not hasattr(signal, "pthread_sigmask"):
+            super().start()
+            return
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            super().start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _check(cluster: Cluster) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 
 MOST_CHARS = 1500
 """Most characters of a message on one file, which may quote it."""
@@ -26,6 +27,14 @@ class UsageError(PipelineError):
     """A wrong command, key or configuration file."""
 
     exit_code = 2
+
+
+def meant(typed: str, known: Iterable[str]) -> str:
+    """A remedy for a name that there is not: the nearest one, and all."""
+    names = list(known)
+    near = get_close_matches(typed, names, 1)
+    shown = f"known are {', '.join(names)}" if names else "there is none"
+    return f"did you mean {near[0]}? {shown}" if near else shown
 
 
 class MachineError(PipelineError):

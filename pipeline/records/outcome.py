@@ -6,11 +6,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """`text` goes to standard output, `errors` line by line to standard error.
+
+    `result` is what `json=true` prints, as plain data; `wrote` the path where results lie, and
+    `next` the command that a user would sensibly give now, both printed after the text.
 
     `then` is what a command goes on with once that is printed, such as a window or a server that
     stays; it returns lines for standard error and a further exit code.
@@ -21,9 +25,14 @@ class Outcome:
     errors: tuple[str, ...] = ()
     timings: tuple[tuple[str, float], ...] = ()
     then: Callable[[], tuple[int, tuple[str, ...]]] | None = None
+    result: Any = None
+    wrote: str = ""
+    next: str = ""
 
 
-PRECEDENCE = (5, 2, 1, 3, 4, 0)
+INTERRUPTED = 130
+"""128 and the number of SIGINT, as shells have it."""
+PRECEDENCE = (INTERRUPTED, 5, 2, 1, 3, 4, 0)
 
 
 def first_that_applies(*codes: int) -> int:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pipeline.calculators.coupling import GRIP, KE_KT, KV
 from pipeline.calculators.impedance import COPPER, SALIENCY, WYE_DELTA
 from pipeline.calculators.poles import POLE_PAIRS
-from pipeline.calculators.quantities import Calculator, parse, render, usage
-from pipeline.records.errors import UsageError
+from pipeline.calculators.quantities import Answer, Calculator, parse, render, usage
+from pipeline.records.errors import UsageError, meant
 from pipeline.records.outcome import Outcome
 from pipeline.settings import CalcSettings
 
@@ -25,11 +25,17 @@ KINDS: dict[str, Calculator] = {
 
 def main(settings: CalcSettings) -> Outcome:
     """Prints one calculator's answer with its formula."""
-    return Outcome(text=calculate(settings.kind, settings.values))
+    text, answer = answered(settings.kind, settings.values)
+    return Outcome(text=text, result=answer)
 
 
 def calculate(kind: str, mapping: Mapping[str, str]) -> str:
-    """The printed answer of one calculator for the keys as typed.
+    """The printed answer of `answered`."""
+    return answered(kind, mapping)[0]
+
+
+def answered(kind: str, mapping: Mapping[str, str]) -> tuple[str, Answer | None]:
+    """The printed answer of one calculator for the keys as typed, and the answer itself.
 
     Without a kind, the kinds; without keys, what the kind can be given.
 
@@ -37,12 +43,12 @@ def calculate(kind: str, mapping: Mapping[str, str]) -> str:
     other, and values without sense or of another unit.
     """
     if not kind:
-        return usage(KINDS)
+        return usage(KINDS), None
     calculator = KINDS.get(kind)
     if calculator is None:
-        raise UsageError(f"calc: no kind {kind!r}", f"known are {', '.join(KINDS)}")
+        raise UsageError(f"calc: no kind {kind!r}", meant(kind, KINDS))
     if not mapping:
-        return usage(KINDS, kind)
+        return usage(KINDS, kind), None
     given = parse(kind, calculator, mapping)
     answer = calculator.answer(given)
     if answer is None:
@@ -50,4 +56,4 @@ def calculate(kind: str, mapping: Mapping[str, str]) -> str:
         raise UsageError(
             f"calc {kind}: nothing to work out of {', '.join(mapping)}", f"give {ways}"
         )
-    return render(kind, calculator, given, answer)
+    return render(kind, calculator, given, answer), answer

@@ -20,7 +20,7 @@ from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry, Survey, survey
 from pipeline.io.maps.places import source_maps
 from pipeline.records.capture import Campaign
-from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.errors import MachineError, UsageError, meant
 from pipeline.records.finding import Finding
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import nothing_usable
@@ -42,13 +42,14 @@ def campaigns(
     source: str = "auto",
     motor: str | None = None,
     limits: ReadLimits | None = None,
+    config_dir: str | None = None,
 ) -> Gathered:
     """Every motor's usable captures.
 
     Raises UsageError where the folder is not there or holds no capture of `motor`.
     """
     input_folder(folder)
-    sources = source_maps(source)
+    sources = source_maps(source, config_dir)
     bounds = limits or ReadLimits()
     with TemporaryDirectory() as progress:
         pool = open_pool("local", Cluster())
@@ -74,8 +75,7 @@ def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) ->
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
     if motor is not None and motor not in motors:
-        known = f"there are {', '.join(sorted(motors))}" if motors else "there is none of any motor"
-        raise UsageError(f"no capture of motor {motor} in {folder}", known)
+        raise UsageError(f"no capture of motor {motor} in {folder}", meant(motor, sorted(motors)))
     wanted = sorted(motors) if motor is None else [motor]
     return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
 

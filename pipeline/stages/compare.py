@@ -21,7 +21,7 @@ def main(settings: CompareSettings) -> Outcome:
 
     What a motor was compared with before stays on its page.
     """
-    return each_motor(settings, _judge, "pipeline.criticism.comparison")
+    return each_motor(settings, _judge, "pipeline.criticism.comparison", "comparison")
 
 
 def _judge(task: Task) -> Judged:
@@ -30,7 +30,9 @@ def _judge(task: Task) -> Judged:
     with task.watch.stage("compare"):
         result = compare(task.campaign, task.spec, task.start)
     output, stem = task.output, file_stem(task.campaign.motor_id)
-    write_whole(output / "comparison" / f"{stem}.json", canonical_json(result.document()))
+    write_whole(
+        output / "comparison" / f"{stem}.json", canonical_json(document := result.document())
+    )
     if result.traces:
         from pipeline.io.recordings.comparison import write_comparison_recording
 
@@ -39,7 +41,7 @@ def _judge(task: Task) -> Judged:
             write_comparison_recording(result, path)
     with task.watch.stage("page"):
         _write_page(output, result)
-    return Judged(comparison_text(result), not result.errors)
+    return Judged(comparison_text(result), not result.errors, document)
 
 
 def _write_page(output: Path, result: Comparison) -> None:

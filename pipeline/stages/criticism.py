@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from threading import Thread
+from typing import Any
 
 from pipeline.criticism.policy.policy import policy_changes
 from pipeline.execution.segment_worker import segment_worker
@@ -17,17 +18,22 @@ from pipeline.io.storage.publish import output_folder
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch
+from pipeline.report.waiting import waiting
 from pipeline.settings import CompareSettings
 from pipeline.stages.campaigns import campaigns, outcome_of
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One motor's result: the text to print, and whether the captures were too few to decide."""
+    """One motor's result: the text to print, whether the captures were too few to decide, the
+    document that was written.
+    """
 
     text: str
     undecided: bool
+    document: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +51,11 @@ class Task:
 Judge = Callable[[Task], Judged]
 
 
-def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
+def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str) -> Outcome:
     """Runs `judge` on every motor of `input`; it writes under the folder that it is given.
 
-    While workers read the captures, the module that the judge `needs` is imported.
+    While workers read the captures, the module that the judge `needs` is imported. `folder` is
+    where under the output it writes.
     """
     input_folder(settings.input)
     if settings.model.effects or settings.effects_path is not None:
@@ -58,16 +65,20 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     changes = policy_changes(settings.policy)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     watch, output = Stopwatch(), output_folder(settings.output)
-    with segment_worker(settings.effects_path) as worker:
-        with watch.stage("read"), ThreadPoolExecutor(1) as aside:
-            request = settings.input, settings.source, settings.motor, limits
-            read = aside.submit(campaigns, *request)
-            import_module(needs)
-            found = read.result()
+    with waiting("reading") as line, segment_worker(settings.effects_path) as worker:
+        with watch.stage("read"):
+            # a daemon, so that an interrupt need not wait for it
+            aside = Thread(target=import_module, args=(needs,), daemon=True)
+            aside.start()
+            found = campaigns(
+                settings.input, settings.source, settings.motor, limits, settings.config_dir
+            )
+            aside.join()
         effects = tuple(settings.model.effects)
         spec = ModelSpec(settings.model.name, effects, settings.effects_path, changes)
         results = []
-        for campaign in found.campaigns:
+        for number, campaign in enumerate(found.campaigns, 1):
+            line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(found.campaigns)}")
             with worker.campaign():
                 start = start_constants(campaign)
                 task = Task(campaign, spec, start, settings.input, output, watch)
@@ -76,4 +87,9 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str) -> Outcome:
     outcome = outcome_of(
         settings.input, found, [result.text for result in results], undecided=undecided
     )
-    return replace(outcome, timings=watch.table())
+    return replace(
+        outcome,
+        timings=watch.table(),
+        result=[result.document for result in results],
+        wrote=f"{output}/{folder}" if results else "",
+    )

@@ -17,7 +17,7 @@ def main(settings: DiagnoseSettings) -> Outcome:
     Where structure is left that no effect explains, an effect to start from is written as well:
     `diagnosis/effects/MOTOR_unknown.py`.
     """
-    return each_motor(settings, _judge, "pipeline.criticism.diagnosis")
+    return each_motor(settings, _judge, "pipeline.criticism.diagnosis", "diagnosis")
 
 
 def _judge(task: Task) -> Judged:
@@ -26,7 +26,9 @@ def _judge(task: Task) -> Judged:
     with task.watch.stage("diagnose"):
         result = diagnose(task.campaign, task.spec, task.start)
     output, stem = task.output, file_stem(task.campaign.motor_id)
-    write_whole(output / "diagnosis" / f"{stem}.json", canonical_json(result.document()))
+    write_whole(
+        output / "diagnosis" / f"{stem}.json", canonical_json(document := result.document())
+    )
     if result.unknown is not None and result.unknown.sketch:
         effect = output / "diagnosis" / "effects" / f"{result.unknown.effect}.py"
         write_whole(effect, result.unknown.source.encode())
@@ -42,4 +44,4 @@ def _judge(task: Task) -> Judged:
         page = render_ladder(result, task.folder, links)
         write_whole(output / "diagnosis" / f"{stem}.html", page.encode())
         relink(output, result.motor_id)
-    return Judged(ladder_text(result, task.folder), result.verdict == "insufficient")
+    return Judged(ladder_text(result, task.folder), result.verdict == "insufficient", document)

@@ -43,7 +43,11 @@ def main(settings: ExportSettings) -> Outcome:
     path = output_folder(settings.output) / "export" / name
     write_whole(path, text.encode())
     which = f"note: {exported(version)}"
-    return Outcome(text=text, errors=(which, *notes, f"note: wrote {path.as_posix()}"))
+    return Outcome(
+        text=text,
+        errors=(which, *notes, f"note: wrote {path.as_posix()}"),
+        result={"path": path, "content": text},
+    )
 
 
 def _exporter(settings: ExportSettings) -> Exporter:

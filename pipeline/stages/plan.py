@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.crosscheck.plan import Aims, Known, Plan, Way, make_plan
@@ -11,9 +12,9 @@ from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.limits import limits_file, required_constants
 from pipeline.records.datasheet import Datasheet
-from pipeline.records.errors import UsageError
+from pipeline.records.errors import UsageError, meant
 from pipeline.records.outcome import Outcome
-from pipeline.settings import PlanSettings, configuration_folder
+from pipeline.settings import PlanSettings
 from pipeline.stages.campaigns import campaigns, outcome_of
 
 # Relative standard uncertainties that a bench of calibrated instruments reaches.
@@ -42,30 +43,32 @@ def main(settings: PlanSettings) -> Outcome:
 
     Raises UsageError where there is no such motor or limits file.
     """
-    limits = limits_file(configuration_folder() / "limits", settings.limits)
+    limits = limits_file(settings.limits, settings.config_dir)
     required = frozenset(required_constants(limits))
     if settings.input is not None:
         return _of_captures(settings, settings.input, required)
     sheets = read_datasheets(Path(settings.output))
     chosen = [s for s in sheets if settings.motor is None or s.motor_id == settings.motor]
     if not chosen:
-        known = ", ".join(sheet.motor_id for sheet in sheets)
-        raise UsageError(f"no motor {settings.motor!r} in {settings.output}", f"known are {known}")
-    return Outcome(text="\n\n".join(plan_of(sheet, required).text() for sheet in chosen))
+        known = meant(settings.motor or "", (sheet.motor_id for sheet in sheets))
+        raise UsageError(f"no motor {settings.motor!r} in {settings.output}", known)
+    plans = [plan_of(sheet, required) for sheet in chosen]
+    return Outcome(text="\n\n".join(plan.text() for plan in plans), result=plans)
 
 
 def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) -> Outcome:
     """The plans of what a run of these captures would find; nothing is written."""
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
-    found = campaigns(folder, settings.source, settings.motor, limits)
+    found = campaigns(folder, settings.source, settings.motor, limits, settings.config_dir)
     plans = []
     for campaign in found.campaigns:
         constants = fit_all(campaign, {})[0]
         tests = frozenset(capture.meta.test for capture in campaign.captures)
         checks = check_all(constants, campaign, {})
         known = Known(campaign.motor_id, constants.chosen(), checks, tests)
-        plans.append(_planned(known, required).text())
-    return outcome_of(folder, found, plans, undecided=not plans)
+        plans.append(_planned(known, required))
+    outcome = outcome_of(folder, found, [plan.text() for plan in plans], undecided=not plans)
+    return replace(outcome, result=plans)
 
 
 def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:

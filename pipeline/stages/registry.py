@@ -47,13 +47,13 @@ def _list(registry: Registry, settings: RegistrySettings) -> Outcome:
     motors = len({version.motor_id for version in found})
     lines = [versions_table(found), ""] if found else []
     count = f"{counted(motors, 'motor')}, {counted(len(found), 'version')}"
-    return Outcome(text="\n".join([*lines, count]))
+    return Outcome(text="\n".join([*lines, count]), result=found)
 
 
 def _show(registry: Registry, settings: RegistrySettings) -> Outcome:
     version = _version(registry, settings, newest=True)
     (sheet,) = registry.datasheets([version])
-    return Outcome(text=datasheet_text(version, sheet))
+    return Outcome(text=datasheet_text(version, sheet), result=sheet.document())
 
 
 def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -68,7 +68,7 @@ def _diff(registry: Registry, settings: RegistrySettings) -> Outcome:
         pair.append(one_of([v for v in history if wanted.takes(v)], wanted, registry.place))
     one, other = registry.datasheets(pair)
     found = changes(one.constants, other.constants)
-    return Outcome(text=difference_text(pair[0], pair[1], found))
+    return Outcome(text=difference_text(pair[0], pair[1], found), result=found)
 
 
 def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -87,7 +87,8 @@ def _at(registry: Registry, settings: RegistrySettings) -> Outcome:
     rows = [(motor_id, in_force(history), history[-1]) for motor_id, history in motors.items()]
     valid = sum(version is not None for _, version, _ in rows)
     text = f"{counted(len(rows), 'motor')}, {valid} with a released datasheet at {when(until)}"
-    return Outcome(text="\n".join([in_force_table(rows), "", text]))
+    current = [{"motor_id": motor_id, "in_force": version} for motor_id, version, _ in rows]
+    return Outcome(text="\n".join([in_force_table(rows), "", text]), result=current)
 
 
 def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -96,7 +97,9 @@ def _verify(registry: Registry, settings: RegistrySettings) -> Outcome:
     faults = counted(len(found.faults), "mismatch")
     verdict = faults if found.faults else "all of it as published"
     errors = (*(f"mismatch: {line}" for line in found.faults), *(f"note: {n}" for n in found.notes))
-    return Outcome(1 if found.faults else 0, f"{settings.registry}: {count}, {verdict}", errors)
+    return Outcome(
+        1 if found.faults else 0, f"{settings.registry}: {count}, {verdict}", errors, result=found
+    )
 
 
 def _approve(registry: Registry, settings: RegistrySettings) -> Outcome:
@@ -123,7 +126,7 @@ def _decide(
     except PipelineError as error:
         failed = f"error: decided, but not shown: {error}; `run` again shows it"
         return Outcome(error.exit_code, "\n".join(lines), (failed,))
-    return Outcome(text="\n".join(lines))
+    return Outcome(text="\n".join(lines), result=version)
 
 
 def _tag(registry: Registry, settings: RegistrySettings) -> Outcome:

@@ -22,7 +22,7 @@ from pipeline.records.outcome import Outcome
 from pipeline.report.junit import junit_xml
 from pipeline.report.lot_page import render_regression
 from pipeline.report.lot_text import regression_text
-from pipeline.settings import RegressSettings, configuration_folder
+from pipeline.settings import RegressSettings
 from pipeline.stages.selection import Chosen, choose
 
 MODES = ("auto", "lots", "code")
@@ -37,7 +37,7 @@ def main(settings: RegressSettings) -> Outcome:
     like) is undecided.
     """
     terms = _terms()
-    limits = read_limits(limits_file(configuration_folder() / "limits", settings.limits))
+    limits = read_limits(limits_file(settings.limits, settings.config_dir))
     faults = lint(limits, terms)
     if faults:
         lines = tuple(f"error: limits {limits.name}: {fault}" for fault in faults)
@@ -60,7 +60,9 @@ def main(settings: RegressSettings) -> Outcome:
     regression = _compare(settings, chosen, limits, terms)
     files = _write(output, regression)
     text = regression_text(regression, files)
-    return Outcome(EXIT_CODES.get(regression.verdict, UNDECIDED), text)
+    return Outcome(
+        EXIT_CODES.get(regression.verdict, UNDECIDED), text, result=regression.document()
+    )
 
 
 def _place(settings: RegressSettings) -> str:

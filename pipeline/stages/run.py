@@ -35,6 +35,7 @@ from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, 
 from pipeline.io.maps.places import source_maps
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.registry.store import Registry
+from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.limits import limits_file, required_constants
 from pipeline.io.storage.publish import output_folder
 from pipeline.records.comparison import ModelSpec
@@ -44,7 +45,8 @@ from pipeline.records.ledger import Event, Revocation
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
 from pipeline.report.progress import progress
-from pipeline.settings import RunSettings, configuration_folder
+from pipeline.report.waiting import waiting
+from pipeline.settings import RunSettings
 
 PROGRESS = ".work"
 COMMITTED = 50
@@ -79,7 +81,10 @@ def main(settings: RunSettings) -> Outcome:
     output = output_folder(settings.output)
     workers = WorkerPool(pool, settings.workers or core_count(), output / PROGRESS)
     with workers:
-        return _run(settings, registry, workers)
+        outcome = _run(settings, registry, workers)
+    if not settings.json:
+        return outcome
+    return replace(outcome, result=[sheet.document() for sheet in read_datasheets(output)])
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -92,11 +97,10 @@ def process_motor(job: MotorJob) -> MotorResult:
 def _run(settings: RunSettings, registry: Registry | None, workers: WorkerPool) -> Outcome:
     watch = Stopwatch()
     folder, output = Path(settings.input), Path(settings.output)
-    conf = configuration_folder()
-    limits = limits_file(conf / "limits", settings.limits)
-    sources = source_maps(settings.source)
+    limits = limits_file(settings.limits, settings.config_dir)
+    sources = source_maps(settings.source, settings.config_dir)
     cache = RunCache(folder, output, on=settings.cache)
-    with watch.stage("survey"):
+    with waiting("looking at the files of " + settings.input), watch.stage("survey"):
         ask = partial(_answers, settings, sources, workers, cache)
         found = survey(folder, sources, ask, recover=settings.recover)
     plain = _jobs(settings, found, limits)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Mapping
 from itertools import cycle
 from pathlib import Path
@@ -48,7 +49,7 @@ def main(settings: SimulateSettings) -> Outcome:
         raise UsageError(f"simulate: {error}", "correct it") from error
     output_folder(settings.output)
     _ours(output, [folder for folder, *_ in jobs])
-    lines = []
+    lines, made = [], []
     for folder, motor, bench, seed, plan in jobs:
         with watch.stage("simulate"):
             recordings, true = simulated(motor, bench, seed, plan)
@@ -59,7 +60,14 @@ def main(settings: SimulateSettings) -> Outcome:
                 stale.unlink()
         count = counted(len(written), "capture")
         lines.append(f"{motor.motor_id}: {count} in {output / folder}")
-    return Outcome(text="\n".join(lines) + "\n", timings=watch.table())
+        made.append({"motor_id": motor.motor_id, "folder": output / folder, "captures": written})
+    return Outcome(
+        text="\n".join(lines),
+        timings=watch.table(),
+        result=made,
+        wrote=str(output),
+        next=f"run input={shlex.quote(str(output))}",
+    )
 
 
 def _captures(folder: Path) -> set[Path]:

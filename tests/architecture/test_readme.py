@@ -13,7 +13,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.commands import COMMANDS
+from pipeline.cli.commands import COMMANDS
 from pipeline.contracts.protocol import Gate
 from pipeline.criticism.effect import Effect
 from pipeline.crosscheck.protocol import Rule

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from pipeline.__main__ import main
-from pipeline.commands import COMMANDS
-from pipeline.configuration import load_settings
+from pipeline.cli.commands import COMMANDS
+from pipeline.cli.configuration import load_settings
 from pipeline.records.errors import UsageError
 from tests.unit.io.recordings import json_messages, mcap_file
 

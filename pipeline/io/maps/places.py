@@ -17,14 +17,18 @@ from pipeline.settings import configuration_folder
 AUTO = "auto"
 
 
-def map_folders() -> tuple[Path, ...]:
-    """Folders of source maps, the weakest first: the package's, the user's, the current one's."""
+def map_folders(config_dir: str | None = None) -> tuple[Path, ...]:
+    """Folders of source maps, the weakest first: the package's, the user's, the current one's,
+    and that of a configuration folder that the user names.
+    """
     places = [configuration_folder() / "source", *_users(), Path("conf") / "source"]
+    if config_dir is not None:
+        places.append(Path(config_dir) / "source")
     there = {place.resolve(): place for place in places if place.is_dir()}
     return tuple(there.values())
 
 
-def source_maps(source: str = AUTO) -> dict[str, SourceMap]:
+def source_maps(source: str = AUTO, config_dir: str | None = None) -> dict[str, SourceMap]:
     """The maps to read foreign files by: those of a file, of a name, or with `auto` all.
 
     A map of the same name in a nearer folder takes the place of one farther away.
@@ -38,7 +42,7 @@ def source_maps(source: str = AUTO) -> dict[str, SourceMap]:
     if source.endswith((".yaml", ".yml")):
         return load_source_file(Path(source))
     maps: dict[str, SourceMap] = {}
-    for folder in map_folders():
+    for folder in map_folders(config_dir):
         nearer = load_source_maps(folder)
         names = {name.partition("/")[0] for name in nearer}
         maps = {n: one for n, one in maps.items() if n.partition("/")[0] not in names} | nearer

@@ -18,6 +18,7 @@ from pipeline.records.limits import (
     amount_from,
     number_from,
 )
+from pipeline.settings import named_file
 
 KEYS = ("about", "required", "rules", "golden", "constants")
 RULE_KEYS = ("alpha", "min_lots", "k", "order_share", "code_negligible", "code_limit")
@@ -35,14 +36,11 @@ CONSTANT_KEYS = (
 WORDS = {"yes": True, "true": True, "no": False, "false": False}
 
 
-def limits_file(folder: Path, name: str) -> Path:
+def limits_file(name: str, config_dir: str | None = None) -> Path:
     """The limits file of a name, or at a path that ends in .yaml; raises UsageError for neither."""
     if name.endswith((".yaml", ".yml")) and Path(name).is_file():
         return Path(name)
-    known = sorted(path.stem for path in folder.glob("*.yaml"))
-    if name not in known:
-        raise UsageError(f"no limits file {name!r}", f"known are {', '.join(known)}")
-    return folder / f"{name}.yaml"
+    return named_file("limits", name, config_dir)
 
 
 def required_constants(path: Path) -> tuple[str, ...]:

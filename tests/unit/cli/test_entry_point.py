@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.commands import COMMANDS, Command
-from pipeline.configuration import load_settings
+from pipeline.cli.commands import COMMANDS, Command
+from pipeline.cli.configuration import load_settings
 from pipeline.criticism.library.registry import effects
 from pipeline.records.errors import UsageError
 from pipeline.settings import ModelSettings, RunSettings, result_document

@@ -155,7 +155,7 @@ def test_plan_from_captures_is_that_of_a_run_of_them(
     assert planned == capsys.readouterr().out
     assert "open_circuit" in planned
     assert command_line(["plan", "motor=other", f"input={folder}"]) == 2
-    assert f"there are {DEMO.name}" in capsys.readouterr().err
+    assert f"known are {DEMO.name}" in capsys.readouterr().err
 
 
 def test_every_constant_can_be_planned(tmp_path: Path) -> None:

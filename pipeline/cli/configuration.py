@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import re
 import typing
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from pipeline.commands import Command
+from pipeline.cli.commands import Command, program
 from pipeline.records.errors import UsageError
-from pipeline.settings import Settings, configuration_folder
+from pipeline.settings import Settings, configuration_folder, named_file
 
 _BOOL = re.compile("true|false|yes|no|on|off|0|1", re.IGNORECASE)
 _INT = re.compile("[+-]?[0-9]+")
@@ -26,13 +28,20 @@ _KINDS: dict[Any, tuple[re.Pattern[str], str, str]] = {
 }
 
 
-def load_settings(command: Command, words: list[str]) -> Settings:
+def load_settings(
+    command: Command, words: Sequence[str], config_dir: str | None = None
+) -> Settings:
     """The settings of a command from its defaults, `conf/command/NAME.yaml` and the overrides.
 
-    Raises UsageError for an unknown key, a value of the wrong type or a word that is no override.
+    Files of the folder `config_dir` come before those of the package.
+
+    Raises UsageError for an unknown key, a value of the wrong type or a word that is no override,
+    and for a `config_dir` that is no folder.
     """
     kinds = typing.get_type_hints(command.settings)
     named = _with_names(command, words)
+    stated = [word.partition("=")[2] for word in named if word.startswith("config_dir=")]
+    config_dir = str(Path(stated[-1]).expanduser()) if stated else config_dir
     texts: dict[str, str | None] = {}
     free: dict[str, str] = {}
     rest: list[str] = []
@@ -48,12 +57,15 @@ def load_settings(command: Command, words: list[str]) -> Settings:
             if key.lstrip("+").split(".")[0] not in kinds:
                 raise UsageError(
                     f"{command.name}: no key {key.lstrip('+')!r}",
-                    f"`python -m pipeline {command.name} --help` lists the keys",
+                    _meant(key.lstrip("+"), kinds, command),
                 )
-            _well_formed(command, key.lstrip("+"), value)
+            _well_formed(command, key.lstrip("+"), value, config_dir)
             nested = typing.get_origin(kinds.get(key.split(".")[0])) is dict and not _group(key)
             rest.append(f"++{word}" if nested else word)
-    settings = _composed(command, rest)
+    texts["config_dir"] = config_dir
+    if config_dir is not None and not Path(config_dir).is_dir():
+        raise UsageError(f"config_dir={config_dir} is no folder", "name a folder like conf/")
+    settings = _composed(command, rest, config_dir)
     for key, text in texts.items():
         setattr(settings, key, text)
     if command.free:
@@ -80,7 +92,34 @@ def _text(command: Command, key: str, text: str, kind: Any) -> str | None:
     return str(Path(text).expanduser()) if text == "~" or text.startswith("~/") else text
 
 
-def _well_formed(command: Command, key: str, value: str) -> None:
+def settings_text(settings: Settings) -> str:
+    """Settings as the YAML that `--cfg job` prints."""
+    from omegaconf import OmegaConf
+
+    return OmegaConf.to_yaml(OmegaConf.structured(settings))
+
+
+def origin_text(command: Command, settings: Settings) -> str:
+    """Where settings come from, the nearest first, as `--info` prints it."""
+    places = [settings.config_dir, str(configuration_folder())]
+    files = [
+        f"  {path}" + ("" if path.is_file() else "  (not there)")
+        for place in places
+        if place is not None
+        for path in [Path(place) / "command" / f"{command.name}.yaml"]
+    ]
+    defaults = f"  {command.settings.__module__}.{command.settings.__name__}"
+    return "\n".join([f"{command.name}: the first of these that names a key", *files, defaults])
+
+
+def _meant(key: str, kinds: Iterable[str], command: Command) -> str:
+    """What to write instead of a key that there is not."""
+    near = get_close_matches(key, [kind.rstrip("_") for kind in kinds], 1)
+    lists = f"`{program()} {command.name} --help` lists the keys"
+    return f"did you mean {near[0]}? {lists}" if near else lists
+
+
+def _well_formed(command: Command, key: str, value: str, config_dir: str | None) -> None:
     """Refuses a word that Hydra would refuse without saying what to write instead."""
     kind: Any = command.settings
     for depth, name in enumerate(parts := key.split(".")):
@@ -92,14 +131,14 @@ def _well_formed(command: Command, key: str, value: str) -> None:
             raise UsageError(f"{command.name}: no key {key!r}", f"{group} has {has}")
         kind = kinds[name]
     if _group(key):
-        _known_name(command, key, value)
+        _known_name(command, key, value, config_dir)
     if kind in _KINDS and not _KINDS[kind][0].fullmatch(_unquoted(value)):
         _, wrong, right = _KINDS[kind]
         raise UsageError(f"{command.name}: {key}={value} is {wrong}", f"write {key}= and {right}")
     if kind is str and value == "null":
         raise UsageError(f"{command.name}: {key}=null is nothing", f"write {key}= and a name")
     if is_dataclass(kind):
-        _known_name(command, key, value)
+        _known_name(command, key, value, config_dir)
     elif typing.get_origin(kind) is list and not (value[:1] == "[" and value[-1:] == "]"):
         listed = f"[{value.strip('[]')}]"
         raise UsageError(f"{command.name}: {key}={value} is no list", f"write {key}={listed}")
@@ -110,13 +149,14 @@ def _group(key: str) -> bool:
     return key == "policy"
 
 
-def _known_name(command: Command, key: str, value: str) -> None:
-    known = sorted(path.stem for path in (configuration_folder() / key).glob("*.yaml"))
-    if value not in known:
-        raise UsageError(f"{command.name}: no {key} {value!r}", f"known are {', '.join(known)}")
+def _known_name(command: Command, key: str, value: str, config_dir: str | None) -> None:
+    try:
+        named_file(key, value, config_dir)
+    except UsageError as error:
+        raise UsageError(f"{command.name}: {error.message}", error.remedy) from error
 
 
-def _with_names(command: Command, words: list[str]) -> list[str]:
+def _with_names(command: Command, words: Sequence[str]) -> list[str]:
     """Words without `=` take the positional names in their order."""
     free = list(command.positional)
     named = []
@@ -128,12 +168,12 @@ def _with_names(command: Command, words: list[str]) -> list[str]:
         else:
             raise UsageError(
                 f"{command.name}: {word!r} is no key=value",
-                f"`python -m pipeline {command.name} --help` lists the keys",
+                f"`{program()} {command.name} --help` lists the keys",
             )
     return named
 
 
-def _composed(command: Command, overrides: list[str]) -> Settings:
+def _composed(command: Command, overrides: list[str], config_dir: str | None) -> Settings:
     from hydra import compose, initialize_config_dir
     from hydra.core.config_store import ConfigStore
     from hydra.errors import HydraException
@@ -144,16 +184,22 @@ def _composed(command: Command, overrides: list[str]) -> Settings:
         raise UsageError("overrides hold no ${...}", "write the value itself")
     store = ConfigStore.instance()
     store.store(group="schema", name=command.name, node=command.settings, package="_global_")
+    folder = configuration_folder()
+    # A primary config would be looked for before there is a search path: the command is a group.
+    overrides = [f"+command={command.name}", *overrides]
+    if config_dir is not None:
+        package = f"file://{folder}".replace("'", "\\'")
+        overrides, folder = [*overrides, f"hydra.searchpath=['{package}']"], Path(config_dir)
     try:
-        with initialize_config_dir(str(configuration_folder()), version_base="1.3"):
-            config = compose(f"command/{command.name}", overrides=overrides)
+        with initialize_config_dir(str(folder.resolve()), version_base="1.3"):
+            config = compose(None, overrides=overrides)
         made: Settings = typing.cast(Settings, OmegaConf.to_object(config))
     except (HydraException, OmegaConfBaseException) as error:
         reasons = [str(one).splitlines()[0].rstrip(".") for one in (error, error.__cause__) if one]
         reason = ": ".join(dict.fromkeys(reasons))
         raise UsageError(
             f"{command.name}: {reason}",
-            f"`python -m pipeline {command.name} --help` lists the keys",
+            f"`{program()} {command.name} --help` lists the keys",
         ) from error
     return made
 

@@ -1,0 +1,1 @@
+"""The command line: commands and their keys, flags, configuration, sweeps, completion."""
