@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pipeline.records.capture import Capture
 from tests.unit.estimation.signals import capture, estimates
 
 KS_V, KV_V_S_RAD, KA_V_S2_RAD, DELAY_S = 0.3, 0.02, 0.004, 0.004
+LABMRD = Path(__file__).parents[4] / "shared" / "data" / "real" / "labmrd"
 COUNTS = 2.0 * np.pi / 16384
 
 
@@ -100,3 +102,29 @@ def test_a_log_with_current_or_at_one_speed_is_left_to_others() -> None:
                     theta_mech_rad=table["theta_mech_rad"] * 0.0)  # fmt: skip
     for other in (driven, still):
         assert not any(e.known for e in estimates(ESTIMATOR, other).values())
+
+
+def labmrd(name: str) -> dict[str, NDArray[np.float64]]:
+    """A recording of an ODrive in open loop: a counter of 8 kHz that wraps, volts, turns."""
+    lines = (LABMRD / f"{name}.csv").read_text().splitlines()
+    rows = [line.rstrip(";").split(",") for line in lines if line[:1].isdigit()]
+    counter, volts, turns, _ = np.array(rows[:-12], dtype=float).T
+    clock = np.unwrap(counter, period=56000.0) / 8000.0
+    return {"t_s": clock - clock[0], "vq_v": volts, "theta_mech_rad": 2.0 * np.pi * turns}
+
+
+@pytest.mark.skipif(not LABMRD.is_dir(), reason="../shared/data/real/labmrd is not here")
+def test_a_real_chirp_tells_where_a_step_of_voltage_ends() -> None:
+    """KS and kV of two chirps foretell the speed that another recording, a step, settles at."""
+    found = estimates(
+        ESTIMATOR, *(capture("drive", name, **labmrd(name)) for name in ("chirp1", "chirp2"))
+    )
+    step = labmrd("step1")
+    late = step["t_s"] > step["t_s"][np.argmax(step["vq_v"])] + 1.0
+    driven = late & (step["vq_v"] == step["vq_v"].max())
+    speed = np.polyfit(step["t_s"][driven], step["theta_mech_rad"][driven], 1)[0]
+    volts = found["ks_v"].number + found["kv_v_s_rad"].number * speed
+    u = found["ks_v"].u + found["kv_v_s_rad"].u * speed
+    assert volts == pytest.approx(step["vq_v"].max(), abs=2.0 * u)
+    assert u < 0.02 * step["vq_v"].max()
+    assert not found["ka_v_s2_rad"].known
