@@ -114,7 +114,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 def _records(
     found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
 ) -> tuple[LadderRung, ...]:
-    """The rungs for people, each with the signature of what came with it."""
+    """The steps for people, each with the signature of what came with it."""
     told = [rung_record(found, rung, one) for rung, one in zip(rungs, held, strict=True)]
     signatures = [
         signature(found, (rungs[n - 1], rungs[n]), (told[n - 1], told[n]))
@@ -200,7 +200,7 @@ def _ranking(
     captured: Sequence[Segment],
     cut: Mapping[str, str],
 ) -> tuple[RankedEffect, ...]:
-    """Found effects in the order found, then the others by their score on the last rung."""
+    """Found effects in the order found, then the others by their score on the last step."""
     last = rungs[-1]
     found = []
     for name in last.added:
@@ -239,7 +239,7 @@ def _ranking(
 
 
 def _loss(found: Sequence[Segment], last: Rung, effect: Effect, dof: int) -> float:
-    """Rise of misfit without a found effect: to first order, or of a refit where that says that
+    """Rise of deviance without a found effect: to first order, or of a refit where that says that
     the effect is not worth its parameters. Along a bent valley the tangent knows little.
     """
     loss = loss_without(last.around, last.fitted, (effect.name,))
@@ -252,7 +252,7 @@ def _loss(found: Sequence[Segment], last: Rung, effect: Effect, dof: int) -> flo
 
 
 def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tuple[Candidate, ...]:
-    """Candidates that promised as much as an effect on the rung before it was added."""
+    """Candidates that promised as much as an effect on the step before it was added."""
     policy = rungs[0].fitted.policy.selection
     before = [rung for rung in rungs if name not in rung.added][-1]
     falls = {score.candidate.effect.name: score.fall for score in before.scores}
@@ -266,7 +266,7 @@ def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tupl
 
 
 def _drop(rungs: Sequence[Rung], held: Sequence[HeldOut], name: str) -> float:
-    """Share of the removable held-out error, from first to last rung, that went where an effect
+    """Share of the removable held-out error, from first to last step, that went where an effect
     was added; 0 where the error grew there.
     """
     totals = [math.log(max(h.total, 1e-300)) for h in held]

@@ -1,4 +1,4 @@
-"""A rung of the ladder as a record: its errors, its parameters, and where the error lives."""
+"""A step of the ladder as a record: its errors, its parameters, and where the error lives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.records.diagnosis import LadderRung, RungError, ToldParameter
 
 
 def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRung:
-    """One rung for people: held-out errors and maps; angle maps are those of the fit."""
+    """One step for people: held-out errors and maps; angle maps are those of the fit."""
     residual = np.where(np.isfinite(held.residual), held.residual, rung.around.residual)
     policy = rung.fitted.policy.validation
     errors = window_errors(found, rung.around, residual)
@@ -42,7 +42,7 @@ def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRu
 
 
 def parameters_of(rung: Rung, held: HeldOut) -> dict[str, ToldParameter]:
-    """Value, standard uncertainty and unit of every effect's parameters on a rung."""
+    """Value, standard uncertainty and unit of every effect's parameters on a step."""
     told = parameters_told(rung.fitted, rung.around, held)
     own = rung.fitted.model.parameters()
     return {name: (told[name].value, told[name].u, told[name].unit) for name in own}

@@ -1,7 +1,7 @@
 """Which further test or calibration would part two effects, and with what power.
 
 Around a fit everything is linear. What an effect does is a vector d of weak samples over the
-noise; what its rival and all other constants can do instead is a plane. λ = |d|² (1 − cos²), the
+noise; what an alternative and all other constants can do is a plane. λ = |d|² (1 − cos²), the
 part of d off the plane, is the noncentrality of the test that tells the two apart [1]. Another
 capture adds its rows to both, a calibration adds a prior.
 
@@ -58,11 +58,11 @@ def separations(
     segments: Sequence[Segment],
     remedies: Mapping[str, str],
 ) -> tuple[Separation, ...]:
-    """What would part an effect of the model from each rival in `against`, the best first.
+    """What would part an effect of the model from each alternative in `against`, the best first.
 
     Power is that of a test at the 1 % level, from the captures at hand and the experiment
     together. If no experiment that can be predicted helps, the one in `remedies`, which the effects
-    themselves declare, is told without a power.
+    themselves declare, is reported without a power.
     """
     policy = fitted.policy.design
     told: list[Separation] = []
@@ -98,7 +98,7 @@ def _power(noncentrality: float, freedom: int, policy: Design) -> float:
 def _nearest(
     effect: Effect, other: str, fitted: Fitted, wide: System, offered: Sequence[Candidate]
 ) -> NDArray[np.int64] | None:
-    """Places of the rival's columns, of its trial shapes the one that is hardest to part."""
+    """Places of the alternative's columns, of its trial shapes the one that is hardest to part."""
     first, best, least = len(own_columns(fitted.model)), None, np.inf
     for candidate in offered:
         places = np.arange(first, first + len(candidate.columns))
@@ -123,7 +123,7 @@ def _amplitudes(effect: Effect, columns: Sequence[Column], fitted: Fitted) -> Ar
 def _now(
     effect: Effect, rival: NDArray[np.int64], fitted: Fitted, wide: System
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Normal matrix of [d, other columns of the model, the rival's], and the others' places."""
+    """Normal matrix of [d, the model's other columns, the alternative's], and their places."""
     own = len(own_columns(fitted.model))
     mine = f"{effect.name}."
     others = np.array([n for n in range(own) if not wide.columns[n].name.startswith(mine)])

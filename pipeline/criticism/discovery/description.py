@@ -15,7 +15,7 @@ from pipeline.criticism.policy.discovery import Discovery
 from pipeline.records.diagnosis import CurvePoint, UnknownStructure
 
 _POINTS, _TURN_POINTS, _DENSE = 17, 48, 2001
-"""Points of a curve that is told, of one over a turn, and of one that is looked at."""
+"""Points of a curve that is reported, of one over a turn, and of one that is looked at."""
 _WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
 
@@ -65,7 +65,7 @@ def _columns(port: Port, found: Expression) -> tuple[str, ...]:
 
 
 def _signal(port: Port, carrier: int, signals: Sequence[str]) -> str:
-    """The recorded signal that the structure is told of: one that misses, where it acts on it."""
+    """The recorded signal that the structure is reported of: one that misses, if it acts on it."""
     told_of = port.signals[min(carrier, len(port.signals) - 1)]
     if port.hook == "flux" and signals and told_of not in signals:
         return signals[0]

@@ -4,7 +4,7 @@ The weak residual is linear in a port's narrow hats, so once their columns are t
 a product of small matrices, and scales are searched at no cost.
 
 References: [1] Pati, Rezaiifar & Krishnaprasad, Asilomar Conf. (1993), orthogonal matching
-pursuit; [2] Schwarz, Ann. Stat. 6 (1978), the price of a parameter; [3] Golub & Pereyra, SIAM J.
+pursuit; [2] Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter; [3] Golub & Pereyra, SIAM J.
 Numer. Anal. 10 (1973), scales with the amplitudes eliminated.
 """
 
@@ -147,7 +147,7 @@ class Pursuit:
         return np.column_stack([np.empty((width, 0)), *(self.hats_of(t) for t in terms)])
 
     def fitted(self, curves: Array) -> tuple[Array, Array, Array, float]:
-        """Own step, amplitudes, residual [R] and misfit with curves [K, k] beside own columns."""
+        """Own step, amplitudes, residual [R] and deviance with curves [K, k] beside own columns."""
         around, own = self.around, self.own
         matrix = np.column_stack([around.matrix[:, :own], around.matrix[:, own:] @ curves])
         penalty = np.concatenate([around.penalty[:own], np.zeros(curves.shape[1])])
@@ -217,7 +217,7 @@ def _promising(pursuit: Pursuit, known: Sequence[Term], offered: Sequence[Group]
 
 
 def _judged(pursuit: Pursuit, groups: Sequence[Group]) -> tuple[float, list[Group]]:
-    """Misfit and price of groups with their scales refined together."""
+    """Deviance and penalty of groups with their scales refined together."""
     refined = _refined(pursuit, groups)
     terms = [t for group in refined for t in group]
     free = sum(1 + len(t.free) for t in terms)

@@ -52,7 +52,7 @@ def gauss_newton(
 ) -> tuple[Fitted, System]:
     """Fits a model's own parameters; returns the fit and the system around it.
 
-    A step that makes the misfit worse is shortened. Columns stay as they are while steps do about
+    A step that makes the deviance worse is shortened. Columns stay as they are while steps do about
     what they promise [2]; a fit is at its end where columns made anew promise nothing.
     """
     policy = fitted.policy.fit
@@ -78,7 +78,7 @@ def _tried(
     segments: Sequence[Segment], fitted: Fitted, around: System, step: Array, halvings: int
 ) -> tuple[Fitted, System, float]:
     """The fit after a step, shortened until it does no harm; the system there, with the columns of
-    the start; and the fall of misfit that these columns promised.
+    the start; and the fall of deviance that these columns promised.
     """
     policy = fitted.policy.fit
     for _ in range(halvings):

@@ -29,7 +29,7 @@ from pipeline.numerics.identifiability import (
 from pipeline.records.comparison import KnownCombination, ModelParameter
 
 POSITIVE = ("psi_wb", "j_kgm2", "r_ohm", "ld_h", "lq_h")
-"""Constants that no motor is without, in the order in which others are told over them."""
+"""Constants that no motor is without, in the order in which others are reported over them."""
 _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
 
@@ -174,7 +174,7 @@ def combinations_told(
     """What the captures tell of parameters that they do not determine one by one.
 
     A matrix speaks of where the fit stands. So the directions without information are walked: what
-    is told must be all there is to know far from here as well.
+    is reported must be all there is to know far from here as well.
     """
     policy = fitted.policy.fit
     names = [c.name for c in around.columns[: len(own_columns(fitted.model))]]
@@ -203,7 +203,7 @@ def combinations_told(
 
 
 def _combined(one: Combination, u: float, names: Sequence[str], model: Model) -> KnownCombination:
-    """A combination as it is told."""
+    """A combination as it is reported."""
     base = base_of(model.machine)
     units = {c.name: c.unit for c in base} | {n: p.unit for n, (_, p) in model.parameters().items()}
     weights = {names[place]: weight for place, weight in one.weights}

@@ -113,7 +113,7 @@ class System:
 
     @property
     def excess(self) -> float:
-        """The part of the misfit that is over noise floors and priors."""
+        """The part of the deviance that is over noise floors and priors."""
         over = np.log(np.maximum(self.spreads(self.residual), 1.0))
         return float(self.counts @ over) + float(self.prior_costs().sum())
 
@@ -135,7 +135,7 @@ class System:
         return each[self.group]
 
     def foreseen(self, step: Array) -> float:
-        """Misfit after a step along the first columns, to first order."""
+        """Deviance after a step along the first columns, to first order."""
         places = np.arange(step.size)
         cost = float(self.prior_costs(places, step).sum())
         return self.misfit_of(self.spreads(self.after(places, step))) + cost

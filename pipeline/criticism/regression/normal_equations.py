@@ -23,7 +23,7 @@ moves them."""
 @dataclass(frozen=True, slots=True)
 class Descent:
     """Where a fit along some columns ends: step [k], χ²/n [G] of every group after it, and its
-    misfit, the cost of the priors included.
+    deviance, the cost of the priors included.
     """
 
     step: Array
@@ -108,9 +108,9 @@ class Grams:
         return misfit_of(self.counts, self._spreads(self.power)) + cost
 
     def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int | None = None) -> Descent:
-        """The step of least misfit.
+        """The step of least deviance.
 
-        Weighted least squares, the weights renewed until the misfit stays. There may be more than
+        Weighted least squares, the weights renewed until the deviance stays. There may be more than
         one end: one start gives up a group that another would have saved. So it begins once for
         each power in `starts`, with the weights of the residual at hand to that power.
         """

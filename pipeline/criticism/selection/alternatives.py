@@ -24,12 +24,12 @@ def rivals_of(
     segments: Sequence[Segment],
     passed_over: Sequence[Candidate] = (),
 ) -> tuple[str, ...]:
-    """Effects that explain the captures as well in an effect's place (misfit within 12, and so
+    """Effects that explain the captures as well in an effect's place (deviance within 12, and so
     much of it that is over noise floors and priors).
 
     Refitted in its place are those that to first order keep half of what it explains, and those
-    that were `passed_over` for it. Effects that share its closer look are rivals if that look does
-    not tell them apart.
+    that were `passed_over` for it. Effects that share its closer look are
+    alternatives if that look does not discriminate them.
     """
     policy = fitted.policy.selection
     effect = next(e for e in fitted.model.effects if e.name == name)
@@ -84,7 +84,7 @@ def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str
 def remedies(
     effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]
 ) -> dict[str, str]:
-    """What the effects themselves declare to part them from each other, by rival."""
+    """What the effects themselves declare to part them from each other, by alternative."""
     return {
         other: effect.rivals.get(other)
         or library[other].rivals.get(effect.name)

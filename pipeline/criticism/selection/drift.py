@@ -1,4 +1,4 @@
-"""Slow wander of the instruments in time: taken as noise where it explains all that is left.
+"""Slow drift of the instruments in time: taken as noise where it explains all that is left.
 
 A random walk of a voltage, current or torque is a sum of sines of independent size, of which the
 slowest few hold nearly all. What repeats with the machine's state, at every step of a torque map or
@@ -27,16 +27,16 @@ from pipeline.criticism.residuals.residual import disturbed
 from pipeline.records.diagnosis import Remainder
 
 _WANDERS = ("v", "i", "torque")
-"""Beginnings of the names of signals that wander: voltages, currents and torque."""
+"""Beginnings of the names of signals that drift: voltages, currents and torque."""
 
 
 def wandering(
     segments: Sequence[Segment], fitted: Fitted, left: Sequence[Remainder]
 ) -> tuple[Segment, ...] | None:
-    """The segments, knowing the wander that their instruments may have.
+    """The segments, knowing the drift that their instruments may have.
 
-    None if a fit with that wander leaves anything over the floor. None as well if what is `left` is
-    in captures of one test alone: instruments wander in every test, while a machine that warms up
+    None if a fit with that drift leaves anything over the floor. None as well if what is `left` is
+    in captures of one test alone: instruments drift in every test, while a machine that warms up
     changes slowly in one.
     """
     captures = {one.capture for one in left}
@@ -49,7 +49,7 @@ def wandering(
 
 
 def with_wander(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Segment, ...]:
-    """The segments, each knowing what a wander of its sensors does to its residuals."""
+    """The segments, each knowing what a drift of its sensors does to its residuals."""
     return on_each(wanders, segments, [(model, values)] * len(segments))
 
 

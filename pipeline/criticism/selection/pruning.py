@@ -1,6 +1,6 @@
 """Terms inside an effect: those that the captures do not pay for are left out.
 
-Reference: Schwarz, Ann. Stat. 6 (1978), the price of a parameter.
+Reference: Schwarz, Ann. Stat. 6 (1978), the penalty of a parameter.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def trimmed(
 
     A term pays when −2 log L falls by more than ln n a parameter. All terms that to first order do
     not pay are left out in one refit. If that loses too much, they are tried one by one, and with
-    them the terms that to first order pay less than twenty prices. One amplitude always stays.
+    them the terms that to first order pay less than twenty penalties. One amplitude always stays.
     """
     price = math.log(max(around.size, 2))
     for name in names:
@@ -71,7 +71,7 @@ def _unless_worth(
     terms: tuple[int, ...],
     price: float,
 ) -> tuple[Fitted, System] | None:
-    """The refit without some terms of an effect; None where these were worth their price, or no
+    """The refit without some terms of an effect; None where these were worth their penalty, or no
     amplitude would stay.
     """
     effect = _named(fitted, name)
@@ -110,7 +110,7 @@ def _spare(fitted: Fitted, around: System, effect: Effect, price: float) -> tupl
 
 
 def _loss(fitted: Fitted, around: System, known: Grams, names: Sequence[str]) -> float:
-    """Rise of misfit, to first order, when these parameters go to zero and the rest refits."""
+    """Rise of deviance, to first order, when these parameters go to zero and the rest refits."""
     own = np.arange(len(own_columns(fitted.model)))
     out = np.array([n for n in own if around.columns[n].name in names], dtype=int)
     move = np.array([-fitted.values[around.columns[n].name] for n in out])

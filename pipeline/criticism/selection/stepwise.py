@@ -150,13 +150,16 @@ def _refit_best(
     wide: System,
     found: Sequence[Effect],
 ) -> tuple[Fitted, System] | None:
-    """Refits with the best candidates, those close to the best fall, and takes the best.
+    """Refits candidates that are close to the best fall of deviance; the best one that passes.
 
-    A candidate must keep the promise of its score: the misfit falls by more than its price, and
-    with captures predicted from all the others by half of its price. That must hold even if the
-    effects `found` of its own kind have forms that are a little wrong. Evidence below the floor
-    must hold even if any effect found has such a form; beside one of its own kind it must be worth
-    three prices, since what a form leaves there is of that size.
+    Each must pass all of:
+
+    1. it matters at its refitted size;
+    2. the deviance falls by more than its penalty;
+    3. predicted from all other captures, it falls by `held_out_penalties`, even if the forms of
+       effects `found` with the same hook are a little wrong (`form_error`);
+    4. evidence below the floor does so even if any form found is wrong, and beside an effect of the
+       same hook by `same_hook_penalties`, since what a form leaves there is of that size.
     """
     policy, own = fitted.policy.selection, len(own_columns(fitted.model))
     before, shrunk = leave_out(wide, own, segments), _shrunk(segments, wide)
@@ -262,8 +265,8 @@ def _holds(
 ) -> bool:
     """Whether a candidate helps where captures are predicted from all the others.
 
-    Their misfit must fall by the first of `least`. Besides, a share of some signal's power must go,
-    or the misfit of signals below their floor must fall by the second of `least`. `before` and
+    Their deviance must fall by the first of `least`. A share of some signal's power must go too,
+    or the deviance of signals below their floor must fall by the second of `least`. `before` and
     `after` are χ²/n [G] without and with the candidate. They are multiplied by the first of the
     `doubts` [G]; below the floor, the smaller fall with and without the second counts.
     """
@@ -351,7 +354,7 @@ def loss_without(
     instead: NDArray[np.int64] | None = None,
     grams: Grams | None = None,
 ) -> float:
-    """Rise of misfit when effects go to zero amplitude and the rest, with `instead`, refits.
+    """Rise of deviance when effects go to zero amplitude and the rest, with `instead`, refits.
 
     The model is taken as linear between here and there. `grams` are those of all columns, where
     they are there already.

@@ -1,4 +1,4 @@
-"""How far a ladder is trusted: which of its last rungs are guesses beside what nothing explains."""
+"""Where a ladder is cut: trailing steps whose names are unsupported beside an unknown remainder."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ from pipeline.records.diagnosis import Remainder
 def trusted(
     found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
 ) -> tuple[tuple[Rung, ...], tuple[Remainder, ...]]:
-    """The ladder, and what is left over the floor at its end.
+    """The ladder without unsupported trailing steps, and what is left over the floor at its end.
 
-    Where structure is left that nothing here explains, the last rungs go that took less than a
-    fifth of the held-out error: beside an unknown, their names would be guesses. A rung stays that
-    cleared a signal of all waves of the angle; one goes that some captures speak against. A further
-    effect also goes if it lowers the held-out error by less than 1 % while anything is left.
+    While anything is left, trailing steps are dropped that
+
+    1. captures contradict, where the effects found do not explain what is left;
+    2. lowered the held-out error by less than `guess_share`, where they do not explain it, unless
+       the step cleared a signal of all waves of the angle;
+    3. came after the first effect and lowered the held-out error by less than `little_share`.
     """
     policy = rungs[0].fitted.policy.selection
     for count in range(len(rungs), 0, -1):
@@ -42,7 +44,7 @@ def trusted(
 
 
 def denied(rung: Rung) -> str:
-    """What captures say against the effect that a rung added, nothing where they don't: that an
+    """What captures say against the effect that a step added, nothing where they don't: that an
     amplitude of it that they know is not half of the one that it should come to
     (`Parameter.at_least`).
     """
@@ -64,7 +66,7 @@ def denied(rung: Rung) -> str:
 
 
 def _clears_orders(found: Sequence[Segment], before: System, after: System) -> bool:
-    """Whether some signal had waves of the angle over its floor before a rung, and none after it.
+    """Whether some signal had waves of the angle over its floor before a step, and none after it.
 
     Cogging is no guess where it takes every wave there was in a torque, however much a drag of
     nobody's library leaves at order nought, or another capture in a voltage.
@@ -73,17 +75,17 @@ def _clears_orders(found: Sequence[Segment], before: System, after: System) -> b
 
 
 def _waved(found: Sequence[Segment], around: System) -> set[str]:
-    """Signals with waves of the angle that are told."""
+    """Signals with waves of the angle that are reported."""
     told = told_groups(around, found)
     return {c for (_, c, order), over in zip(around.labels, told, strict=True) if over and order}
 
 
 def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Remainder]) -> bool:
-    """Whether the effects found took most of the misfit of the signals that still miss, a tenth at
+    """Whether the effects found took most of the deviance of signals that still miss, a tenth at
     least of each one's own, and most of the power that held-out errors have over the floor.
 
     An offset of the angle that takes all the torque's error explains nothing of a shaft that coasts
-    too short. Signals that had less than a tenth of the misfit do not count alone. Misfit is
+    too short. Signals that had less than a tenth of the deviance do not count alone. Deviance is
     logarithmic: of an equation that is given up at a million floors it takes half to come to a
     thousand.
     """
