@@ -21,6 +21,7 @@ from pipeline.records.evidence import Evidence, Series
 from pipeline.report.axis import Axis, axis_for, padded, symmetric_axis
 from pipeline.report.band import filled, outlined
 from pipeline.report.residual import ResidualScale, residual_of, residual_scale
+from pipeline.report.ticks import x_ticks, y_ticks
 from pipeline.views.names import unit_of
 
 Array = NDArray[np.float64]
@@ -288,13 +289,7 @@ def _short(labels: Sequence[str]) -> list[str]:
 
 def _frame(panel: Panel) -> str:
     left, right = panel.x.start, panel.x.end
-    rows = "".join(
-        f'<path class="grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>'
-        f'<text class="tick y" x="{left - 7:.1f}" y="{y + 4:.1f}">{label}</text>'
-        for y, label in zip(
-            panel.y.pixels(np.array(panel.y.ticks)).tolist(), panel.y.labels(), strict=True
-        )
-    )
+    rows = y_ticks(panel.y, left, right)
     columns = "".join(
         f'<path class="grid" d="M{x:.1f} {panel.y.end:.1f}V{panel.y.start:.1f}"/>'
         for x in panel.x.pixels(np.array(panel.x.ticks)).tolist()
@@ -306,13 +301,9 @@ def _frame(panel: Panel) -> str:
 
 
 def _x_axis(x: Axis, bottom: float) -> str:
-    labels = "".join(
-        f'<text class="tick x" x="{place:.1f}" y="{bottom + 16:.1f}">{label}</text>'
-        for place, label in zip(x.pixels(np.array(x.ticks)).tolist(), x.labels(), strict=True)
-    )
     middle = (x.start + x.end) / 2
     return (
-        f'{labels}<text class="title x" x="{middle:.1f}" y="{bottom + 33:.1f}">'
+        f'{x_ticks(x, bottom)}<text class="title x" x="{middle:.1f}" y="{bottom + 33:.1f}">'
         f"{_subscripts(x.title)}</text>"
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.physics.notation import scale_for
 from pipeline.report.axis import axis_for, padded
+from pipeline.report.ticks import x_ticks
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 560.0, 62.0, 14.0, 20.0, 200.0, 38.0
 
@@ -28,10 +29,7 @@ def curve_chart(variable: str, unit: str, points: Sequence[Mapping[str, float]])
     band = "M" + "L".join(f"{px:.1f} {py:.1f}" for px, py in outline) + "Z"
     curve = zip(places, y.pixels(value).tolist(), strict=True)
     line = "M" + "L".join(f"{px:.1f} {py:.1f}" for px, py in curve)
-    marks = [
-        f'<text class="tick x" x="{place:.1f}" y="{TOP + HEIGHT + 14:.1f}">{label}</text>'
-        for place, label in zip(x.pixels(np.array(x.ticks)).tolist(), x.labels(), strict=True)
-    ]
+    marks = [x_ticks(x, TOP + HEIGHT)]
     for tick in y.ticks:
         place = y.pixel(tick)
         marks.append(f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>')

@@ -12,6 +12,7 @@ from pipeline.physics.notation import quantity
 from pipeline.records.error_map import ErrorMap
 from pipeline.report.axis import Axis, axis_for, symmetric_axis
 from pipeline.report.chart import Panel
+from pipeline.report.ticks import x_ticks, y_ticks
 from pipeline.views.names import quantity_words
 
 WIDTH, LEFT, TOP, HEIGHT, BOTTOM = 400.0, 52.0, 20.0, 180.0, 38.0
@@ -70,14 +71,7 @@ def _cells(one: ErrorMap, reach: float, panel: Panel) -> Iterator[str]:
 
 def _ticks(panel: Panel) -> str:
     x, y = panel.x, panel.y
-    marks = [
-        f'<text class="tick x" x="{place:.1f}" y="{y.start + 14:.1f}">{label}</text>'
-        for place, label in zip(x.pixels(np.array(x.ticks)), x.labels(), strict=True)
-    ]
-    marks += [
-        f'<text class="tick y" x="{x.start - 5:.1f}" y="{place + 4:.1f}">{label}</text>'
-        for place, label in zip(y.pixels(np.array(y.ticks)), y.labels(), strict=True)
-    ]
+    marks = [x_ticks(x, y.start), y_ticks(y, x.start)]
     middle = (x.start + x.end) / 2
     marks.append(
         f'<text class="title x" x="{middle:.1f}" y="{y.start + 31:.1f}">{escape(x.title)}</text>'
@@ -130,14 +124,4 @@ def angle_bars(one: ErrorMap, reach: float) -> str:
 
 
 def _angle_frame(x: Axis, y: Axis) -> str:
-    lines = "".join(f"M{x.start:g} {place:.1f}H{x.end:g}" for place in y.pixels(np.array(y.ticks)))
-    marks = [f'<path class="grid" d="{lines}"/>']
-    marks += [
-        f'<text class="tick y" x="{x.start - 5:.1f}" y="{place + 4:.1f}">{label}</text>'
-        for place, label in zip(y.pixels(np.array(y.ticks)), y.labels(), strict=True)
-    ]
-    marks += [
-        f'<text class="tick x" x="{place:.1f}" y="{y.start + 14:.1f}">{label}</text>'
-        for place, label in zip(x.pixels(np.array(x.ticks)), x.labels(), strict=True)
-    ]
-    return "".join(marks)
+    return y_ticks(y, x.start, x.end) + x_ticks(x, y.start)

@@ -12,6 +12,7 @@ from pipeline.physics.notation import quantity
 from pipeline.records.lot_constant import ConstantResult, LotMean, MotorValue
 from pipeline.records.lot_regression import CoggingBand, OrderLevel
 from pipeline.report.axis import Axis, axis_for, padded
+from pipeline.report.ticks import x_ticks, y_ticks
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 640.0, 66.0, 12.0, 14.0, 190.0, 40.0
 MOST_DOTS, MOST_NAMES = 60, 14
@@ -53,14 +54,8 @@ def _range(one: ConstantResult) -> Axis:
 
 
 def _grid(y: Axis) -> str:
-    marks = []
-    for tick, label in zip(y.ticks, y.labels(), strict=True):
-        place = y.pixel(tick)
-        marks.append(
-            f'<path class="grid" d="M{LEFT:g} {place:.1f}H{WIDTH - RIGHT:g}"/>'
-            f'<text class="tick y" x="{LEFT - 5:g}" y="{place + 4:.1f}">{label}</text>'
-        )
-    return "".join(marks) + f'<text class="title" x="2" y="10">{escape(y.title)}</text>'
+    title = f'<text class="title" x="2" y="10">{escape(y.title)}</text>'
+    return y_ticks(y, LEFT, WIDTH - RIGHT) + title
 
 
 def _margin(one: ConstantResult, y: Axis) -> str:
@@ -168,11 +163,7 @@ def cogging_chart(bands: Sequence[CoggingBand], orders: Sequence[OrderLevel]) ->
     high = max(max(band.high_nm[:n]) for band, n in zip(bands, cut, strict=True))
     x = axis_for("theta_mech_deg", 0.0, math.degrees(window), LEFT, WIDTH - RIGHT, 6)
     y = axis_for("torque_shaft_nm", *padded(low, high), TOP + HEIGHT, TOP, 4)
-    body = [_grid(y)]
-    for place, label in zip(x.pixels(np.array(x.ticks)).tolist(), x.labels(), strict=True):
-        body.append(
-            f'<text class="tick x" x="{place:.1f}" y="{TOP + HEIGHT + 15:.1f}">{label}</text>'
-        )
+    body = [_grid(y), x_ticks(x, TOP + HEIGHT)]
     for band, n in zip(bands, cut, strict=True):
         css = "t-new" if band.side == "candidate" else "t-old"
         px = x.pixels(np.degrees(np.array(band.theta_mech_rad[:n]))).tolist()

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from html import escape
 from statistics import median
 
-import numpy as np
-
 from pipeline.physics.notation import COVERAGE_FACTOR, reading
 from pipeline.report.axis import Axis, axis_for, padded
+from pipeline.report.ticks import x_ticks
 
 WIDTH, LEFT, RIGHT, ROW, TOP, BOTTOM = 340.0, 76.0, 14.0, 24.0, 6.0, 24.0
 LABEL_CHARS = 10
@@ -38,11 +37,7 @@ def strip_plot(name: str, unit: str, rows: Sequence[tuple[str, Sequence[Dot]]]) 
     low, high = min(r[0] for r in reach), max(r[1] for r in reach)
     x = axis_for(name, *padded(low, high, 0.04), LEFT, WIDTH - RIGHT, 3)
     bottom = TOP + ROW * len(rows)
-    columns = "".join(
-        f'<path class="grid" d="M{place:.1f} {TOP:.1f}V{bottom:.1f}"/>'
-        f'<text class="tick x" x="{place:.1f}" y="{bottom + 15:.1f}">{label}</text>'
-        for place, label in zip(x.pixels(np.array(x.ticks)).tolist(), x.labels(), strict=True)
-    )
+    columns = x_ticks(x, bottom, (TOP, bottom))
     lots = "".join(_lot(x, unit, lot, members, i) for i, (lot, members) in enumerate(rows))
     return (
         f'<svg class="strip" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
