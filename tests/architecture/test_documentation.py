@@ -131,7 +131,7 @@ def test_modules_that_the_manual_of_criticism_cites_are_there() -> None:
     text = (DOCS / "criticism.md").read_text(encoding="utf-8")
     cited = set(re.findall(r"`([a-z_]+/[a-z_]+(?:\.py)?)`", text))
     cited |= set(re.findall(r"─ ([a-z_]+/[a-z_]+)", text))
-    assert len(cited) > 15
+    assert len(cited) > 10
     homes = (ROOT / "pipeline", ROOT / "pipeline" / "criticism")
     lost = {c for c in cited if not any((h / c).with_suffix(".py").is_file() for h in homes)}
     assert lost == set()
