@@ -148,9 +148,18 @@ class CalcSettings(Settings):
 
 @dataclass(kw_only=True)
 class InspectSettings(ReadingSettings):
-    """`inspect`: what one file holds."""
+    """`inspect`: what a file or folder holds, and a source map for it."""
 
-    file: str = key("", "any file", place=True)
+    file: str = key("", "any file, or a folder of them", place=True)
+    map: str | None = key(None, "where to write the source map, such as bench.yaml", place=True)
+    check: bool = key(
+        False, "read every capture through the map and say which constants it determines"
+    )
+    answers: dict[str, str] = key(
+        {},
+        "what the files do not say: unit.NAME=mA, scale.NAME=1e-4 of counts, column.NAME=iq_a or "
+        "none, increment_s=1e-4, and metadata such as motor_id=M1 test=drive pole_pairs=7",
+    )
 
 
 @dataclass(kw_only=True)

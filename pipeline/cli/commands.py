@@ -90,10 +90,14 @@ COMMANDS = _index(
         "inspect",
         "inspect_file",
         s.InspectSettings,
-        "what a file holds, which columns it knows, a source map to start from",
+        "what a file or folder holds, which columns it knows, a source map that reads it",
         positional=("file",),
-        common=("file",),
-        examples=("inspect log.csv",),
+        common=("file", "map", "check"),
+        examples=(
+            "inspect log.csv",
+            "inspect captures map=bench.yaml check=true pole_pairs=7 unit.Moment=mNm",
+        ),
+        free="answers",
     ),
     Command(
         "plan",

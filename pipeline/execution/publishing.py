@@ -17,7 +17,7 @@ from pipeline.io.ingest.survey import Survey
 from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.io.storage.publish import canonical_json, partial_owner, write_whole
 from pipeline.records.datasheet import Datasheet
-from pipeline.records.finding import Finding
+from pipeline.records.finding import Finding, lines_of
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import nothing_usable, summary
@@ -167,7 +167,7 @@ def outcome_of(
         3 if refused else 0,
         4 if not datasheets or any(checked == {"not_evaluated"} for checked in outcomes) else 0,
     )
-    lines = tuple(finding.line() for finding in findings)
+    lines = tuple(lines_of(findings))
     if not datasheets:
         lines = (*lines, nothing_usable(INPUT, refused=refused))
     if found.note:

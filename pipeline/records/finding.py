@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pipeline.records.errors import CaptureError
-from pipeline.records.naming import printable
+from pipeline.records.naming import counted, printable
 
 Severity = Literal["refused", "warning"]
 
@@ -57,3 +57,29 @@ class Finding:
             "message": self.message,
             "remedy": self.remedy,
         }
+
+
+MOST_LINES_OF_A_KIND = 3
+
+
+def lines_of(findings: Iterable[Finding]) -> list[str]:
+    """The lines that standard error carries: one a refused file, and one a cause of many warnings.
+
+    Warnings of one code and remedy that concern more than three findings are one line with the
+    count of findings and files, at the place of the first; `findings.json` holds them all.
+    """
+    every = list(findings)
+    kinds: dict[tuple[str, str], list[Finding]] = {}
+    for one in every:
+        if one.severity == "warning":
+            kinds.setdefault((one.code, one.remedy), []).append(one)
+    lines = []
+    for one in every:
+        alike = kinds.get((one.code, one.remedy), []) if one.severity == "warning" else []
+        if len(alike) <= MOST_LINES_OF_A_KIND:
+            lines.append(one.line())
+        elif one is alike[0]:
+            files = len({other.file for other in alike})
+            count = f" ({len(alike)} such warnings in {counted(files, 'file')})"
+            lines.append(one.line() + count)
+    return lines

@@ -5,7 +5,7 @@ Strangers' files are parsed by workers under limits, as in a run, and never in t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +21,7 @@ from pipeline.io.ingest.survey import Entry, Survey, survey
 from pipeline.io.maps.places import source_maps
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import MachineError, UsageError, meant
-from pipeline.records.finding import Finding
+from pipeline.records.finding import Finding, lines_of
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import nothing_usable
 
@@ -43,8 +43,9 @@ def campaigns(
     motor: str | None = None,
     limits: ReadLimits | None = None,
     config_dir: str | None = None,
+    only: Collection[str] | None = None,
 ) -> Gathered:
-    """Every motor's usable captures.
+    """Every motor's usable captures, of the files `only` where that is given.
 
     Raises UsageError where the folder is not there or holds no capture of `motor`.
     """
@@ -55,7 +56,7 @@ def campaigns(
         pool = open_pool("local", Cluster())
         with WorkerPool(pool, core_count(), Path(progress) / "work") as workers:
             ask = partial(survey_with, workers, Path(folder), sources, bounds, recover=False)
-            found = survey(Path(folder), sources, ask)
+            found = _of_files(survey(Path(folder), sources, ask), only)
             tasks = _tasks(folder, found, motor, bounds)
             read = workers.map_tasks(usable_captures, tasks)
     findings = list(found.findings)
@@ -68,6 +69,14 @@ def campaigns(
         if captures:
             made.append(Campaign(task.motor_id, captures))
     return Gathered(tuple(made), tuple(findings), found.note)
+
+
+def _of_files(found: Survey, only: Collection[str] | None) -> Survey:
+    if only is None:
+        return found
+    entries = tuple(entry for entry in found.entries if entry.path in only)
+    findings = tuple(finding for finding in found.findings if finding.file in only)
+    return Survey(entries, findings, ())
 
 
 def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
@@ -83,7 +92,7 @@ def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) ->
 def outcome_of(folder: str, found: Gathered, texts: Sequence[str], *, undecided: bool) -> Outcome:
     """The text of each motor, the refusals, and the remedy where nothing is usable."""
     refused = any(finding.severity == "refused" for finding in found.findings)
-    lines = [finding.line() for finding in found.findings]
+    lines = lines_of(found.findings)
     if not texts:
         lines.append(nothing_usable(folder, refused=refused))
     if found.note:

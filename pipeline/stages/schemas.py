@@ -1,4 +1,4 @@
-"""`schemas`: writes the JSON Schemas and the glossary page that the repository carries."""
+"""`schemas`: writes the JSON Schemas, the glossary and the keys of source maps."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pipeline.contracts.glossary_page import glossary_page
 from pipeline.contracts.json_schema import build_schemas
 from pipeline.criticism.policy.policy import DEFAULT as MODELS
 from pipeline.estimation.policy import DEFAULT as ESTIMATORS
+from pipeline.io.maps.keys import SCHEMA_ID, keys_page, map_schema
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
@@ -19,16 +20,23 @@ SCHEMA_FOLDER = "pipeline/contracts/json"
 GLOSSARY_PAGE = "docs/glossary.md"
 POLICY_PAGE = "docs/policy.md"
 POLICIES = {"Models": MODELS, "Estimators": ESTIMATORS}
+KEYS_PAGE = "docs/source-map-keys.md"
+MAP_FOLDER = "conf/source"
 
 
 def build() -> dict[str, bytes]:
-    """Files that are built from glossary and policy: path in the repository, content."""
+    """Files that are built from the code: path in the repository, content."""
     files = {
         f"{SCHEMA_FOLDER}/{stem}.schema.json": canonical_json(schema)
         for stem, schema in build_schemas().items()
     }
-    pages = {GLOSSARY_PAGE: glossary_page(), POLICY_PAGE: policy_page(POLICIES)}
-    return files | {name: page.encode() for name, page in pages.items()}
+    pages = {
+        GLOSSARY_PAGE: glossary_page(),
+        POLICY_PAGE: policy_page(POLICIES),
+        KEYS_PAGE: keys_page(),
+    }
+    files |= {name: page.encode() for name, page in pages.items()}
+    return files | {f"{MAP_FOLDER}/{SCHEMA_ID}": canonical_json(map_schema())}
 
 
 def main(settings: Settings) -> Outcome:

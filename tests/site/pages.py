@@ -22,9 +22,9 @@ TOP = {
 """Files at the top of the repository, and the pages that they become."""
 GROUPS: Mapping[str, Sequence[str]] = {
     "Tutorials": ("notebooks/*", "tutorial-effect"),
-    "How to": ("recorder-forms", "review", "registry", "export", "lots", "fleet"),
+    "How to": ("source-maps", "recorder-forms", "review", "registry", "export", "lots", "fleet"),
     "Explanation": ("architecture", "criticism", "uncertainty", "simulator", "real-recordings"),
-    "Reference": ("api", "glossary", "policy", "gallery"),
+    "Reference": ("api", "glossary", "source-map-keys", "policy", "gallery"),
     "Project": ("contributing", "changelog", "decisions/index"),
 }
 """The pages of the side bar; those that are in no group are under `REST`."""

@@ -9,11 +9,14 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.rotation import TURN_RAD, integral
+from pipeline.contracts.waveform import Array, noise_of
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
 CODE = "speed_against_angle"
 BLOCKS = 20
+REST_SHARE = 0.25
+"""Least share of a resting speed's power that is white noise; the rest is an offset."""
 SUSPECTS = {
     9.5493: "the speed is in rpm",
     0.10472: "the angle is in rpm·s, or the speed was converted twice",
@@ -55,6 +58,9 @@ def _standing(ratio: float) -> tuple[str, str]:
 def speed_over_angle(capture: Capture, turns: float) -> float | None:
     """Integrated speed over angle, from block increments; None if the shaft hardly turns.
 
+    A shaft rests where its angle passes less than `turns` and its speed is noise: integrated, the
+    noise makes turns that are no sign of a wrong sign.
+
     The regression runs on the larger of the two, so that a channel that stands still reads 0.
     """
     for table in capture.tables:
@@ -69,10 +75,18 @@ def speed_over_angle(capture: Capture, turns: float) -> float | None:
         by_speed = np.diff(integral(rows[:, 0], rows[:, 2])[edges])
         if max(np.abs(by_angle).sum(), np.abs(by_speed).sum()) < turns * TURN_RAD:
             continue
+        if np.abs(by_angle).sum() < turns * TURN_RAD and is_noise(rows[:, 2]):
+            continue
         if not np.any(by_angle):
             return math.inf
         return float(by_angle @ by_speed / (by_angle @ by_angle))
     return None
+
+
+def is_noise(speed_rad_s: Array) -> bool:
+    """Whether a speed [n] is that of a shaft at rest: white noise, with no motion in it."""
+    power = float(np.mean(speed_rad_s**2))
+    return noise_of(speed_rad_s) ** 2 > REST_SHARE * power
 
 
 def _suspect(ratio: float, pole_pairs: int | None) -> str:

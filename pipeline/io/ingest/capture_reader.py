@@ -12,7 +12,7 @@ from pipeline.io.ingest.files import read_whole
 from pipeline.io.ingest.guard import refusing
 from pipeline.io.ingest.metadata import capture_meta
 from pipeline.io.ingest.survey import Entry, Survey, survey
-from pipeline.io.maps.columns import foreign_unit, last_part, to_frame
+from pipeline.io.maps.columns import foreign_unit, is_field, last_part, to_frame
 from pipeline.io.maps.source_map import Part, SourceMap
 from pipeline.io.mcap.container import scan
 from pipeline.io.mcap.tables import read_tables
@@ -82,7 +82,7 @@ def _sorted(frames: list[pl.DataFrame]) -> list[pl.DataFrame]:
 def wanted(source: SourceMap | None, name: str) -> bool:
     if source is None:
         return last_part(name) in COLUMNS or foreign_unit(name) is not None
-    return any(name == part.field or last_part(name) == part.field for part in source.fields)
+    return any(is_field(part.field, name) for part in source.fields)
 
 
 def _read_mcap(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:

@@ -306,7 +306,8 @@ def _entry(
             findings.append(_recovered(path, layout))
     else:
         form, topics = "csv", []
-        own, head = _text_head(data, bool(listed or beside))
+        form_known = any(s.reader and _may_read(s, path, beside, listed) for s in sources.values())
+        own, head = _text_head(data, bool(listed or beside) and not form_known)
     source, known = _source(path, own, beside, listed, head, topics, sources)
     if not known:
         _not_lost(path, data)
@@ -327,6 +328,14 @@ def _entry(
     check_texts(said)
     belongs(said)
     return Entry(path, digest, form, source, tuple(sorted(said.items())), recovered)
+
+
+def _may_read(
+    source: SourceMap, path: str, beside: Mapping[str, str], listed: Mapping[str, str]
+) -> bool:
+    """Whether a map is named beside a file, or knows it by its name."""
+    named = beside.get("source") or listed.get("source")
+    return source.name.partition("/")[0] == named or source.recognises_name(path)
 
 
 def _not_lost(path: str, data: bytes) -> None:

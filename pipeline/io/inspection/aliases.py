@@ -1,13 +1,8 @@
-"""Guesses: which column a bench probably means by a field. For `inspect` only, never for `run`."""
+"""Names that columns go by, whole; for `inspect` only, never for `run`."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-
-from pipeline.io.maps.columns import JOINT_COLUMNS, last_part
-from pipeline.io.maps.units import FOREIGN_UNITS, normal_unit
-from pipeline.physics.glossary import COLUMNS
+from functools import cache
 
 _NAMES: dict[str, str] = {
     "t_s": "t time times timestamp timesec seconds second sec xaxis mstoday source sequence",
@@ -21,7 +16,7 @@ _NAMES: dict[str, str] = {
         "angularvelocity angularspeed mechanicalspeed n motorvelocity"
     ),
     "torque_shaft_nm": "torque tq trq shafttorque loadtorque torqueshaft mshaft dynotorque effort",
-    "vdc_v": "vdc udc vbus ubus busvoltage dcvoltage inputvoltage supplyvoltage voltage vin",
+    "vdc_v": "vdc udc vbus ubus busvoltage dcvoltage inputvoltage supplyvoltage vin",
     "idc_a": "idc ibus busin dccurrent currentin inputcurrent buscurrent supplycurrent",
     "temp_winding_degc": (
         "tempwinding windingtemp windingtemperature tempmotor motortemp motortemperature "
@@ -51,18 +46,9 @@ _VARIANTS: dict[str, dict[str, str]] = {
     "phase": {"a": "a u 1 l1", "b": "b v 2 l2", "c": "c w 3 l3"},
     "pair": {"ab": "ab uv 12", "bc": "bc vw 23", "ca": "ca wu 31"},
 }
-_BRACKET = re.compile(r"^(.*?)\s*[(\[{]\s*([^)\]}]*)\s*[)\]}]\s*$")
-_IMPLIED = {"rpm": "rpm", "mstoday": "ms", "erpm": "rpm"}
 
 
-@dataclass(frozen=True, slots=True)
-class Guess:
-    """A column that a field probably is, and the unit its name or units row gives, if any."""
-
-    column: str
-    unit: str | None = None
-
-
+@cache
 def _table() -> dict[str, str]:
     table = {name: column for column, names in _NAMES.items() for name in names.split()}
     for column, kind, stems in _PATTERNS:
@@ -72,37 +58,6 @@ def _table() -> dict[str, str]:
     return table | {"va": "va_v", "vb": "vb_v", "vc": "vc_v"}
 
 
-def guess(name: str, unit_row: str | None = None) -> Guess | None:
-    """The column a field name probably means, or None.
-
-    The unit comes from the units row, brackets (`Speed [rpm]`) or the name's end (`time_ms`).
-    """
-    bare = last_part(name)
-    if bare in COLUMNS:
-        return Guess(bare)
-    table = _table() | JOINT_COLUMNS
-    bracket = _BRACKET.match(bare)
-    stem, unit = (bracket[1], bracket[2]) if bracket else (bare, unit_row)
-    column = table.get(_key(stem))
-    if column is None:
-        head, _, tail = stem.replace(" ", "_").rpartition("_")
-        column = table.get(_key(head))
-        unit = tail if column is not None and unit is None else unit
-    if column is None:
-        return None
-    return Guess(column, _unit(column, unit) or _IMPLIED.get(_key(stem)))
-
-
-def _key(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
-def _unit(column: str, text: str | None) -> str | None:
-    """The unit as the table knows it, whatever its capitals, or None."""
-    if not text:
-        return None
-    known = FOREIGN_UNITS.get(COLUMNS[column].unit, {})
-    unit = normal_unit(text)
-    if unit in known:
-        return unit
-    return next((name for name in known if name.lower() == unit.lower()), None)
+def alias(key: str) -> str | None:
+    """The column that goes by a name of small letters and digits without its unit, or None."""
+    return _table().get(key)

@@ -4,36 +4,47 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.io.ingest.capture_reader import wanted
 from pipeline.io.ingest.files import read_whole
 from pipeline.io.ingest.metadata import CONTRACT_VERSION, SIDECAR_SUFFIX, capture_meta
 from pipeline.io.ingest.survey import look, question_of
-from pipeline.io.inspection.aliases import guess
+from pipeline.io.inspection.file_names import name_patterns
+from pipeline.io.inspection.proposals import FieldSeen, StreamSeen, propose
 from pipeline.io.inspection.sniff import encoding_of, numeric_columns, sniff
-from pipeline.io.inspection.starter_map import FieldSeen, StreamSeen, starter_map
+from pipeline.io.inspection.starter_map import Shape, map_text
 from pipeline.io.maps.columns import to_frame
 from pipeline.io.maps.source_map import SourceMap
+from pipeline.io.maps.units import FOREIGN_UNITS
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.tables import read_tables
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT
 from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, check_text, read_csv, split_comments
+from pipeline.io.tables.foreign import Reader, readers
 from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
+from pipeline.records.naming import counted
 from pipeline.records.parse import whole
+
+_WORTH_TELLING = 0.01
+_GAP = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class InspectReport:
-    """What `describe` found. `faults` says what stands in the way of reading the file."""
+    """What `describe` found. `faults` says what stands in the way of reading the file.
+
+    `form` is mcap, text, unknown or the name of a reader. `shape` is that of a file that needs a
+    source map, and `starter` the map.
+    """
 
     path: str
-    form: Literal["mcap", "text", "unknown"]
+    form: str
     size: int
     sha256: str
     checksums: str
@@ -41,20 +52,72 @@ class InspectReport:
     source: str | None
     streams: tuple[StreamSeen, ...]
     faults: tuple[str, ...]
-    starter: str
+    starter: str = ""
+    shape: Shape | None = None
 
     @property
     def columns(self) -> frozenset[str]:
-        """Columns that the file holds under their own name, or by a guess."""
-        found = (seen.guess for stream in self.streams for seen in stream.fields)
-        return frozenset(one.column for one in found if one is not None)
+        """Columns that the file holds under their own name, or probably."""
+        found = (seen.column for stream in self.streams for seen in stream.fields)
+        return frozenset(one for one in found if one is not None)
 
 
-def describe(path: Path, sources: Mapping[str, SourceMap]) -> InspectReport:
-    """Look into any file; raises CaptureError only where it cannot be opened at all."""
+@dataclass(slots=True)
+class _Look:
+    """One file while it is looked into."""
+
+    name: str
+    data: bytes
+    sources: Mapping[str, SourceMap]
+    answers: Mapping[str, str]
+    form: str = "unknown"
+    checksums: str = "none"
+    metadata: dict[str, str] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+    source: str | None = None
+
+    def report(self, shape: Shape, *, lacks: bool, foreign: bool) -> InspectReport:
+        """What was found; with a map to start from where the file lacks one."""
+        needs = bool(shape.streams) and (foreign or lacks)
+        starter = ""
+        if needs:
+            names = name_patterns([self.name], frozenset(self.answers))
+            given = {key: value for key, value in self.answers.items() if "." not in key}
+            starter = map_text([shape], names, given, by_name=foreign)
+        return InspectReport(
+            self.name,
+            self.form,
+            len(self.data),
+            hashlib.sha256(self.data).hexdigest(),
+            self.checksums,
+            tuple(self.metadata.items()),
+            self.source,
+            shape.streams,
+            tuple(self.faults),
+            starter,
+            shape if needs else None,
+        )
+
+
+def describe(
+    path: Path,
+    sources: Mapping[str, SourceMap],
+    answers: Mapping[str, str] | None = None,
+) -> InspectReport:
+    """Look into any file; raises CaptureError only where it cannot be opened at all.
+
+    `answers` settle what the file does not say: `unit.NAME`, `column.NAME`, metadata. Raises
+    UsageError for one that cannot be.
+    """
     data = read_whole(path)
-    look_into = _mcap if data.startswith(MAGIC) else _text
-    report = look_into(path.name, data, sources)
+    look_at = _Look(path.name, data, sources, answers or {})
+    reader = _reader_of(path.name)
+    if reader is not None:
+        report = _foreign(look_at, reader)
+    elif data.startswith(MAGIC):
+        report = _mcap(look_at)
+    else:
+        report = _text(look_at)
     if "contract" in dict(report.metadata):
         return report
     return replace(report, faults=(*report.faults, *_unused(path, report, sources)))
@@ -73,31 +136,50 @@ def _unused(path: Path, report: InspectReport, sources: Mapping[str, SourceMap])
     return [f"`run` takes it for no capture, for nothing states `contract`; {remedy}"]
 
 
-def _mcap(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectReport:
-    faults: list[str] = []
-    metadata: dict[str, str] = {}
+def _reader_of(name: str) -> Reader | None:
+    """The reader of a form that the suffix names, or None for MCAP and text."""
+    suffix = PurePosixPath(name).suffix.lower()
+    return next((one for one in readers().values() if suffix in one.suffixes), None)
+
+
+def _foreign(look_at: _Look, reader: Reader) -> InspectReport:
+    look_at.form = reader.name
+    streams: tuple[StreamSeen, ...] = ()
+    try:
+        tables = reader.read(look_at.data)
+        look_at.metadata = dict(reader.metadata(look_at.data))
+        streams = tuple(_stream(table, reader.name, look_at.answers) for table in tables)
+    except CaptureError as fault:
+        look_at.faults.append(str(fault))
+    look_at.source = _matched(look_at.name, None, [], look_at.sources)
+    suffix = PurePosixPath(look_at.name).suffix
+    shape = Shape(streams, suffixes=(suffix,), reader=reader.name)
+    return look_at.report(shape, lacks=look_at.source is None, foreign=False)
+
+
+def _mcap(look_at: _Look) -> InspectReport:
+    look_at.form, faults = "mcap", look_at.faults
+    look_at.checksums = "none that covers the whole file"
     topics: list[str] = []
     tables: list[RawTable] = []
-    checksums = "none that covers the whole file"
     try:
-        layout = scan(data)
-        metadata = layout.metadata_named("capture")
+        layout = scan(look_at.data)
+        look_at.metadata = layout.metadata_named("capture")
         if layout.data_crc_holds:
-            checksums = "cover every byte, and hold"
-        tables = _tables(layout, metadata.get("joint"), faults)
+            look_at.checksums = "cover every byte, and hold"
+        tables = _tables(layout, look_at.metadata.get("joint"), faults)
         topics = [channel.topic for channel in layout.definitions.channels.values()]
     except CaptureError as fault:
         faults.append(str(fault))
+    metadata = look_at.metadata
     contract = "contract" in metadata
     foreign = contract and "source" not in metadata and _column_faults(tables, metadata, faults)
     if contract:
         faults += _metadata_faults(metadata)
-    matched = _matched(name, None, topics, sources)
-    streams = tuple(_stream(table, "messages") for table in tables)
-    starter = ""
-    if streams and (foreign or not contract):
-        starter = starter_map(streams, CONTRACT_DIALECT, None, topics, by_name=foreign)
-    return _report(name, "mcap", data, checksums, metadata, matched, streams, faults, starter)
+    look_at.source = _matched(look_at.name, None, topics, look_at.sources)
+    streams = tuple(_stream(table, "messages", look_at.answers) for table in tables)
+    shape = Shape(streams, topics=tuple(topics))
+    return look_at.report(shape, lacks=not contract, foreign=foreign)
 
 
 def _tables(layout: Layout, joint: str | None, faults: list[str]) -> list[RawTable]:
@@ -108,16 +190,13 @@ def _tables(layout: Layout, joint: str | None, faults: list[str]) -> list[RawTab
         return []
 
 
-def _text(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectReport:
-    faults: list[str] = []
-    metadata: dict[str, str] = {}
-    table = None
-    dialect, header = CONTRACT_DIALECT, None
-    checksums = "none"
+def _text(look_at: _Look) -> InspectReport:
+    data, faults = look_at.data, look_at.faults
+    shape = Shape(())
     head = ""
     try:
         check_text(data)
-        metadata, begin = split_comments(data)
+        look_at.metadata, begin = split_comments(data)
         head = data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
         start = data[begin : begin + MAX_HEAD_BYTES]
         encoding = encoding_of(start)
@@ -127,22 +206,23 @@ def _text(name: str, data: bytes, sources: Mapping[str, SourceMap]) -> InspectRe
         else:
             dialect, header = replace(found[0], encoding=encoding), found[1]
             parsed = read_csv(data, dialect, numeric_columns(data[begin:], dialect))
-            table = parsed.table
-            checksums = "sha256_rows covers the rows, and holds" if parsed.verified else "none"
+            stated = "sha256_rows covers the rows, and holds"
+            look_at.checksums = stated if parsed.verified else "none"
+            streams = (_stream(parsed.table, "text", look_at.answers),)
+            suffix = PurePosixPath(look_at.name).suffix
+            marked = data.startswith(b"\xef\xbb\xbf")
+            shape = Shape(streams, dialect, header, suffixes=(suffix,), marked=marked)
     except CaptureError as fault:
         faults.append(str(fault))
+    metadata = look_at.metadata
     contract = "contract" in metadata and "source" not in metadata
     foreign = not faults and contract and _contract_faults(data, metadata, faults)
     if contract:
         faults += _metadata_faults(metadata)
-    matched = _matched(name, head, [], sources)
-    streams = () if table is None else (_stream(table, "text"),)
-    starter = ""
-    lacks = "contract" not in metadata and not _but_for_the_key(data, metadata, streams)
-    if table is not None and (foreign or lacks):
-        starter = starter_map(streams, dialect, header, [], by_name=foreign)
-    form: Literal["text", "unknown"] = "text" if head else "unknown"
-    return _report(name, form, data, checksums, metadata, matched, streams, faults, starter)
+    look_at.source = _matched(look_at.name, head, [], look_at.sources)
+    lacks = "contract" not in metadata and not _but_for_the_key(data, metadata, shape.streams)
+    look_at.form = "text" if head else "unknown"
+    return look_at.report(shape, lacks=lacks, foreign=foreign)
 
 
 def _but_for_the_key(
@@ -190,24 +270,6 @@ def _metadata_faults(metadata: Mapping[str, str]) -> list[str]:
     return []
 
 
-def _report(
-    name: str,
-    form: Literal["mcap", "text", "unknown"],
-    data: bytes,
-    checksums: str,
-    metadata: Mapping[str, str],
-    source: str | None,
-    streams: tuple[StreamSeen, ...],
-    faults: list[str],
-    starter: str,
-) -> InspectReport:
-    digest = hashlib.sha256(data).hexdigest()
-    said = tuple(metadata.items())
-    return InspectReport(
-        name, form, len(data), digest, checksums, said, source, streams, tuple(faults), starter
-    )
-
-
 def _matched(
     name: str, head: str | None, topics: list[str], sources: Mapping[str, SourceMap]
 ) -> str | None:
@@ -215,31 +277,42 @@ def _matched(
     return ", ".join(found) or None
 
 
-def _stream(table: RawTable, encoding: str) -> StreamSeen:
-    units = dict(table.units)
-    fields = tuple(
-        FieldSeen(
-            name,
-            float(values[0]) if values.size else None,
-            guess(name, units.get(name)),
-            guess(name) == guess(name, units.get(name)) and _is_column(name),
-        )
-        for name, values in table.fields.items()
-    )
-    return StreamSeen(table.name, encoding, table.rows, _rate_hz(table), fields)
+def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> StreamSeen:
+    fields = propose(table, answers)
+    time = _time_s(table, fields)
+    steps = np.diff(time) if time is not None else np.empty(0)
+    step = float(np.nanmedian(steps)) if steps.size else 0.0
+    rate = 1.0 / step if step > 0 else None
+    clock = "" if rate is None else _clock_words(steps, step)
+    return StreamSeen(table.name, encoding, table.rows, rate, fields, clock)
 
 
-def _is_column(name: str) -> bool:
-    found = guess(name)
-    return found is not None and name.rsplit(".", 1)[-1] == found.column
+def _clock_words(steps: NDArray[np.float64], step: float) -> str:
+    """Jitter and gaps of a clock, steps [s] against their median, where there are any."""
+    told = []
+    jitter = float(np.nanmedian(np.abs(steps - step))) / step
+    if jitter > _WORTH_TELLING:
+        told.append(f"steps vary by {jitter:.1%}")
+    gaps = int(np.count_nonzero(steps > _GAP * step))
+    if gaps:
+        longest = float(np.nanmax(steps))
+        told.append(f"{counted(gaps, 'gap')}, the longest {longest:.4g} s")
+    back = int(np.count_nonzero(steps <= 0))
+    if back:
+        told.append(f"it stands or goes back at {counted(back, 'row')}")
+    return "; ".join(told)
 
 
-def _rate_hz(table: RawTable) -> float | None:
-    """Median rate [Hz] by t_s or the log clock."""
-    time = table.fields.get("t_s")
-    if time is None and table.log_time_ns is not None and not table.blocks:
-        time = table.log_time_ns / 1e9
-    if time is None or time.size < 2:
+def _time_s(table: RawTable, fields: Sequence[FieldSeen]) -> NDArray[np.float64] | None:
+    """Time [s] by the field that is t_s, its unit known, or by the log clock."""
+    seen = next((one for one in fields if one.column == "t_s" and not one.question), None)
+    if seen is not None:
+        values = table.fields[seen.name].astype(np.float64)
+        if seen.wraps:
+            values = values + seen.wraps * np.cumsum(np.diff(values, prepend=values[:1]) < 0)
+        factor = FOREIGN_UNITS["s"][seen.unit].factor if seen.unit and not seen.scale else 1.0
+        return values * factor * (seen.scale or 1.0)
+    if table.log_time_ns is None or table.blocks:
         return None
-    step = float(np.nanmedian(np.diff(time.astype(np.float64))))
-    return 1.0 / step if step > 0 else None
+    time: NDArray[np.float64] = table.log_time_ns.astype(np.float64) / 1e9
+    return time

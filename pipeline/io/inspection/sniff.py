@@ -12,7 +12,8 @@ from dataclasses import replace
 from pipeline.io.tables.csv_dialect import CsvDialect
 from pipeline.io.tables.csv_table import MAX_HEAD_BYTES
 
-_SEPARATORS = (",", ";", "\t", "|")
+_SEPARATORS = ("|", ";", ",", "\t", " ")
+"""The first of equals counts."""
 _NUMBER = re.compile(r"^[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?$|^[-+]?(nan|NaN|NAN)$")
 _LOOK_AT_LINES = 200
 
@@ -22,28 +23,32 @@ def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
 
     The separator is the one that parts the rows into the most numbers and fewest texts; the header
     is the last line of as many texts before the first such row, a second one taken for the units
-    row. Three lines of one number each are a table of one column.
+    row. Three lines of one number each are a table of one column. Between numbers that are parted
+    by blanks any number of blanks is one.
     """
-    lines = text.split("\n")[:_LOOK_AT_LINES]
-    best: tuple[int, str, int, int] | None = None
-    for separator in _SEPARATORS:
+    lines = text.replace("\r\n", "\n").split("\n")[:_LOOK_AT_LINES]
+    lines, row_end = _without_ends(lines)
+    best: tuple[int, int, int, int] | None = None
+    for place, separator in enumerate(_SEPARATORS):
         looks = [_numbers(line, separator) for line in lines]
         counts = [count for count, _ in looks]
         widths = [count for count in counts if count > 1]
         if widths:
             width = max(set(widths), key=lambda w: (widths.count(w), w))
             worth = sum(surplus for count, surplus in looks if count == width)
-            found = (worth, separator, counts.index(width), width)
+            found = (worth, -place, counts.index(width), width)
             best = max(best, found) if best else found
     if best is None:
         best = _one_column(lines)
     if best is None:
         return None
-    _, separator, first, width = best
+    _, place, first, width = best
+    separator = _SEPARATORS[-place]
     heads = [n for n in range(first) if _is_header(lines[n], separator, width)]
     comma = separator != "," and any(re.search(r"\d,\d", line) for line in lines[first:])
     decimal = "," if comma else "."
-    dialect = CsvDialect(separator=separator, decimal=decimal, fewer_columns=True)
+    fewer = separator != " "
+    dialect = CsvDialect(separator=separator, decimal=decimal, fewer_columns=fewer, row_end=row_end)
     if not heads:
         names = tuple(f"column_{n + 1}" for n in range(width))
         return replace(dialect, names=names, skip_lines=first), None
@@ -59,17 +64,27 @@ def sniff(text: str) -> tuple[CsvDialect, str | None] | None:
     )
 
 
-def _one_column(lines: list[str]) -> tuple[int, str, int, int] | None:
+def _without_ends(lines: list[str]) -> tuple[list[str], str]:
+    """The lines without a `;` that ends rows which something else parts, and that mark."""
+    ended = [line for line in lines if line.rstrip().endswith(";")]
+    if 2 * len(ended) < len(lines) or any(line.count(";") > 1 for line in ended):
+        return lines, ""
+    return [line.rstrip().removesuffix(";") for line in lines], ";"
+
+
+def _one_column(lines: list[str]) -> tuple[int, int, int, int] | None:
     """The table of one column that most lines are, with a separator that is no decimal sign."""
     filled = [n for n, line in enumerate(lines) if line.strip()]
     numbers = [n for n in filled if _NUMBER.match(lines[n].strip())]
     if len(numbers) < 3 or 2 * len(numbers) < len(filled):
         return None
     decimal_comma = any("," in lines[n] for n in numbers)
-    return len(numbers), ";" if decimal_comma else ",", numbers[0], 1
+    return len(numbers), -_SEPARATORS.index(";" if decimal_comma else ","), numbers[0], 1
 
 
 def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
     row = next(csv.reader(io.StringIO(line), delimiter=separator), [])
     cells = [cell.strip() for cell in row]
     while cells and not cells[-1]:
@@ -91,6 +106,8 @@ def _numbers(line: str, separator: str) -> tuple[int, int]:
 
 def _is_header(line: str, separator: str, width: int) -> bool:
     cells = _cells(line, separator)
+    if separator == " " and len(cells) != width:
+        return False
     return len(cells) >= width and not any(_NUMBER.match(cell) for cell in cells[:1])
 
 
@@ -113,7 +130,8 @@ def numeric_columns(body: bytes, dialect: CsvDialect) -> Callable[[str], bool]:
     names = list(dialect.names or _cells(lines[header], dialect.separator))
     texts: set[str] = set()
     for line in lines[first : first + _LOOK_AT_LINES]:
-        for name, cell in zip(names, _cells(line, dialect.separator), strict=False):
+        bare = line.rstrip().removesuffix(dialect.row_end)
+        for name, cell in zip(names, _cells(bare, dialect.separator), strict=False):
             if cell and not _NUMBER.match(cell):
                 texts.add(name)
     return (frozenset(names) - texts).__contains__

@@ -1,97 +1,183 @@
-"""A source map to finish by hand: what is recognised filled in, the rest as comments."""
+"""The source map of one file or a folder: what is known is filled in, what is asked a comment."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
-from pipeline.io.inspection.aliases import Guess
+from pipeline.io.inspection.file_names import NamePatterns
+from pipeline.io.inspection.proposals import FieldSeen, StreamSeen
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 
-
-@dataclass(frozen=True, slots=True)
-class FieldSeen:
-    """One field: its name, a first value, and the column it is or probably is."""
-
-    name: str
-    first: float | None
-    guess: Guess | None
-    certain: bool
+_LONGEST_HEADER = 400
+_KEY_WORDS = {"motor_id": "the serial number", "test": "one of the contract's"}
 
 
 @dataclass(frozen=True, slots=True)
-class StreamSeen:
-    """One table or topic: rows, rate [Hz] (None without a clock), and its fields."""
+class Shape:
+    """Files of one shape: how they are laid out and recognised, and what they hold.
 
-    name: str
-    encoding: str
-    rows: int
-    rate_hz: float | None
-    fields: tuple[FieldSeen, ...]
+    `header` is the line that names the columns, None where there is none; `suffixes` are those of
+    the files without one; `reader` names the plug-in of a form that is no text.
+    """
+
+    streams: tuple[StreamSeen, ...]
+    dialect: CsvDialect = CONTRACT_DIALECT
+    header: str | None = None
+    topics: tuple[str, ...] = ()
+    suffixes: tuple[str, ...] = ()
+    reader: str | None = None
+    marked: bool = False
+    """Whether the file begins with a byte order mark."""
+
+    @property
+    def fields(self) -> tuple[FieldSeen, ...]:
+        """The fields of all streams."""
+        return tuple(field for stream in self.streams for field in stream.fields)
+
+    def joined(self, other: Shape) -> Shape:
+        """This shape with what another file of it shows besides: wraps, units, suffixes."""
+        streams = tuple(
+            replace(one, fields=tuple(map(_clearer, one.fields, two.fields)))
+            for one, two in zip(self.streams, other.streams, strict=True)
+        )
+        suffixes = tuple(dict.fromkeys([*self.suffixes, *other.suffixes]))
+        marked = self.marked or other.marked
+        return replace(self, streams=streams, suffixes=suffixes, marked=marked)
+
+    def key(self) -> tuple[object, ...]:
+        """What files of one shape have in common."""
+        names = tuple((s.name, f.name) for s in self.streams for f in s.fields)
+        return self.dialect, self.header, self.topics, self.reader, names
 
 
-def starter_map(
-    streams: tuple[StreamSeen, ...],
-    dialect: CsvDialect,
-    header: str | None,
-    topics: list[str],
+def _clearer(one: FieldSeen, other: FieldSeen) -> FieldSeen:
+    """The field of two files that leaves less open, with the wrap that either shows."""
+    kept, rest = (other, one) if one.question and not other.question else (one, other)
+    if kept.wraps is None and kept.column == rest.column and rest.wraps is not None:
+        return replace(kept, wraps=rest.wraps, why=rest.why)
+    return kept
+
+
+def map_text(
+    shapes: Sequence[Shape],
+    names: NamePatterns | None = None,
+    answers: Mapping[str, str] | None = None,
     *,
     by_name: bool = False,
 ) -> str:
-    """A source map in YAML: guesses filled in, the rest as comments to finish.
+    """A source map in YAML for files of these shapes.
 
-    `by_name`: the file says `contract` and so has to name the map that it is to be read by.
+    `answers` are metadata and `increment_s`. `by_name`: the file says `contract` and so has to
+    name the map that it is to be read by.
     """
-    lines = ["# Save as conf/source/NAME.yaml, correct what is guessed, and run again."]
+    given = dict(answers or {})
+    increment = given.pop("increment_s", None)
+    lines = ["# A source map. Lines that are comments wait for an answer; docs/source-maps.md."]
     if by_name:
         text = "`# source: NAME` among its first lines"
-        where = text if header is not None else "`source: NAME` in its metadata or NAME.meta.yaml"
+        in_text = shapes[0].header is not None
+        where = text if in_text else "`source: NAME` in its metadata or NAME.meta.yaml"
         lines.append(f"# The file itself must name it: {where}.")
-    lines.append("recognise:")
-    if header is not None:
-        pattern = "^" + re.escape(header.strip()[:120])
-        lines.append(f"  header: {_quoted(pattern)}")
-    elif topics:
-        lines.append(f"  topics: [{', '.join(_quoted(topic) for topic in sorted(set(topics)))}]")
+    names = names or NamePatterns()
+    lines += _metadata_lines(given, names)
+    if len(shapes) == 1:
+        lines += _shape_lines(shapes[0], increment)
     else:
-        lines.append("  files: ['*.csv']")
-    lines += _layout_lines(dialect)
+        lines.append("variants:")
+        for shape in shapes:
+            own = _shape_lines(shape, increment)
+            lines += [f"  - {own[0]}", *(f"    {line}" for line in own[1:])]
+    return "\n".join(lines) + "\n"
+
+
+def _metadata_lines(given: Mapping[str, str], names: NamePatterns) -> list[str]:
+    lines = ["metadata:"]
+    lines += [f"  {key}: {_quoted(value)}" for key, value in given.items() if "." not in key]
+    for key, words in _KEY_WORDS.items():
+        if key not in given and key not in names.keys:
+            lines.append(f"  # {key}: {words}")
+    if "station" not in given:
+        lines.append("  station: unknown")
+    if names.patterns:
+        lines += ["file_names:", *(f"  - {_quoted(pattern)}" for pattern in names.patterns)]
+    if names.values:
+        lines.append("values:")
+        for key, values in names.values.items():
+            pairs = ", ".join(f"{_quoted(word)}: {value}" for word, value in values.items())
+            lines.append(f"  {key}: {{{pairs}}}")
+    return lines
+
+
+def _shape_lines(shape: Shape, increment: str | None) -> list[str]:
+    lines = ["recognise:", f"  {_recognise(shape)}"]
+    if shape.reader:
+        lines.append(f"reader: {shape.reader}")
+    lines += _layout_lines(shape.dialect)
     lines.append("fields:")
-    taken: set[str] = set()
-    clock = False
-    for seen in (seen for stream in streams for seen in stream.fields):
-        line, column = _field_line(seen, taken)
-        clock = clock or column == "t_s"
-        lines.append(line)
-    if not clock:
-        origin = "increment" if header is not None or not topics else "log"
-        lines += ["time:", f"  from: {origin}"]
-        if origin == "increment":
-            lines.append("  increment_s: 1.0e-3   # the sampling interval: state the true one")
-    lines += ["metadata:", "  # motor_id: the serial number", "  # test: one of the contract's"]
-    return "\n".join(lines) + "\n  station: unknown\n"
+    lines += [f"  {_field_line(seen)}" for seen in shape.fields]
+    if not any(seen.column == "t_s" for seen in shape.fields):
+        if shape.topics:
+            lines += ["time:", "  from: log"]
+        elif increment:
+            lines += ["time:", "  from: increment", f"  increment_s: {increment}"]
+        else:
+            lines.append("# time: {from: increment, increment_s: }   # s from row to row")
+    return lines
 
 
-def _field_line(seen: FieldSeen, taken: set[str]) -> tuple[str, str | None]:
-    if seen.guess is None or seen.guess.column in taken:
-        return f"  # {_quoted(seen.name)}: {{column: , unit: }}", None
-    taken.add(seen.guess.column)
-    unit = f", unit: {_quoted(seen.guess.unit)}" if seen.guess.unit else ""
-    note = "" if seen.certain else "   # guessed: check column, unit and sign"
-    return f"  {_quoted(seen.name)}: {{column: {seen.guess.column}{unit}}}{note}", seen.guess.column
+def _recognise(shape: Shape) -> str:
+    if shape.header is not None and shape.reader is None:
+        return f"header: {_quoted(header_pattern(shape.header, marked=shape.marked))}"
+    if shape.topics:
+        return f"topics: [{', '.join(_quoted(topic) for topic in sorted(set(shape.topics)))}]"
+    return f"files: [{', '.join(_quoted('*' + suffix) for suffix in shape.suffixes or ('.csv',))}]"
+
+
+def header_pattern(header: str, *, marked: bool = False) -> str:
+    """A regular expression of a header line, whatever the encoding of what is not ASCII in it."""
+    text = header.strip()
+    whole = len(re.escape(text)) <= _LONGEST_HEADER
+    pattern = re.escape(text if whole else text[: _LONGEST_HEADER // 2])
+    pattern = re.sub(r"(?:\\?[^\x00-\x7F])+", lambda _: r"[^\\x00-\\x7F]+", pattern)
+    pattern = pattern.replace("[^\\\\x00-\\\\x7F]", "[^\\x00-\\x7F]").replace("\\\t", "\\t")
+    begin = r"^[^\x00-\x7F]*" if marked else "^"
+    return begin + pattern + (r"\s*$" if whole else "")
+
+
+def _field_line(seen: FieldSeen) -> str:
+    why = f"; {seen.why}" if seen.why else ""
+    if seen.column is None:
+        asked = f"asked: {seen.question[1]}" if seen.question else "not recognised"
+        return f"# {_quoted(seen.name)}: {{column: , unit: }}   # {asked}{why}"
+    parts = [f"column: {seen.column}"]
+    if seen.question is not None:
+        line = f"{_quoted(seen.name)}: {{{parts[0]}, unit: }}"
+        return f"# {line}   # asked: {seen.question[1]}{why}"
+    parts += [f"unit: {_quoted(seen.unit)}"] if seen.unit else []
+    parts += [f"scale: {seen.scale!r}"] if seen.scale else []
+    parts += [f"wraps: {seen.wraps:.12g}"] if seen.wraps else []
+    parts += ["per_pole_pair: true"] if seen.per_pole_pair else []
+    note = "" if seen.certain else "   # probably: check column, unit and sign"
+    return f"{_quoted(seen.name)}: {{{', '.join(parts)}}}{note}{why if note else ''}"
 
 
 def _layout_lines(dialect: CsvDialect) -> list[str]:
     lines: list[str] = []
-    for key in ("separator", "decimal", "encoding", "skip_lines", "skip_after_header"):
-        value = getattr(dialect, key)
-        if value != getattr(CONTRACT_DIALECT, key):
-            text = "tab" if value == "\t" else value
-            lines.append(f"  {key}: {_quoted(text) if isinstance(text, str) else text}")
-    flags = ("units_row", "fewer_columns")
-    lines += [f"  {key}: true" for key in flags if getattr(dialect, key)]
-    if dialect.names:
-        lines.append(f"  names: [{', '.join(_quoted(name) for name in dialect.names)}]")
+    for part in fields(CsvDialect):
+        value = getattr(dialect, part.name)
+        if value == getattr(CONTRACT_DIALECT, part.name):
+            continue
+        if isinstance(value, bool):
+            text = str(value).lower()
+        elif isinstance(value, tuple):
+            text = f"[{', '.join(_quoted(name) for name in value)}]"
+        elif isinstance(value, str):
+            text = _quoted({"\t": "tab", " ": "space"}.get(value, value))
+        else:
+            text = str(value)
+        lines.append(f"  {part.name}: {text}")
     return ["layout:", *lines] if lines else []
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -73,13 +74,18 @@ def contract_fields(names: Sequence[str], joint_state: bool) -> list[FieldMap]:
 
 
 def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
-    """The map's fields that are there, each under the name it has in the file."""
+    """The map's fields that are there, each under the name it has in the file.
+
+    A `*` in a map's field is any text, where no field has that very name.
+    """
     by_last: dict[str, list[str]] = {}
     for name in names:
         by_last.setdefault(last_part(name), []).append(name)
     found: list[FieldMap] = []
     for part in source.fields:
         matches = [part.field] if part.field in names else by_last.get(part.field, [])
+        if not matches and "*" in part.field:
+            matches = [name for name in names if is_field(part.field, name)]
         if len(matches) > 1:
             raise CaptureError(
                 "duplicate_column",
@@ -96,6 +102,13 @@ def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
             "keep one of them in the source map",
         )
     return found
+
+
+def is_field(field: str, name: str) -> bool:
+    """Whether a name in a file is the field that a map names, `*` being any text."""
+    if field in (name, last_part(name)):
+        return True
+    return "*" in field and fnmatchcase(name, re.sub(r"[\[?]", "[\\g<0>]", field))
 
 
 def to_frame(
@@ -124,7 +137,14 @@ def to_frame(
     time = _time(table, clock, source)
     if time is not None:
         columns = {"t_s": time} | columns
-    return pl.DataFrame(columns)
+    frame = pl.DataFrame(columns)
+    return frame if source is None else _without_blank_rows(frame)
+
+
+def _without_blank_rows(frame: pl.DataFrame) -> pl.DataFrame:
+    """The rows of a foreign table that hold a number at all."""
+    blank = np.all([np.isnan(frame[name].to_numpy()) for name in frame.columns], axis=0)
+    return frame.filter(~blank) if blank.any() else frame
 
 
 def _mechanical(part: FieldMap, pole_pairs: int | None) -> FieldMap:

@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Literal, get_args
 
 from pipeline.io.maps.section import Section
+from pipeline.io.maps.units import COUNTS, normal_unit
 from pipeline.io.storage.plain_yaml import load_plain
 from pipeline.io.tables.csv_dialect import CONTRACT_DIALECT, CsvDialect
 from pipeline.physics.glossary import COLUMNS
@@ -24,6 +25,7 @@ MessageForm = Literal["auto", "row", "block"]
 class FieldMap:
     """One foreign field: column = sign * scale * (value in `unit`, converted) + offset.
 
+    A `*` in its name is any text.
     `unit` None is the column's own unit; `row` takes what the file's units row says.
     `per_pole_pair` divides by the metadata's pole pairs, for a drive that logs electrical speed.
     `wraps` is the span [the field's own numbers] after which a counter or an angle starts again;
@@ -303,6 +305,8 @@ def _fields(section: Section) -> tuple[FieldMap, ...]:
         if not scale:
             raise part.fault("scale", "is zero", "write the factor")
         unit, per_pole_pair = part.text("unit"), part.flag("per_pole_pair", False)
+        if unit and normal_unit(unit) == COUNTS and scale == 1.0:
+            raise part.fault("unit", "counts have no size", "write what one is into `scale`")
         wraps = _positive(part, "wraps")
         found.append(FieldMap(name, column, unit, sign, scale, offset or 0.0, per_pole_pair, wraps))
         part.close()

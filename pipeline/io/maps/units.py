@@ -78,7 +78,13 @@ FOREIGN_UNITS: dict[str, dict[str, Scale]] = {
     "ohm": _prefixed("ohm", "", "m", "u", "k"),
     "Hz": _prefixed("Hz", "", "k", "M"),
 }
+COUNTS = "counts"
 _SPELLINGS = {
+    "count": COUNTS,
+    "cnt": COUNTS,
+    "cnts": COUNTS,
+    "ticks": COUNTS,
+    "#": COUNTS,
     "Volt": "V",
     "Volts": "V",
     "volt": "V",
@@ -88,14 +94,34 @@ _SPELLINGS = {
     "Ampere": "A",
     "ampere": "A",
     "amp": "A",
+    "安": "A",
+    "伏": "V",
+    "度": "deg",
+    "rad/sec": "rad/s",
+    "deg/sec": "deg/s",
     "second": "s",
     "Second": "s",
     "seconds": "s",
     "sec": "s",
+    "Sek": "s",
+    "Sekunden": "s",
+    "秒": "s",
+    "毫秒": "ms",
+    "ミリ秒": "ms",
     "msec": "ms",
     "RPM": "rpm",
     "kRPM": "krpm",
     "1/min": "rpm",
+    "U/min": "rpm",
+    "u/min": "rpm",
+    "Upm": "rpm",
+    "min^-1": "rpm",
+    "min-1": "rpm",
+    "min⁻¹": "rpm",
+    "tr/min": "rpm",
+    "rev/min": "rpm",
+    "转/分": "rpm",
+    "回転/分": "rpm",
     "r/min": "rpm",
     "turn": "rev",
     "turns": "rev",
@@ -115,6 +141,10 @@ _SPELLINGS = {
     "radians": "rad",
     "Nm": "N·m",
     "N.m": "N·m",
+    "N m": "N·m",
+    "N-m": "N·m",
+    "mN m": "mN·m",
+    "mN.m": "mN·m",
     "N*m": "N·m",
     "Nmm": "N·mm",
     "Ncm": "N·cm",
@@ -126,12 +156,26 @@ _SPELLINGS = {
     "lb-in": "lbf·in",
     "lbin": "lbf·in",
     "lb-ft": "lbf·ft",
+    "ft-lb": "lbf·ft",
+    "ft-lbs": "lbf·ft",
+    "ft·lb": "lbf·ft",
+    "ft lb": "lbf·ft",
+    "ftlb": "lbf·ft",
+    "ft-lbf": "lbf·ft",
+    "ft·lbf": "lbf·ft",
+    "in-lb": "lbf·in",
+    "in·lb": "lbf·in",
     "lbft": "lbf·ft",
     "kgcm": "kgf·cm",
     "gcm": "gf·cm",
     "C": "degC",
     "°C": "degC",
     "℃": "degC",
+    "deg C": "degC",
+    "grad C": "degC",
+    "Grad": "deg",
+    "Celsius": "degC",
+    "celsius": "degC",
     "F": "degF",
     "°F": "degF",
     "V·s": "Wb",
@@ -155,7 +199,12 @@ def normal_unit(text: str) -> str:
 
 
 def scale_to(unit: str, target: str) -> Scale:
-    """The scale from a foreign unit to a glossary unit; CaptureError `unknown_unit` without one."""
+    """The scale from a foreign unit to a glossary unit; CaptureError `unknown_unit` without one.
+
+    `counts` are of the unit that the map's own `scale` makes them.
+    """
+    if normal_unit(unit) == COUNTS:
+        return Scale(1.0)
     known = FOREIGN_UNITS.get(target, {target: Scale(1.0)})
     found = known.get(normal_unit(unit))
     if found is None:

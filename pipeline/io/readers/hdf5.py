@@ -7,4 +7,4 @@ from functools import partial
 from pipeline.io.tables.foreign import Reader
 from pipeline.io.tables.hdf5_tables import tables
 
-READER = Reader("hdf5", partial(tables, form="hdf5"))
+READER = Reader("hdf5", partial(tables, form="hdf5"), suffixes=(".h5", ".hdf5"))

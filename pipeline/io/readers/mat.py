@@ -60,4 +60,4 @@ def _vectors(path: str, value: Any, depth: int) -> Iterator[tuple[str, np.ndarra
             yield path, value.ravel()
 
 
-READER = Reader("mat", read)
+READER = Reader("mat", read, suffixes=(".mat",))

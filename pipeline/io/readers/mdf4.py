@@ -50,4 +50,4 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     return tuple(found)
 
 
-READER = Reader("mdf4", read)
+READER = Reader("mdf4", read, suffixes=(".mf4", ".mdf"))

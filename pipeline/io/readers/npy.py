@@ -32,4 +32,4 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     return (RawTable("npy", {str(n): columns[:, n] for n in range(columns.shape[1])}),)
 
 
-READER = Reader("npy", read)
+READER = Reader("npy", read, suffixes=(".npy",))

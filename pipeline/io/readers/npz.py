@@ -58,4 +58,4 @@ def _fields(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return found
 
 
-READER = Reader("npz", read)
+READER = Reader("npz", read, suffixes=(".npz",))

@@ -40,4 +40,4 @@ def _numbers(column: pl.Series) -> pl.Series | None:
     return column.cast(pl.Float64).fill_null(np.nan) if column.null_count() else column
 
 
-READER = Reader("parquet", read)
+READER = Reader("parquet", read, suffixes=(".parquet",))

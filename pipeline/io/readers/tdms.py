@@ -41,4 +41,4 @@ def _time(channel: Any, size: int, step_s: float) -> np.ndarray:
     return np.asarray(start + step_s * np.arange(size))
 
 
-READER = Reader("tdms", read)
+READER = Reader("tdms", read, suffixes=(".tdms",))

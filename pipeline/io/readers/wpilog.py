@@ -119,4 +119,4 @@ def _table(entry: _Entry) -> RawTable | None:
     return RawTable(entry.name, {"timestamp": times, **fields})
 
 
-READER = Reader("wpilog", read)
+READER = Reader("wpilog", read, suffixes=(".wpilog",))

@@ -22,12 +22,14 @@ class Reader:
     """How one foreign form becomes raw tables, one a clock.
 
     read(data): the tables of the file's bytes; raises CaptureError. metadata(data): what the file
-    itself says, as texts, under the contract's keys.
+    itself says, as texts, under the contract's keys. suffixes: those of the form's files, by
+    which `inspect` knows them.
     """
 
     name: str
     read: Callable[[bytes], Sequence[RawTable]]
     metadata: Callable[[bytes], Mapping[str, str]] = _nothing
+    suffixes: tuple[str, ...] = ()
 
 
 def library(module: str, extra: str) -> ModuleType:

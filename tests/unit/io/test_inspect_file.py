@@ -27,16 +27,16 @@ STRANGER = (
 def test_a_strange_table_is_understood_and_its_starter_map_reads_it(tmp_path: Path) -> None:
     path = tmp_path / "x.csv"
     path.write_text(STRANGER)
-    report = describe(path, {})
+    report = describe(path, {}, {"unit.i_q": "mA"})
     assert report.form == "text"
     (stream,) = report.streams
-    guesses = {seen.name: seen.guess for seen in stream.fields}
-    assert {n: (g.column, g.unit) for n, g in guesses.items() if g} == {
+    assert {seen.name: (seen.column, seen.unit) for seen in stream.fields} == {
         "Time (ms)": ("t_s", "ms"),
         "Speed [RPM]": ("omega_mech_rad_s", "rpm"),
-        "i_q": ("iq_a", None),
+        "i_q": ("iq_a", "mA"),
         "phase_current_a": ("ia_a", None),
     }
+    assert stream.fields[-1].question is not None
     text = render(report)
     assert "spin_down: enough" in text
     assert "holding_current: needs theta_mech_rad" in text
@@ -47,7 +47,8 @@ def test_a_strange_table_is_understood_and_its_starter_map_reads_it(tmp_path: Pa
     (table,) = read_capture(tmp_path, found.entries[0]).tables
     np.testing.assert_allclose(table["t_s"], [0, 1e-3, 2e-3])
     np.testing.assert_allclose(table["omega_mech_rad_s"], np.array([100.5, 101, 102]) * np.pi / 30)
-    assert table["ia_a"].to_list() == [2, 2.5, 2.5]
+    np.testing.assert_allclose(table["iq_a"], 1.5e-3)
+    assert "ia_a" not in table.columns  # its unit is asked for, not assumed
 
 
 def test_a_table_without_header_gets_numbered_names(tmp_path: Path) -> None:

@@ -11,10 +11,11 @@ import polars as pl
 import pytest
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.source_map import parse_source_map
+from pipeline.io.maps.source_map import load_source_maps, parse_source_map
 from pipeline.io.tables import foreign
 from pipeline.io.tables.foreign import find_reader, readers
 from pipeline.records.errors import CaptureError
+from pipeline.settings import configuration_folder
 
 T_S = np.arange(0.0, 0.5, 0.01)
 SPEED = 100.0 - 20.0 * T_S
@@ -99,7 +100,7 @@ def mdf4() -> bytes:
     return buffer.getvalue()
 
 
-def wpilog() -> bytes:
+def wpilog(speed: str = "speed", current: str = "iq") -> bytes:
     """Two entries of doubles, one of texts, one of arrays; the last is closed."""
     parts = [b"WPILOG", struct.pack("<HI", 0x0100, 3), b"bot"]
 
@@ -112,7 +113,7 @@ def wpilog() -> bytes:
         record(0, 0, struct.pack("<BI", 0, entry) + text)
 
     for entry, (name, kind) in enumerate(
-        [("speed", "double"), ("iq", "double"), ("state", "string"), ("both", "double[]")], start=1
+        [(speed, "double"), (current, "double"), ("state", "string"), ("both", "double[]")], start=1
     ):
         start(entry, name, kind)
     for t, w, i in zip(T_S, SPEED, CURRENT, strict=True):
@@ -227,6 +228,19 @@ def test_a_log_of_entries_tells_arrays_apart_and_leaves_texts() -> None:
     tables = {table.name: table for table in find_reader("wpilog").read(wpilog())}
     assert set(tables) == {"speed", "iq", "both"}
     assert tables["both"].fields["both.1"] == pytest.approx(CURRENT)
+
+
+def test_a_log_of_sysid_is_read_by_its_map(tmp_path: Path) -> None:
+    """Entries of any motor and routine, each on its clock; turns become radians."""
+    log = wpilog("velocity-wheel-shooter", "current-wheel-shooter")
+    (tmp_path / "sysid-1.wpilog").write_bytes(log)
+    (tmp_path / "sysid-1.meta.yaml").write_text("motor_id: m\n")
+    found = survey(tmp_path, load_source_maps(configuration_folder() / "source"))
+    capture = read_capture(tmp_path, found.entries[0])
+    assert (capture.meta.test, capture.meta.voltage_kind) == ("drive", "commanded")
+    rows = capture.arrays("omega_mech_rad_s", "iq_a")
+    np.testing.assert_allclose(rows["omega_mech_rad_s"], SPEED * 2 * np.pi)
+    np.testing.assert_allclose(rows["iq_a"], CURRENT)
 
 
 def test_a_library_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 import pipeline
+from pipeline.api.recordings import Recordings
+from pipeline.contracts.validate import validate
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.maps.source_map import load_source_maps, parse_source_map
-from pipeline.records.capture import Capture
+from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError, UsageError
 from tests.unit.io.recordings import SHARED
 
@@ -149,6 +152,67 @@ def test_every_map_of_an_instrument_has_a_sample_that_it_alone_recognises(tmp_pa
         claimed.add(own)
     tables = {name for name, found in maps.items() if found.reader is None}
     assert claimed == tables - {"laas_solo"}
+
+
+def test_a_run_without_current_is_read_and_its_counter_counted_on(tmp_path: Path) -> None:
+    """The row that holds no number is none; 4 counts come after 55,960."""
+    text = sample("odrive_characterization")
+    (table,) = one(tmp_path, text, said="motor_id: m\n").tables
+    assert table.columns == ["t_s", "vq_v", "theta_mech_rad", "omega_mech_rad_s"]
+    np.testing.assert_allclose(table["t_s"], np.array([55_960, 56_004, 56_048]) / 8000)
+    np.testing.assert_allclose(table["omega_mech_rad_s"], 9 * np.pi)
+
+
+def test_monitor_lines_of_simplefoc_need_the_interval(tmp_path: Path) -> None:
+    """They have no clock: the shipped map says so, and a copy with `increment_s` reads them."""
+    (tmp_path / "simplefoc.csv").write_text(sample("simplefoc"))
+    (tmp_path / "simplefoc.meta.yaml").write_text("motor_id: m\n")
+    maps = load_source_maps(CONF)
+    (entry,) = survey(tmp_path, maps).entries
+    with pytest.raises(CaptureError, match="no sampling increment"):
+        read_capture(tmp_path, entry)
+    text = (CONF / "simplefoc.yaml").read_text().replace("from: increment", "{}", 1)
+    text = text.replace("  {}", "  from: increment\n  increment_s: 0.01")
+    found = survey(tmp_path, {"mine": parse_source_map(text.encode(), "mine")})
+    (table,) = read_capture(tmp_path, found.entries[0]).tables
+    np.testing.assert_allclose(table["t_s"], [0.0, 0.01, 0.02])
+    np.testing.assert_allclose(table["iq_a"], [0.35, 0.36, 0.37])
+    np.testing.assert_allclose(table["vd_v"], -0.25)
+
+
+LAST_ROWS = {
+    "chirp1": 1164,
+    "chirp2": 1139,
+    "impulse1": 1217,
+    "impulse2": 1261,
+    "noise1": 1280,
+    "noise2": 1255,
+    "step1": 1289,
+    "step2": 1258,
+}
+
+
+def test_runs_of_voltage_and_speed_alone_say_what_they_do_not_determine() -> None:
+    """Published runs of an ODrive: all eight are read, no constant of the winding is printed."""
+    folder = SHARED / "real" / "labmrd"
+    if not folder.is_dir():
+        pytest.skip(f"the recording is not there: {folder}")
+    parts = "".join(f"  - {{files: '{n}*', rows: 0-{last}}}\n" for n, last in LAST_ROWS.items())
+    text = (
+        CONF / "odrive_characterization.yaml"
+    ).read_text() + f"  motor_id: m\ncaptures:\n{parts}"
+    found = survey(folder, {"labmrd": parse_source_map(text.encode(), "labmrd")})
+    read = [read_capture(folder, entry) for entry in found.entries]
+    assert len(read) == len(LAST_ROWS)
+    for capture in read:
+        (table,) = capture.tables
+        steps = np.diff(table["t_s"].to_numpy())
+        assert steps.min() > 0.004 and steps.max() < 0.023
+    driven = [one for one in read if one.tables[0]["vq_v"].to_numpy().any()]
+    captures = [validate(one, {})[0] for one in driven]
+    fits = pipeline.fit(Recordings({"m": Campaign("m", tuple(captures))}))
+    printed = fits.constants.filter(pl.col("value").is_not_null())["constant"].to_list()
+    assert not set(printed) & {"psi_pm_wb", "r_phase_ohm", "kt_peak_nm_a", "j_rotor_kgm2"}
 
 
 def test_keysight_times_with_a_gap_are_refused(tmp_path: Path) -> None:

@@ -1,0 +1,279 @@
+"""What every field of a table probably is, from its name and its numbers, and what must be asked.
+
+A unit that neither the name nor the numbers give is asked for and never assumed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.io.inspection.evidence import Evidence, gather
+from pipeline.io.inspection.labels import Label, known_unit, read_label, words_of
+from pipeline.io.maps.columns import JOINT_COLUMNS
+from pipeline.io.maps.units import COUNTS, FOREIGN_UNITS, normal_unit
+from pipeline.io.tables.raw_table import RawTable
+from pipeline.physics.glossary import COLUMNS
+from pipeline.records.errors import UsageError
+from pipeline.records.parse import number
+
+ROWS_LOOKED_AT = 100_000
+NONE = "none"
+_WITHIN = 0.02
+_MOST_CLOCK_JITTER = 0.5
+_ELECTRICAL = frozenset({"erpm", "elec", "el", "electrical", "elektrisch"})
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSeen:
+    """One field: its name, a first value, and the column it is or probably is.
+
+    `unit` is None where the column's own unit is stated by the name, or nothing is known;
+    `question` says what must be asked before the field can be used. `why` is the evidence.
+    """
+
+    name: str
+    first: float | None
+    column: str | None = None
+    unit: str | None = None
+    certain: bool = False
+    wraps: float | None = None
+    scale: float | None = None
+    per_pole_pair: bool = False
+    question: tuple[str, str] | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StreamSeen:
+    """One table or topic: rows, rate [Hz] (None without a clock), and its fields."""
+
+    name: str
+    encoding: str
+    rows: int
+    rate_hz: float | None
+    fields: tuple[FieldSeen, ...]
+    clock: str = ""
+
+
+def answer_key(name: str) -> str:
+    """The name of a field as it is written in an answer: `unit.Motor_Strom=A`."""
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+def propose(table: RawTable, answers: Mapping[str, str]) -> tuple[FieldSeen, ...]:
+    """The fields of a table, each with the column it probably is or what must be asked.
+
+    `answers` are `column.NAME` and `unit.NAME`. Raises UsageError for one that cannot be.
+    """
+    rows = {name: values[:ROWS_LOOKED_AT] for name, values in table.fields.items()}
+    numeric = {name: values for name, values in rows.items() if values.dtype.kind in "fiub"}
+    labels = {name: _label(table, name) for name in numeric}
+    times = [name for name, label in labels.items() if label.columns[:1] == ("t_s",)]
+    found = gather(numeric, times[0] if times else None)
+    columns = _columns(labels, found, answers)
+    seen = [_seen(name, numeric, labels, columns, found, answers) for name in numeric]
+    return tuple(_with_units(seen, labels, found, answers))
+
+
+def _label(table: RawTable, name: str) -> Label:
+    if table.joint_state and name in JOINT_COLUMNS:
+        return Label((JOINT_COLUMNS[name],), exact=True)
+    return read_label(name, dict(table.units).get(name))
+
+
+def _columns(
+    labels: Mapping[str, Label], found: Evidence, answers: Mapping[str, str]
+) -> dict[str, tuple[str, ...]]:
+    """Columns that each field may be, after the answers and the evidence."""
+    clocks = {clock.field: clock for clock in found.clocks}
+    columns: dict[str, tuple[str, ...]] = {}
+    for name, label in labels.items():
+        answer = answers.get(f"column.{answer_key(name)}")
+        if answer is not None:
+            if answer != NONE and answer not in COLUMNS:
+                remedy = f"write {NONE} or one of {', '.join(COLUMNS)}"
+                raise UsageError(f"column.{answer_key(name)}={answer} is no column", remedy)
+            columns[name] = () if answer == NONE else (answer,)
+        elif len(label.columns) > 1 and name not in clocks:
+            columns[name] = tuple(one for one in label.columns if one != "t_s")
+        else:
+            columns[name] = label.columns
+    if not any(one[:1] == ("t_s",) for one in columns.values()):
+        clear = [c for c in found.clocks if c.jitter < _MOST_CLOCK_JITTER]
+        free = [c for c in clear if not columns[c.field] and not _is_answered(c.field, answers)]
+        if free:
+            columns[min(free, key=lambda clock: clock.jitter).field] = ("t_s",)
+    answered = frozenset(name for name in columns if _is_answered(name, answers))
+    return _from_relations(columns, found, answered)
+
+
+def _is_answered(name: str, answers: Mapping[str, str]) -> bool:
+    return f"column.{answer_key(name)}" in answers
+
+
+def _from_relations(
+    columns: dict[str, tuple[str, ...]], found: Evidence, answered: frozenset[str]
+) -> dict[str, tuple[str, ...]]:
+    """Fields of no known name that integrate to an angle, or that a speed integrates to."""
+    angle, speed = ("theta_mech_rad",), ("omega_mech_rad_s",)
+    taken = {one[0] for one in columns.values() if len(one) == 1}
+    for relation in found.relations:
+        if not relation.integral:
+            continue
+        one, other = columns[relation.field], columns[relation.other]
+        if {relation.field, relation.other} & answered:
+            continue
+        if one == angle and not other and speed[0] not in taken:
+            columns[relation.other] = speed
+            taken.add(speed[0])
+        elif other == speed and not one and angle[0] not in taken:
+            columns[relation.field] = angle
+            taken.add(angle[0])
+    return columns
+
+
+def _seen(
+    name: str,
+    numeric: Mapping[str, np.ndarray],
+    labels: Mapping[str, Label],
+    columns: Mapping[str, tuple[str, ...]],
+    found: Evidence,
+    answers: Mapping[str, str],
+) -> FieldSeen:
+    """A field before its unit is settled."""
+    label, options, values = labels[name], columns[name], numeric[name]
+    first = float(values[0]) if values.size else None
+    seen = FieldSeen(name, first, why=_why(name, found))
+    if not options:
+        return seen
+    if len(options) > 1:
+        text = f"which column {name!r} is: {', '.join(options)}, or {NONE}"
+        return replace(seen, question=(f"column.{answer_key(name)}", text))
+    electrical = bool(_ELECTRICAL & set(words_of(name))) and options[0] == "omega_mech_rad_s"
+    wraps = dict(found.wraps).get(name) if options[0] in ("t_s", *_ANGLES) else None
+    answered = _is_answered(name, answers)
+    return replace(
+        seen,
+        column=options[0],
+        certain=(label.exact or answered) and options[0] in (label.columns or options),
+        wraps=wraps,
+        per_pole_pair=electrical,
+    )
+
+
+_ANGLES = ("theta_mech_rad", "theta_elec_rad", "theta_elec_deg")
+
+
+def _why(name: str, found: Evidence) -> str:
+    """What the numbers of a field show, in words."""
+    told = [f"starts again after {span:g}" for field, span in found.wraps if field == name]
+    for relation in found.relations:
+        if relation.field == name:
+            kind = "the integral of " if relation.integral else ""
+            told.append(f"is {relation.factor:.6g} times {kind}{relation.other!r}")
+    return "; ".join(told)
+
+
+def _with_units(
+    seen: list[FieldSeen],
+    labels: Mapping[str, Label],
+    found: Evidence,
+    answers: Mapping[str, str],
+) -> list[FieldSeen]:
+    """The fields with their units: answered, written, or seen in the numbers; else a question."""
+    done: dict[str, FieldSeen] = {}
+    taken: set[str] = set()
+    for field in sorted(seen, key=lambda one: not one.certain):
+        if field.column in taken:
+            words = f"{field.column} is another field already"
+            done[field.name] = replace(field, column=None, why=_joined(field.why, words))
+            continue
+        if field.column is not None:
+            taken.add(field.column)
+        done[field.name] = _stated(field, labels[field.name], answers)
+    for field in seen:
+        one = done[field.name]
+        if one.column is None or one.unit is not None or labels[one.name].exact:
+            continue
+        factor = _factor_seen(one, done, found, labels)
+        unit = None if factor is None else _unit_of(factor, one.column)
+        question = None if unit else _ask_unit(one, factor)
+        done[one.name] = replace(one, unit=unit, question=question)
+    return [done[field.name] for field in seen]
+
+
+def _joined(one: str, other: str) -> str:
+    return f"{one}; {other}" if one else other
+
+
+def _stated(field: FieldSeen, label: Label, answers: Mapping[str, str]) -> FieldSeen:
+    """The field with the unit that is answered or written."""
+    if field.column is None:
+        return field
+    key = f"unit.{answer_key(field.name)}"
+    text = answers.get(key, label.unit_text)
+    unit = known_unit(COLUMNS[field.column].unit, text) if text else label.unit
+    scale = number(answers.get(f"scale.{answer_key(field.name)}", ""))
+    if text and normal_unit(text) == COUNTS and scale:
+        return replace(field, unit=COUNTS, scale=scale)
+    if key in answers and unit is None:
+        known = ", ".join(FOREIGN_UNITS[COLUMNS[field.column].unit])
+        raise UsageError(f"{key}={text} is no unit of {field.column}", f"use one of {known}")
+    return replace(field, unit=unit)
+
+
+def _ask_unit(field: FieldSeen, factor: float | None) -> tuple[str, str]:
+    target = COLUMNS[field.column or ""].unit
+    text = f"the unit of {field.name!r} ({field.column}): {', '.join(FOREIGN_UNITS[target])}"
+    if factor is not None:
+        text += f"; by the other fields 1 is about {factor:.3g} {target}"
+    counts = f", or {COUNTS} with scale.{answer_key(field.name)}= what one is [{target}]"
+    return f"unit.{answer_key(field.name)}", text + counts
+
+
+def _size(field: FieldSeen | None, labels: Mapping[str, Label]) -> float | None:
+    """What 1 of a field is in its column's unit, where that is known."""
+    if field is None or field.column is None or field.per_pole_pair:
+        return None
+    if field.unit is None:
+        return 1.0 if labels[field.name].exact else None
+    if field.scale is not None:
+        return field.scale
+    return FOREIGN_UNITS[COLUMNS[field.column].unit][field.unit].factor
+
+
+def _factor_seen(
+    field: FieldSeen,
+    done: Mapping[str, FieldSeen],
+    found: Evidence,
+    labels: Mapping[str, Label],
+) -> float | None:
+    """What 1 of a field is by its relation to fields whose unit is known, or None."""
+    clock = _size(next((f for f in done.values() if f.column == "t_s"), None), labels)
+    for relation in found.relations:
+        angle, speed = done[relation.field], done[relation.other]
+        columns = (angle.column, speed.column)
+        if not relation.integral or columns != ("theta_mech_rad", "omega_mech_rad_s"):
+            continue
+        one, two = _size(angle, labels), _size(speed, labels)
+        if field is speed and one and clock:
+            return relation.factor * one / clock
+        if field is angle and two and clock:
+            return two * clock / relation.factor
+        if field.column == "t_s" and one and two:
+            return relation.factor * one / two
+    return None
+
+
+def _unit_of(factor: float, column: str) -> str | None:
+    """The unit of a column's dimension of this size, where there is one and one alone."""
+    fitting = {
+        scale.factor: name
+        for name, scale in reversed(FOREIGN_UNITS[COLUMNS[column].unit].items())
+        if abs(factor - scale.factor) <= _WITHIN * scale.factor
+    }
+    return next(iter(fitting.values())) if len(fitting) == 1 else None

@@ -1,0 +1,18 @@
+"""What `inspect` says of one field, as text for people."""
+
+from __future__ import annotations
+
+from pipeline.io.inspection.proposals import FieldSeen
+
+
+def field_line(seen: FieldSeen) -> str:
+    """What a field is, probably is, or what must be asked of it, and the evidence."""
+    first = "" if seen.first is None else f" (first {seen.first:.6g})"
+    why = f"; {seen.why}" if seen.why else ""
+    name = f"{seen.name}{first}"
+    if seen.column is None:
+        return f"{name}: {'unclear' if seen.question else 'not recognised'}{why}"
+    unit = f" [{seen.unit}]" if seen.unit else ""
+    lacks = ", its unit is not stated" if seen.question else ""
+    verb = "is" if seen.certain else "probably"
+    return f"{name}: {verb} {seen.column}{unit}{lacks}{why}"

@@ -1,0 +1,241 @@
+"""`inspect` on a folder: one source map for all files, a preview through it, and what follows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from pipeline.execution.inspect_tasks import InspectTask, Looked, in_workers, look_into
+from pipeline.io.ingest.files import list_files, size_bytes
+from pipeline.io.ingest.guard import ReadLimits, died, reading
+from pipeline.io.ingest.metadata import MANIFEST, SIDECAR_SUFFIX
+from pipeline.io.storage.publish import write_whole
+from pipeline.physics.glossary import METADATA, TESTS_WITHOUT_CLOCK
+from pipeline.records.errors import CaptureError, UsageError
+from pipeline.records.finding import lines_of
+from pipeline.records.naming import counted, printable
+from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.settings import InspectSettings
+
+if TYPE_CHECKING:
+    from pipeline.io.inspection.file_names import NamePatterns
+    from pipeline.io.inspection.starter_map import Shape
+    from pipeline.records.capture import Campaign
+
+PREVIEW_ROWS = 3
+_STATED = frozenset(METADATA) - {"contract", "sha256_rows"}
+
+
+@dataclass(frozen=True, slots=True)
+class PreviewTask:
+    """A file to show through a map that is not written yet."""
+
+    folder: str
+    file: str
+    limits: ReadLimits
+    map_text: str
+    refused: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"file {printable(self.file)}"
+
+    def without(self, path: str, reason: str) -> PreviewTask:  # noqa: ARG002 (it has one file)
+        """The task with its file refused for a reason."""
+        return replace(self, refused=reason)
+
+
+def check_answers(settings: InspectSettings) -> None:
+    """Raises UsageError for an answer that nothing asks for, or a map that is there already."""
+    from pipeline.records.stated import may_be_stated
+
+    for key in settings.answers:
+        of_field = key.startswith(("unit.", "column.", "scale."))
+        constant = may_be_stated(key.removeprefix("u_"))
+        if not (of_field or constant or key in _STATED or key == "increment_s"):
+            raise UsageError(
+                f"inspect: no key or metadata {key!r}",
+                "answers are unit.NAME, scale.NAME, column.NAME, increment_s, "
+                f"{', '.join(sorted(_STATED))}",
+            )
+    if settings.map and Path(settings.map).exists():
+        raise UsageError(f"map={settings.map} is there already", "remove it, or name another file")
+
+
+def folder(settings: InspectSettings) -> Outcome:
+    """What the files of a folder hold, by shape, and one map for those that need one."""
+    paths = [path for path in list_files(Path(settings.file)).paths if _is_data(path)]
+    if not paths:
+        raise UsageError(f"{settings.file} holds no files", "name a folder of recordings")
+    limits = _read_limits(settings)
+    tasks = [InspectTask(settings.file, path, limits, settings.answers) for path in paths]
+    seen = in_workers(_look_or_fault, tasks)
+    looked = [one for one in seen if isinstance(one, Looked)]
+    unread = [one for one in seen if isinstance(one, str)]
+    strangers = [one for one in looked if one.report.shape and not one.report.source]
+    known = [one for one in looked if one not in strangers and one.report.streams]
+    lines = [f"{settings.file}: {counted(len(paths), 'file')}"]
+    if known:
+        lines.append(f"{counted(len(known), 'file')} read as they are")
+    empty = [one.file for one in looked if one not in strangers and one not in known]
+    lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
+    more = finish(settings, settings.file, strangers, None)
+    return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors)
+
+
+def _look_or_fault(task: InspectTask) -> Looked | str:
+    """What `look_into` finds, or a line on why the file cannot be opened; in a worker."""
+    try:
+        return look_into(task)
+    except CaptureError as fault:
+        return f"{printable(task.file)}: {fault.message}"
+
+
+def _read_limits(settings: InspectSettings) -> ReadLimits:
+    return ReadLimits(settings.read_seconds, settings.read_memory_mb)
+
+
+def _is_data(path: str) -> bool:
+    return PurePosixPath(path).name != MANIFEST and not path.endswith(SIDECAR_SUFFIX)
+
+
+def finish(
+    settings: InspectSettings,
+    root: str,
+    strangers: Sequence[Looked],
+    only: tuple[str, ...] | None,
+) -> Outcome:
+    """The map of all shapes, previewed, written and checked as far as the settings ask for it."""
+    from pipeline.io.inspection.file_names import name_patterns
+    from pipeline.io.inspection.starter_map import map_text
+
+    lines: list[str] = []
+    text = ""
+    if strangers:
+        groups = _groups(strangers)
+        names = name_patterns([one.file for one in strangers], frozenset(settings.answers))
+        metadata = {key: value for key, value in settings.answers.items() if "." not in key}
+        by_name = any("contract" in dict(one.report.metadata) for one in strangers)
+        text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
+        if only is None:
+            lines += _shape_lines(groups, names)
+        lines += _questions(groups, names, settings)
+        firsts = [files[0] for _, files in groups]
+        tasks = [PreviewTask(root, file, _read_limits(settings), text) for file in firsts]
+        for preview in in_workers(preview_of, tasks):
+            lines += preview
+        if settings.map:
+            write_whole(Path(settings.map), text.encode())
+            lines.append(f"written: {settings.map}; `run input={root} source={settings.map}`")
+        elif only is None:
+            lines += ["the source map (map=PATH writes it):", "", text.rstrip("\n")]
+    if not settings.check:
+        return Outcome(0, "\n".join(lines) + "\n" if lines else "")
+    checked = _check(settings, root, text, only)
+    return Outcome(checked.exit_code, "\n".join([*lines, checked.text]) + "\n", checked.errors)
+
+
+def _groups(strangers: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:
+    """The shapes of the files, each with its files and what is seen in any of them."""
+    shapes: dict[tuple[object, ...], Shape] = {}
+    files: dict[tuple[object, ...], list[str]] = defaultdict(list)
+    for one in strangers:
+        shape = one.report.shape
+        if shape is None:
+            continue
+        key = shape.key()
+        shapes[key] = shapes[key].joined(shape) if key in shapes else shape
+        files[key].append(one.file)
+    return [(shape, files[key]) for key, shape in shapes.items()]
+
+
+def _shape_lines(groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns) -> list[str]:
+    from pipeline.io.inspection.text import field_line
+
+    lines: list[str] = []
+    for number, (shape, files) in enumerate(groups, 1):
+        listed = ", ".join(printable(file) for file in files[:8])
+        more = f" and {len(files) - 8} more" if len(files) > 8 else ""
+        lines.append(f"shape {number}: {counted(len(files), 'file')} ({listed}{more})")
+        for stream in shape.streams:
+            rate = "" if stream.rate_hz is None else f", {stream.rate_hz:.6g} Hz"
+            clock = f" ({stream.clock})" if stream.clock else ""
+            lines.append(f"  {counted(stream.rows, 'row')} in the first{rate}{clock}")
+            lines += [f"    {field_line(seen)}" for seen in stream.fields]
+    if names.keys:
+        lines.append(f"file names give {', '.join(sorted(names.keys))}")
+    return lines
+
+
+def _questions(
+    groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns, settings: InspectSettings
+) -> list[str]:
+    """What must be answered before the map reads every capture, a line each."""
+    found: dict[str, str] = {}
+    for shape, _ in groups:
+        found |= dict(seen.question for seen in shape.fields if seen.question)
+        timeless = settings.answers.get("test") in TESTS_WITHOUT_CLOCK or shape.topics
+        if not timeless and not any(seen.column == "t_s" for seen in shape.fields):
+            found["increment_s"] = "s from row to row, where rows follow a clock"
+        if any(seen.per_pole_pair for seen in shape.fields):
+            found["pole_pairs"] = "electrical speed is divided by them"
+    found |= {"motor_id": "the serial number", "test": "which test of the contract it is"}
+    given = set(settings.answers) | names.keys
+    asked = [f"  {key}=  {text}" for key, text in found.items() if key not in given]
+    return ["asked, for neither names nor numbers say it:", *asked] if asked else []
+
+
+def preview_of(task: PreviewTask) -> list[str]:
+    """The first rows of a file through a map, as lines; in a worker, under its limits."""
+    from pipeline.io.inspection.preview import preview
+
+    if task.refused is not None:
+        raise died(task.refused)
+    place = Path(task.folder) / task.file
+    with reading(task.file, size_bytes(place), task.limits):
+        return preview(Path(task.folder), task.file, task.map_text, PREVIEW_ROWS)
+
+
+def _check(
+    settings: InspectSettings, root: str, text: str, only: tuple[str, ...] | None
+) -> Outcome:
+    """Every capture read and validated through the map, and what it determines."""
+    from pipeline.stages.campaigns import campaigns
+
+    with TemporaryDirectory() as place:
+        source = settings.map or "auto"
+        if text and not settings.map:
+            source = str(Path(place) / "proposed.yaml")
+            write_whole(Path(source), text.encode())
+        limits = _read_limits(settings)
+        found = campaigns(root, source, limits=limits, config_dir=settings.config_dir, only=only)
+    lines = [line for campaign in found.campaigns for line in _determined(campaign)]
+    refused = any(one.severity == "refused" for one in found.findings)
+    if not found.campaigns:
+        lines.append("no capture can be used yet")
+    code = first_that_applies(3 if refused else 0, 0 if found.campaigns else 4)
+    return Outcome(code, "\n".join(lines), tuple(lines_of(found.findings)))
+
+
+def _determined(campaign: Campaign) -> list[str]:
+    """Captures of a motor with the constants that rest on each, and what none determines."""
+    from pipeline.api.fits import fit
+    from pipeline.api.recordings import Recordings
+
+    fits = fit(Recordings({campaign.motor_id: campaign}))
+    chosen = fits.motors[campaign.motor_id].constants.chosen()
+    lines = [f"motor {printable(campaign.motor_id)}"]
+    for capture in campaign.captures:
+        rows = max(table.height for table in capture.tables)
+        names = [name for name, one in chosen.items() if capture.path in one.captures]
+        given = ", ".join(names) if names else "no constant by itself"
+        lines.append(f"  {printable(capture.path)}: {capture.meta.test}, {rows} rows: {given}")
+    open_ = [name for name, one in chosen.items() if one.status == "not_identifiable"]
+    if open_:
+        lines.append(f"  not determined: {', '.join(open_)}")
+    return lines
