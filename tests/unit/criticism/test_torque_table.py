@@ -13,6 +13,7 @@ from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -62,6 +63,32 @@ def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
     (segment,) = segments(noisy, machine_of(noisy, Constants()))
     assert segment.noise["torque_shaft_nm"] == pytest.approx(2e-3, rel=0.25)
     assert segment.angle_step_rad == 0.0
+
+
+def test_state_and_transducer_are_in_the_prediction():
+    """Electrical angle p theta, a shaft at rest, and 1 + gain of the transducer."""
+    campaign = table()
+    fitted, _ = fit_of(campaign)
+    (segment,) = segments(campaign, fitted.model.machine)
+    x = operate(segment, segment.recorded, fitted.model, fitted.values)
+    assert x.eps_rad == pytest.approx(7 * segment.recorded["theta_mech_rad"])
+    assert not x.omega_rad_s.any()
+    values = fitted.values | {"gain_torque": 0.0}
+    louder = values | {"gain_torque": 0.1}
+    plain, moved = (residual(segment, fitted.model, v) for v in (values, louder))
+    shown = segment.recorded["torque_shaft_nm"] - plain
+    assert plain - moved == pytest.approx(0.1 * shown)
+
+
+def test_beside_a_drive_s_log_it_is_held_out_as_a_whole():
+    plan = (("torque_table", "torque_table", {}), ("torque_map", "torque_map", {}))
+    both = recorded(plan, 3, bench=EXACTLY)[0]
+    assert [s.blocks is None for s in segments_of(both) if s.kind == "torque_table"] == [True]
+    assert [s.blocks is None for s in segments_of(table())] == [False]
+
+
+def segments_of(campaign: Campaign):
+    return segments(campaign, machine_of(campaign, Constants()))
 
 
 def test_too_few_levels_are_no_table():
