@@ -55,7 +55,8 @@ class Parameter:
     `usual`: what handbooks say of the material, and its standard uncertainty, in its own unit: a
     prior of every fit. `at_least`: another amplitude of the effect; if this one stays below half of
     it, captures speak against the effect. `starts`: values, in multiples of `scale`, at which an
-    amplitude is tried too, since the residual bends too far from zero for its tangent.
+    amplitude is tried too, since the residual bends too far from zero for its tangent. `order`:
+    the waves a turn that an amplitude is of.
     """
 
     name: str
@@ -73,6 +74,7 @@ class Parameter:
     at_least: str = ""
     usual: tuple[float, float] | None = None
     starts: tuple[float, ...] = ()
+    order: float = 0.0
 
     @property
     def amplitude(self) -> bool:
@@ -89,7 +91,9 @@ class Machine:
     stand out of a slow turn, `load_orders` others that a fit left in logs under load, whole
     numbers or not, `slots` the nameplate's. `stated_u` is the standard uncertainty of the
     station's gains and thermometers, by the name of the nuisance that stands for each;
-    `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none.
+    `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none;
+    `travel_turns` how far the shaft goes in any one capture: a wave of the angle shows where it is
+    gone through once at least.
     """
 
     pole_pairs: int
@@ -99,6 +103,7 @@ class Machine:
     stated_u: Mapping[str, float] = field(default_factory=dict)
     encoder_rad: float = 0.0
     load_orders: tuple[float, ...] = ()
+    travel_turns: float = math.inf
 
     @property
     def cogging_order(self) -> int | None:
@@ -130,6 +135,8 @@ class Operating:
     shows.
     `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks. `held`: a
     dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
+    `alone`: nothing records the torque that the shaft passes on, so that its load is a drag.
+    `pwm_s`, `vdc_v`: period of the inverter's switching and voltage of its link, 0 where not known.
     """
 
     machine: Machine
@@ -149,6 +156,9 @@ class Operating:
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
     held: bool = False
+    alone: bool = False
+    pwm_s: float = 0.0
+    vdc_v: float = 0.0
     finer: int = 1
     run: NDArray[np.int64] | None = None
     runs_rad: Array | None = None
@@ -339,6 +349,7 @@ class Effect:
         1.5 p times its gradient by the electrical angle (no abs, no branches on those three).
     drop(x, q): complex voltage drop in the rotor frame [V], added to R i.
     torque(x, q): torque that opposes positive rotation [N·m].
+    parallel(x, q): complex current [A] that flows beside the one that magnetises.
     angle(x, q): recorded less true electrical angle [rad].
     current(r, q): true complex current from the recorded one [A].
     load(r, q): true shaft torque from the recorded one [N·m].
@@ -371,6 +382,7 @@ class Effect:
     coenergy: CoenergyHook | None = None
     drop: DropHook | None = None
     torque: TorqueHook | None = None
+    parallel: DropHook | None = None
     angle: AngleHook | None = None
     current: CurrentHook | None = None
     load: LoadHook | None = None
@@ -398,6 +410,13 @@ class Effect:
     def every(self, machine: Machine) -> tuple[Parameter, ...]:
         """The parameters with those of the optional terms that are left out."""
         return self.expand(machine) if self.expand is not None else self.parameters
+
+    def gone_through(self, machine: Machine) -> bool:
+        """Whether some capture goes through a whole period of one of its waves of the angle; of an
+        effect without such waves, always.
+        """
+        orders = [p.order for p in self.parameters_of(machine) if p.order]
+        return not orders or max(orders) * machine.travel_turns >= 1.0
 
     def dof(self, machine: Machine) -> int:
         """How many parameters are fitted."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pipeline.criticism.discovery.unknown_structure import unknown_structure
+from pipeline.criticism.discovery.unknown_structure import SHAFT, unknown_structure
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import policy_of
@@ -97,10 +97,10 @@ def ended(
         calm = _calmed(ladder, library)
         if calm is not None:
             ladder, left = calm, calm.large()
-            sketch = _sketched(ladder, left, name)
+            sketch, _ = _sketched(ladder, left, name)
             notes.append(_DRIFT.format(policy_of(model.policy).selection.drift_size))
     if sketch is None:
-        sketch = _sketched(ladder, left, name, in_parts=True)
+        sketch, _ = _sketched(ladder, left, name, in_parts=True)
         left = left if sketch else ladder.large()
         notes += [_WITHIN] if sketch else []
     return End(ladder, left, sketch, tuple(notes))
@@ -111,18 +111,19 @@ def _by_orders(climb: Callable[..., Ladder], name: str) -> tuple[Ladder, Unknown
     leaves unseen.
 
     Steps of a programme make lines of any order too, and these predict no other capture: orders
-    that are no whole numbers join where they alone give a sketch.
+    that are no whole numbers join where the sketch with them takes more.
     """
     ladder = climb()
     unlooked = orders_left(ladder.begun.segments, ladder.rungs[-1].around)
     whole = tuple(order for order in unlooked if isinstance(order, int))
     if whole:
         ladder = climb(*whole)
-    sketch = _sketched(ladder, ladder.left, name)
-    if sketch is None and len(unlooked) > len(whole) and not ladder.explains(ladder.left):
+    sketch, gain = _sketched(ladder, ladder.left, name)
+    if len(unlooked) > len(whole) and not ladder.explains(ladder.left):
         between = climb(*unlooked)
-        sketch = _sketched(between, between.left, name)
-        ladder = between if sketch is not None else ladder
+        other, more = _sketched(between, between.left, name)
+        if other is not None and (sketch is None or more > gain):
+            return between, other
     return ladder, sketch
 
 
@@ -150,13 +151,19 @@ def climbed(start: Begun, library: Mapping[str, Effect]) -> Ladder:
 
 def _sketched(
     ladder: Ladder, left: Sequence[Remainder], name: str, in_parts: bool = False
-) -> UnknownStructure | None:
-    """What the structure depends on that no effect explains; None where there is none, or where
-    nothing that the machine does predicts it.
+) -> tuple[UnknownStructure | None, float]:
+    """What the structure depends on that no effect explains, and the misfit that it takes; None
+    where there is none, or where nothing that the machine does predicts it.
+
+    The signal that misses by most is sketched, winding or shaft; the other one if that fails.
     """
     if ladder.explains(left):
-        return None
-    last = ladder.rungs[-1]
-    signals = list(dict.fromkeys(r.signal for r in left))
-    found = ladder.begun.segments
-    return unknown_structure(found, last.fitted, signals, last.around, name, in_parts)[0]
+        return None, 0.0
+    last, found = ladder.rungs[-1], ladder.begun.segments
+    worst = sorted(left, key=lambda one: -one.chi2_per_n)
+    signals = list(dict.fromkeys(one.signal for one in worst))
+    other = [one for one in signals if (one in SHAFT) != (signals[0] in SHAFT)]
+    sketch, gain = unknown_structure(found, last.fitted, signals, last.around, name, in_parts)
+    if sketch is None and other:
+        return unknown_structure(found, last.fitted, other, last.around, name, in_parts)
+    return sketch, gain

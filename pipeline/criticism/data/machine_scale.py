@@ -88,7 +88,16 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
         orders,
         stated,
         encoder_step(campaign),
+        travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
     )
+
+
+def _travel_turns(capture: Capture) -> float:
+    """How far the shaft goes in a capture [turns]; infinite where no angle tells."""
+    if capture.has("theta_mech_rad"):
+        theta = capture.arrays("theta_mech_rad")["theta_mech_rad"]
+        return float(np.nanmax(theta) - np.nanmin(theta)) / TURN_RAD if theta.size else 0.0
+    return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
 
 
 def encoder_step(campaign: Campaign) -> float:

@@ -37,17 +37,17 @@ class Segment:
     `kind` is the name of its equation (`equation.Equation`). `recorded` holds capture columns on an
     even clock of period `ts_s`; `noise` the standard
     deviation of each one's sensor. `channels` are the equations: the recorded signal that each
-    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `ambient_k`), `meter` and
-    `ammeter` the nuisances that are the gains of its voltmeter and of its current sensors;
-    `angle_step_rad` is the resolution of an angle whose noise is its rounding. `blocks` [W] numbers
-    the parts of a capture that are held out one by one where there is no other capture to predict
-    it from; `offsets` [K, n] are offsets of the channel, of their prior size, that the capture may
-    have; `runs_rad` the angles turned between reversals, of which the column `run` numbers the one
-    at hand; `lines` [K, C, W, M] are weak samples of the mains lines, and of the wander of sensors,
-    that there may be; `whole` are the columns of a drive log before it was thinned, with `good`,
-    the samples that were recorded well; `steps` the resolution of columns whose rounding error
-    follows the signal; `log` what an instrument may be late with, at all samples, where the others
-    were thinned.
+    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `pwm_s`, `vdc_v`,
+    `ke_v_s_rad`, `ambient_k`), `meter` and `ammeter` the nuisances that are the gains of its
+    voltmeter and of its current sensors; `angle_step_rad` is the resolution of an angle whose noise
+    is its rounding. `blocks` [W] numbers the parts of a capture that are held out one by one where
+    there is no other capture to predict it from; `offsets` [K, n] are offsets of the channel, of
+    their prior size, that the capture may have; `runs_rad` the angles turned between reversals, of
+    which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak samples of the
+    mains lines, and of the wander of sensors, that there may be; `whole` are the columns of a drive
+    log before it was thinned, with `good`, the samples that were recorded well; `steps` the
+    resolution of columns whose rounding error follows the signal; `log` what an instrument may be
+    late with, at all samples, where the others were thinned.
     """
 
     capture: str
@@ -95,7 +95,9 @@ def segment_of(
     """A segment with what the capture's metadata says of it."""
     stated = capture.meta.ambient_degc
     ambient = 0.0 if stated is None else stated - _REFERENCE_DEGC
-    timing = capture.meta.voltage_timing
+    timing, pwm_hz = capture.meta.voltage_timing, capture.meta.pwm_hz
+    if pwm_hz and capture.meta.vdc_v:
+        fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v}
     return Segment(
         capture.path,
         capture.meta.test,

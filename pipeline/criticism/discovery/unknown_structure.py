@@ -21,7 +21,7 @@ from pipeline.criticism.regression.linear_system import Fitted, System, own_colu
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.records.diagnosis import UnknownStructure
 
-_SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
+SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 """Signals of the shaft, to which a torque comes."""
 
 
@@ -49,7 +49,8 @@ def unknown_structure(
     name: str = "unknown",
     in_parts: bool = False,
 ) -> tuple[UnknownStructure | None, float]:
-    """What the structure left in `signals` depends on, as curve, expression and effect file.
+    """What the structure left in `signals`, the worst first, depends on, as curve, expression and
+    effect file.
 
     Ports are compared by the misfit they remove from whole captures that they were not fitted to.
     Of those that do as well, the one of fewest variables is told, and the others are named beside
@@ -93,12 +94,14 @@ def _moved(fitted: Fitted, wide: System, step: Array) -> Fitted:
 
 
 def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
-    """Hooks that can reach the signals that miss: a shaft's own torque is not in the voltage."""
-    if signals and all(signal in _SHAFT for signal in signals):
-        return ("torque",)
-    if any(signal in _SHAFT for signal in signals) or not signals:
+    """Hooks that can reach the first of the signals that miss, and others with it: a shaft's own
+    torque is not in the voltage, a winding's drop not in the torque, flux is in both.
+    """
+    if not signals:
         return ("torque", "drop", "flux")
-    return ("drop", "flux")
+    if signals[0] not in SHAFT:
+        return ("drop", "flux")
+    return ("torque",) if all(signal in SHAFT for signal in signals) else ("torque", "flux")
 
 
 def _ranked(

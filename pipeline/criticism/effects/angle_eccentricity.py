@@ -27,8 +27,8 @@ EFFECT = Effect(
     headline="encoder disc off-centre by {sine_rad & cosine_rad}",
     reference="Hanselman, IEEE Trans. Ind. Electron. 37 (1990), resolver signal requirements",
     parameters=(
-        Parameter("sine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2),
-        Parameter("cosine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2),
+        Parameter("sine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2, order=1.0),
+        Parameter("cosine_rad", "rad", 0.003, 0.0002, low=-0.2, high=0.2, order=1.0),
         Parameter("sine2_rad", "rad", 0.001, 0.0002, low=-0.1, high=0.1, optional=1),
         Parameter("cosine2_rad", "rad", 0.001, 0.0002, low=-0.1, high=0.1, optional=1),
     ),

@@ -28,7 +28,9 @@ def orders(machine: Machine) -> tuple[int, ...]:
     seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}
     if machine.cogging_order is not None:
         seen.add(machine.cogging_order)
-    return tuple(sorted(seen | _untold(machine))) or (6 * machine.pole_pairs,)
+    every = tuple(sorted(seen | _untold(machine))) or (6 * machine.pole_pairs,)
+    # of a wave that is not gone through once, a piece looks like any other curve
+    return tuple(k for k in every if k * machine.travel_turns >= 1.0) or every[-1:]
 
 
 def _untold(machine: Machine) -> set[int]:
@@ -49,6 +51,7 @@ def _expand(machine: Machine) -> tuple[Parameter, ...]:
             -1.0,
             1.0,
             optional=int(order in untold),
+            order=order,
         )
         for order in orders(machine)
         for wave in ("sin", "cos")

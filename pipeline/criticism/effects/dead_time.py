@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.machine.inverter import phase_ripple
 
 
 def _drop(x: Operating, q: Values) -> Complex:
@@ -14,17 +15,23 @@ def _drop(x: Operating, q: Values) -> Complex:
     turn = x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
     stationary = before * np.exp(1j * (x.eps_rad - turn))
     drop = np.zeros(x.omega_rad_s.shape, dtype=complex)
+    swing = q["ripple"] * phase_ripple(x, x.eps_rad - turn) if q["ripple"] else np.zeros(3)
     for k in range(3):
         axis = np.exp(2j * np.pi * k / 3)
-        drop += np.tanh((stationary * np.conj(axis)).real / q["width_a"]) * axis
+        current = (stationary * np.conj(axis)).real
+        # at its rising edge a phase has the least current of its period, at its falling the most
+        edges = np.tanh((current - swing[k]) / q["width_a"])
+        edges = edges + np.tanh((current + swing[k]) / q["width_a"])
+        drop += 0.5 * edges * axis
     rotor: Complex = drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * (x.eps_rad - turn))
     return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a
 
 
 EFFECT = Effect(
     name="dead_time",
-    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, "
-    "and on_v i/i_max in its switches",
+    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, as "
+    "the mean of both edges, which a ripple (1: as pwm_hz, vdc_v and L make it) sets apart; and "
+    "on_v i/i_max in its switches",
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
@@ -38,6 +45,7 @@ EFFECT = Effect(
         ),
         # of itself it would be any resistance: it makes no effect large enough to be named
         Parameter("on_v", "V", 0.005, 0.0, "voltage_v", low=0.0, high=0.1, optional=1),
+        Parameter("ripple", "1", 1.0, 0.0, low=0.0, high=2.0, scan=(0.0, 1.0), optional=2),
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
     ),
     signals=("vd_v", "vq_v"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.machine.iron import loss_current
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -16,10 +17,15 @@ def _torque(x: Operating, q: Values) -> Array:
     return drag
 
 
+def _parallel(x: Operating, q: Values) -> Complex:
+    return q["parallel"] * loss_current(x, _torque(x, q))
+
+
 EFFECT = Effect(
     name="iron_eddy",
     words="drag proportional to ω |ψ|², and to √ω |ψ|^1.5 by excess loss, given at the highest "
-    "speed and the magnet's flux",
+    "speed and the magnet's flux; parallel: a current "
+    "beside the one that magnetises feeds it",
     signature="torque lost with speed, and with the square of the flux",
     tests=("torque_map", "spin_down"),
     experiment="a torque map at two speeds with d current; a spin-down without the magnet",
@@ -28,6 +34,15 @@ EFFECT = Effect(
     parameters=(
         Parameter("drag_nm", "N·m", 0.02, 0.002, "torque_nm", low=0.0, high=1.0),
         Parameter("excess_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0, optional=1),
+        Parameter(
+            "parallel",
+            "1",
+            1.0,
+            0.0,
+            scan=(1.0, 0.0),
+            choice=True,
+            words="1: the winding feeds the loss, 0: the shaft alone does",
+        ),
     ),
     signals=("torque_shaft_nm",),
     rivals={
@@ -35,4 +50,5 @@ EFFECT = Effect(
         "load_dependent_friction": "d current without torque: it changes the flux only",
     },
     torque=_torque,
+    parallel=_parallel,
 )

@@ -1,10 +1,11 @@
-"""Hysteresis of the iron, as the drag it makes."""
+"""Hysteresis of the iron, as the drag it makes and the current that feeds it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
+from pipeline.criticism.machine.iron import loss_current
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -13,9 +14,14 @@ def _torque(x: Operating, q: Values) -> Array:
     return drag
 
 
+def _parallel(x: Operating, q: Values) -> Complex:
+    return q["parallel"] * loss_current(x, _torque(x, q))
+
+
 EFFECT = Effect(
     name="iron_hysteresis",
-    words="drag proportional to sign(ω) |ψ|^(1 + steeper), given at the magnet's flux",
+    words="drag proportional to sign(ω) |ψ|^(1 + steeper), given at the magnet's flux; "
+    "parallel: a current beside the one that magnetises feeds it",
     signature="torque lost with direction, and with the flux",
     tests=("torque_map",),
     experiment="a torque map with d current; a slow turn without the magnet",
@@ -25,6 +31,15 @@ EFFECT = Effect(
     parameters=(
         Parameter("drag_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0),
         Parameter("steeper", "1", 0.6, 0.0, low=0.0, high=1.2, scan=(0.0,), optional=1),
+        Parameter(
+            "parallel",
+            "1",
+            1.0,
+            0.0,
+            scan=(1.0, 0.0),
+            choice=True,
+            words="1: the winding feeds the loss, 0: the shaft alone does",
+        ),
     ),
     signals=("torque_shaft_nm",),
     rivals={
@@ -32,4 +47,5 @@ EFFECT = Effect(
         "load_dependent_friction": "d current without torque: it changes the flux only",
     },
     torque=_torque,
+    parallel=_parallel,
 )

@@ -24,7 +24,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
-from pipeline.criticism.machine.model import Model, Pieces, ripple
+from pipeline.criticism.machine.model import STATE, Model, Pieces, ripple
 from pipeline.criticism.signals.shaft import TORQUE_RIPPLES, net_torque, sensed_torque, true_load
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
@@ -84,7 +84,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     made = segment_of(
         capture, "dq", "drive", period, found=found, sensors=told, channels=channels, weak=weak
     )
-    return replace(made, whole=whole, log=log)
+    # of the magnet, as large as the machine's voltage and speed say
+    ke = machine.pole_pairs * machine.scales["flux_wb"]
+    return replace(made, whole=whole, log=log, fixed={**made.fixed, "ke_v_s_rad": ke})
 
 
 def state(
@@ -197,7 +199,7 @@ EQUATION = Equation(
     predicted=predicted,
     observes=Observes(
         (
-            *("r_ohm", "ld_h", "lq_h"),
+            *("r_ohm", "lead_share", "ld_h", "lq_h", *STATE),
             *("ripple_slope", "ripple_mean", "ripple_edge", "ripple_shift"),
             *("ripple_torque", "ripple_held", "psi_wb", "j_kgm2", "b_nm_s_rad"),
         ),

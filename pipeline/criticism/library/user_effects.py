@@ -33,6 +33,7 @@ _HOOKS = (
     "coenergy",
     "drop",
     "torque",
+    "parallel",
     "angle",
     "current",
     "load",

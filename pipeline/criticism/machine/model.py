@@ -38,7 +38,9 @@ _FREE = float("inf")
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A parameter of the base model: unit, and the prior of a nuisance (infinite: none)."""
+    """A parameter of the base model: unit, and the prior of a nuisance (infinite: none), in
+    multiples of a scale of the machine.
+    """
 
     name: str
     unit: str
@@ -46,6 +48,7 @@ class Constant:
     prior: float = _FREE
     center: float = 0.0
     hook: str = "drop"
+    scale: str = "1"
 
 
 BASE: tuple[Constant, ...] = (
@@ -65,6 +68,13 @@ BASE: tuple[Constant, ...] = (
     Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", 0.3, hook="hold"),
     Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", 0.08, hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
+    # a few milliohm of switches and leads beside a winding of one ohm
+    Constant("lead_share", "1", "resistance of inverter and leads over the phase's", 5e-3),
+    # half a step of a 12-bit converter of twice the current, and a milliradian: what is beyond is
+    # an effect's to name, whose negligible sizes these are
+    Constant("zero_alpha_a", "A", "α offset of the shunts", 5e-4, hook="state", scale="current_a"),
+    Constant("zero_beta_a", "A", "β offset of the shunts", 5e-4, hook="state", scale="current_a"),
+    Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", 1e-3, hook="state"),
     Constant("gain_current", "1", "gain of the drive's current sensors", 0.01, hook="gain"),
     Constant("gain_current_bench", "1", "gain of the bench's ammeter", 0.01, hook="gain"),
     Constant("gain_voltage", "1", "gain of the bench's voltmeters", 0.01, hook="gain"),
@@ -74,6 +84,7 @@ BASE: tuple[Constant, ...] = (
     Constant("gain_clock", "1", "recorded time over true time, less one", 1e-4, hook="gain"),
     Constant("offset_temp_k", "K", "offset of the thermometers", 2.0, hook="gain"),
 )
+STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
 GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
@@ -112,7 +123,8 @@ class Model:
         """
         stated = self.machine.stated_u
         base = [c for c in base_of(self.machine) if c.prior != _FREE]
-        own = {c.name: (c.center, stated.get(c.name, c.prior)) for c in base}
+        sizes = {"1": 1.0, **self.machine.scales}
+        own = {c.name: (c.center, stated.get(c.name, c.prior * sizes[c.scale])) for c in base}
         return own | {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
 
     def with_effects(self, *effects: Effect) -> Model:
@@ -157,6 +169,12 @@ class Pieces:
 def base_flux(x: Operating, base: Mapping[str, float]) -> Complex:
     """Flux linkage [Wb] of magnet and constant inductances."""
     flux: Complex = base["ld_h"] * x.id_a + base["psi_wb"] + 1j * base["lq_h"] * x.iq_a
+    return flux
+
+
+def flux_of(current: Complex, base: Values) -> Complex:
+    """Flux linkage [n, Wb] that a current [n, A] makes in the constant inductances."""
+    flux: Complex = base["ld_h"] * current.real + 1j * base["lq_h"] * current.imag
     return flux
 
 
@@ -244,9 +262,15 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
             more, turn = effect_flux(effect, x, values_of(effect, model.machine, values))
             flux, slope = flux + more, slope + turn
     x.psi_wb = flux
+    for effect in model.effects:
+        if effect.parallel is not None:
+            beside = effect.parallel(x, values_of(effect, model.machine, values))
+            flux = flux - flux_of(beside, values)
+    x.psi_wb = flux
     x.torque_em_nm = air_gap_torque(x, flux, slope)
     mean = mean_current(x, values)
-    drop: Complex = values["r_ohm"] * mean.i_a
+    lead = values["lead_share"] if x.inverter else 0.0
+    drop: Complex = (1.0 + lead) * values["r_ohm"] * mean.i_a
     drag: Array = values["b_nm_s_rad"] * x.omega_rad_s
     for effect in model.effects:
         q = values_of(effect, model.machine, values)

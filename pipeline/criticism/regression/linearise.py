@@ -16,12 +16,14 @@ from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
+    STATE,
     Model,
     Pieces,
     base_of,
     clock_gain,
     effect_flux,
     evaluate,
+    flux_of,
     mean_current,
     values_of,
     zero,
@@ -163,6 +165,9 @@ _FINE = 1e-3
 _BETWEEN = ("j_kgm2", *RIPPLES, "ripple_torque", "ripple_held")
 """Constants that change no flux, drop or drag."""
 
+_OF_SENSORS = ("bench_angle_rad", *STATE)
+"""Constants by which the machine's true state is another."""
+
 
 class _Sampler:
     """Sampled change of a segment's residual along columns; hooks are linear, sensors are not."""
@@ -204,7 +209,7 @@ class _Sampler:
             # a coasting shaft goes by 1 / J: a step must be small against what J has come to
             step = min(step, _FINE * self.values[column.name])
         moved = {**self.values, column.name: self.values[column.name] + step}
-        if column.name == "bench_angle_rad":
+        if column.name in _OF_SENSORS:
             return (residual(self.segment, self.model, moved) - self.here) / step
         x = replace(self.x, base=moved)
         pieces = self.pieces
@@ -283,7 +288,8 @@ class _Sampler:
                 change.drop_v - before.drop_v,
                 change.drag_nm - before.drag_nm,
             )
-        if effect.hook == "torque" and self.observes.torque_in:
+        alone = effect.hook == "torque" and effect.parallel is None
+        if alone and self.observes.torque_in:
             # a drag is in the torque alone: no voltage needs to be predicted for it
             drag = np.zeros_like(self.start)
             place = self.segment.channels.index(self.observes.torque_in)
@@ -313,6 +319,8 @@ class _Sampler:
         still: Complex = nothing.astype(np.complex128)
         drop = still if effect.drop is None else effect.drop(self.mean, q)
         drag = nothing if effect.torque is None else effect.torque(x, q)
+        if effect.parallel is not None:
+            flux = flux - flux_of(effect.parallel(x, q), self.values)
         return Pieces(flux, slope, drop, drag)
 
 

@@ -19,6 +19,8 @@ def observes(segment: Segment, effect: Effect) -> bool:
     if effect.hook == "sensor":
         return any(observes_sensor(segment, sensor) for sensor in _sensors_of(effect))
     seen = equation_of(segment).observes
+    if effect.parallel is not None and {"flux", "drop"} <= seen.hooks:
+        return True
     if effect.hook == "torque" and seen.torque_in and seen.torque_in not in segment.channels:
         return False
     return effect.hook in seen.hooks

@@ -118,7 +118,7 @@ def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate
     inside = {effect.name for effect in model.effects}
     found = []
     for effect in library.values():
-        if effect.name in inside:
+        if effect.name in inside or not effect.gone_through(model.machine):
             continue
         shapes = [p for p in effect.parameters_of(model.machine) if not p.amplitude]
         grids = [[(p.name, v * model.machine.scale(p)) for v in p.scan] for p in shapes]

@@ -105,19 +105,23 @@ def operating(
         ts_s=segment.ts_s,
         freq_hz=motion.freq_hz,
         held=segment.test == "torque_map",
+        alone="torque_shaft_nm" not in signals,
+        pwm_s=segment.fixed.get("pwm_s", 0.0),
+        vdc_v=segment.fixed.get("vdc_v", 0.0),
         finer=theta.size // segment.size,
     )
 
 
 def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) -> Operating:
     """The state with the errors of the angle's sensor taken out of angle, speed and frame."""
-    if not any(effect.angle is not None for effect in model.effects):
+    zero = zero_angle(segment, values)
+    if not zero and not any(effect.angle is not None for effect in model.effects):
         return x
     theta, current = x.theta_rad, x.id_a + 1j * x.iq_a
-    error = np.zeros(theta.size)
+    error = np.full(theta.size, zero)
     for _ in range(_ANGLE_ROUNDS):
         nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
-        error = angle_error(nearer, model, values)
+        error = zero + angle_error(nearer, model, values)
     turned = error / model.machine.pole_pairs
     current = current * np.exp(1j * error)
     return replace(
@@ -134,7 +138,11 @@ def drive_current(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values, size: int
 ) -> Complex:
     """True current [size, A] of a drive's log, between its samples on straight lines."""
-    current = true_current(_recorded(segment, signals, model), segment.ammeter, model, values)
+    recorded = _recorded(segment, signals, model)
+    zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"] if segment.kind == "dq" else 0.0
+    if zero:
+        recorded = replace(recorded, i_a=recorded.i_a - zero * np.exp(-1j * recorded.eps_rad))
+    current = true_current(recorded, segment.ammeter, model, values)
     if current.size < size:
         at = np.arange(size) * (current.size / size)
         current = np.interp(at, np.arange(current.size), current)
@@ -247,6 +255,11 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
             q = values_of(effect, model.machine, values)
             recorded = replace(recorded, i_a=effect.current(recorded, q))
     return recorded.i_a
+
+
+def zero_angle(segment: Segment, values: Values) -> float:
+    """Recorded less true electrical angle [rad] where the drive's encoder has its zero."""
+    return values["zero_angle_rad"] if segment.kind == "dq" else 0.0
 
 
 def angle_error(x: Operating, model: Model, values: Values) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Complex, Operating, Values
 from pipeline.criticism.machine.model import Model, Pieces, values_of
-from pipeline.criticism.signals.true_state import angle_error
+from pipeline.criticism.signals.true_state import angle_error, zero_angle
 
 RIPPLES = ("ripple_edge", "ripple_shift")
 """Nuisances of the current's ripple that are in the voltage (`model.BASE`)."""
@@ -73,8 +73,9 @@ def recorded_voltage(
         if effect.voltage is not None:
             q = values_of(effect, model.machine, values)
             voltage = effect.voltage(voltage, x, q, segment.instrument)
-    if in_frame and any(effect.angle is not None for effect in model.effects):
-        voltage = voltage * np.exp(-1j * angle_error(x, model, values))
+    zero = zero_angle(segment, values)
+    if in_frame and (zero or any(effect.angle is not None for effect in model.effects)):
+        voltage = voltage * np.exp(-1j * (zero + angle_error(x, model, values)))
     return voltage * (1.0 + values[segment.meter])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import GAINS, Model
+from pipeline.criticism.machine.model import GAINS, STATE, Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import Fitted, floors
 from pipeline.numerics.projection import projection
@@ -28,7 +28,8 @@ BASE = {
     "ripple_torque": 0.0,
     "ripple_held": 0.0,
     "bench_angle_rad": 0.0,
-    **dict.fromkeys(GAINS, 0.0),
+    "lead_share": 0.0,
+    **dict.fromkeys((*STATE, *GAINS), 0.0),
 }
 
 

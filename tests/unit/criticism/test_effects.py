@@ -71,7 +71,9 @@ def test_flux_is_reciprocal_and_torque_is_the_angles_share(name):
 def test_dead_time_is_a_sign_for_each_phase_in_the_abc_frame():
     x = operating()
     x.ts_s = 1.0
-    drop = LIBRARY["dead_time"].drop(x, {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0})
+    drop = LIBRARY["dead_time"].drop(
+        x, {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0, "ripple": 0.0}
+    )
     stationary = (x.id_a + 1j * x.iq_a) * np.exp(1j * x.eps_rad)
     phases = [np.real(stationary * np.exp(-2j * np.pi * k / 3)) for k in range(3)]
     lost = [0.2 * np.sign(i) for i in phases]
@@ -82,7 +84,7 @@ def test_dead_time_is_a_sign_for_each_phase_in_the_abc_frame():
 
 def test_a_switch_that_is_on_drops_with_the_current():
     x = operating()
-    of = {"loss_v": 0.0, "width_a": 1.0, "lag_s": 0.0, "on_v": 0.3}
+    of = {"loss_v": 0.0, "width_a": 1.0, "lag_s": 0.0, "on_v": 0.3, "ripple": 0.0}
     drop = LIBRARY["dead_time"].drop(x, of)
     assert drop == pytest.approx(0.3 * x.i_a / x.machine.scales["current_a"])
     assert not np.any(LIBRARY["dead_time"].drop(replace(x, inverter=False), of))
@@ -288,3 +290,71 @@ def test_a_users_file_counts_and_may_not_take_a_name(tmp_path: Path):
 def test_values_are_handed_over_by_their_short_names():
     values = {"windage.drag_nm": 0.5, "stribeck.excess_nm": 0.1}
     assert values_of(LIBRARY["windage"], machine(), values) == {"drag_nm": 0.5}
+
+
+@pytest.mark.parametrize(("name", "of"), [("iron_eddy", "excess_nm"), ("iron_hysteresis", "")])
+def test_power_that_the_iron_takes_from_the_winding_is_what_its_drag_takes_from_the_shaft(name, of):
+    effect, x = LIBRARY[name], ready(operating())
+    q = {"drag_nm": 0.02, "excess_nm": 0.0, "steeper": 0.3, "parallel": 1.0}
+    if of:
+        q[of] = 0.01
+    induced = 1j * 7 * x.omega_rad_s * x.flux_wb
+    taken = 1.5 * np.real(induced * np.conj(effect.parallel(x, q)))
+    assert taken == pytest.approx(effect.torque(x, q) * x.omega_rad_s, rel=1e-12)
+    assert not effect.parallel(x, {**q, "parallel": 0.0}).any()
+    assert not effect.parallel(replace(x, inverter=False), q).any()
+
+
+def test_a_resistance_beside_the_magnetising_branch_is_the_iron_s_loss_in_both_equations():
+    """The exact solution of v = R i + e, e = jω ψ(i − e/R_fe): drag and flux are of one resistance.
+
+    With the drag alone the voltage was L_q/R_fe late, and a delay was named for it.
+    """
+    r_fe, p = 90.0, 7
+    x = operating()
+    size = p * 1.5 * p * x.machine.scales["speed_rad_s"] * BASE["psi_wb"] ** 2 / r_fe
+    model = Model(machine(), (LIBRARY["iron_eddy"],))
+    values = {**BASE, **dict.fromkeys(model.parameters(), 0.0)}
+    values |= {"iron_eddy.drag_nm": size, "iron_eddy.parallel": 1.0, "b_nm_s_rad": 0.0}
+    omega = p * x.omega_rad_s
+    inside = x.i_a
+    for _ in range(60):
+        psi = BASE["ld_h"] * inside.real + BASE["psi_wb"] + 1j * BASE["lq_h"] * inside.imag
+        inside = x.i_a - 1j * omega * psi / r_fe
+    torque = 1.5 * p * np.imag(np.conj(psi) * inside)
+    pieces = evaluate(model, x, values)
+    given = x.torque_nm - pieces.drag_nm
+    plain = Model(machine(), ())
+    bare = evaluate(plain, operating(), BASE)
+    lost = np.abs(psi - bare.psi_wb).max()
+    assert np.abs(pieces.psi_wb - psi).max() < 0.03 * lost
+    without = 1.5 * p * np.imag(np.conj(bare.psi_wb) * x.i_a)
+    assert np.abs(given - torque).max() < 0.03 * np.abs(without - torque).max()
+
+
+def test_a_constant_load_is_a_drag_only_where_no_transducer_records_it():
+    effect, x = LIBRARY["constant_load"], operating()
+    assert not effect.torque(x, {"torque_nm": 0.03}).any()
+    alone = replace(x, alone=True)
+    assert effect.torque(alone, {"torque_nm": 0.03}) == pytest.approx(np.full(60, 0.03))
+
+
+def test_friction_of_its_own_in_each_sense_adds_to_one_and_takes_from_the_other():
+    effect, x = LIBRARY["direction_friction"], operating()
+    x.omega_rad_s[:3] = 100.0, -100.0, 0.0
+    drag = effect.torque(x, {"coulomb_nm": 0.01, "viscous_nm": 0.05})
+    assert drag[:3] == pytest.approx([0.03, 0.03, 0.0])
+    both = np.sign(x.omega_rad_s) * 0.04 + drag
+    assert both[:2] == pytest.approx([0.07, -0.01])
+
+
+def test_an_order_is_offered_where_some_capture_goes_through_one_of_its_waves():
+    """0.04 of a turn: cogging of order 12 was named for a curve of load over the stroke."""
+    short = replace(machine(), travel_turns=0.04)
+    assert cogging.orders(short) == (84,)
+    assert LIBRARY["cogging"].gone_through(short)
+    shorter = replace(machine(), travel_turns=0.01)
+    for name in ("cogging", "unbalance", "angle_eccentricity"):
+        assert not LIBRARY[name].gone_through(shorter)
+        assert LIBRARY[name].gone_through(machine())
+    assert LIBRARY["coulomb_friction"].gone_through(shorter)

@@ -17,7 +17,9 @@ def climbs(monkeypatch):
     """Ladders that are no more than the orders their equations look at; `sketched` says which of
     them leave something that a state of the machine predicts, `wanders` gives a calmer one.
     """
-    made = SimpleNamespace(orders=[], seen=(), sketched=set(), explained=False, wanders=False)
+    made = SimpleNamespace(
+        orders=[], seen=(), sketched=set(), gains={}, explained=False, wanders=False
+    )
 
     class Ladder(SimpleNamespace):
         def explains(self, _):
@@ -34,7 +36,8 @@ def climbs(monkeypatch):
         return Ladder(looked=looked, left=(looked,), rungs=(rung,), begun=inside)
 
     def sketched(ladder, left, name, in_parts=False):
-        return (ladder.looked, in_parts) if (ladder.looked, in_parts) in made.sketched else None
+        what = ladder.looked, in_parts
+        return (what, made.gains.get(what, 1.0)) if what in made.sketched else (None, 0.0)
 
     monkeypatch.setattr(search, "climbed", climbed)
     monkeypatch.setattr(search, "_sketched", sketched)
@@ -67,12 +70,19 @@ def test_others_join_where_they_alone_give_a_sketch(climbs, sketched, looked):
     assert (found.sketch is not None) is sketched
 
 
-def test_others_are_not_tried_where_a_sketch_is_there_or_nothing_is_left(climbs):
-    climbs.seen, climbs.sketched = (4.83,), {((), False)}
-    assert end().sketch is not None
-    climbs.sketched, climbs.explained = set(), True
+@pytest.mark.parametrize(("gain", "looked"), [(900.0, (4.83,)), (0.5, ())])
+def test_others_join_where_the_sketch_takes_more_with_them(climbs, gain, looked):
+    """A sketch of 15 mV was believed, and the belt that made 95 floors of torque was not tried."""
+    climbs.seen, climbs.sketched = (4.83,), {((), False), ((4.83,), False)}
+    climbs.gains = {((4.83,), False): gain}
+    found = end()
+    assert (found.ladder.looked, found.sketch) == (looked, (looked, False))
+
+
+def test_others_are_not_tried_where_nothing_is_left(climbs):
+    climbs.seen, climbs.explained = (4.83,), True
     assert end().sketch is None
-    assert climbs.orders == [(), ()]
+    assert climbs.orders == [()]
 
 
 def test_wander_is_looked_for_where_nothing_predicts_what_is_left(climbs):

@@ -1,0 +1,30 @@
+"""What the iron's loss takes from the winding: a current in parallel with the magnetising one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Array, Complex, Operating
+
+
+def loss_current(x: Operating, drag_nm: Array) -> Complex:
+    """Current [n, A] that feeds the iron's loss, by the drag [n, N·m] that the loss makes.
+
+    Notes
+    -----
+    The loss is fed at the terminals by the induced voltage e = j ω_e ψ, so its power is
+    T ω = 1.5 Re(e i*) and i = j ψ T / (1.5 p |ψ|²). Of a resistance R in parallel, i = j ω_e ψ / R.
+    What is left of the terminal's current magnetises: ψ = ψ(i_s − i). An open winding has no
+    current to feed a loss, so there the shaft alone does.
+
+    References
+    ----------
+    Morimoto, Tong, Takeda & Hirasa, IEEE Trans. Ind. Electron. 41 (1994), loss minimization
+    control of permanent magnet synchronous motor drives. doi:10.1109/41.293899
+
+    """
+    psi = x.flux_wb
+    if not x.inverter:
+        return np.zeros_like(psi)
+    current: Complex = 1j * psi * drag_nm / (1.5 * x.machine.pole_pairs * abs(psi) ** 2)
+    return current
