@@ -175,14 +175,15 @@ def fit(
 
     Notes
     -----
-    An uncertainty is the root sum of squares of its contributions, by the law of propagation [1]_.
+    An uncertainty is the root sum of squares of its contributions, by the law of propagation
+    (JCGM 100:2008).
     Contributions that two constants share, such as the gain of an instrument, are correlated and
     cancel where they can.
 
     References
     ----------
-    .. [1] JCGM 100:2008, Guide to the expression of uncertainty in measurement.
-       https://doi.org/10.59161/JCGM100-2008E
+    JCGM 100:2008, Guide to the expression of uncertainty in measurement.
+    https://doi.org/10.59161/JCGM100-2008E
 
     Examples
     --------

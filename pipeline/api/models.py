@@ -268,13 +268,13 @@ def compare(
 
     Notes
     -----
-    Every capture is predicted by a model that was fitted to the others [1]_. The page
+    Every capture is predicted by a model that was fitted to the others (Stone, 1974). The page
     "Criticism" describes the equations and the noise floors.
 
     References
     ----------
-    .. [1] Stone, Cross-validatory choice and assessment of statistical predictions,
-       J. R. Stat. Soc. B 36 (1974) 111-147. https://doi.org/10.1111/j.2517-6161.1974.tb00994.x
+    Stone, Cross-validatory choice and assessment of statistical predictions,
+    J. R. Stat. Soc. B 36 (1974) 111-147. https://doi.org/10.1111/j.2517-6161.1974.tb00994.x
 
     Examples
     --------
@@ -332,13 +332,13 @@ def diagnose(
 
     Notes
     -----
-    Effects are added one by one while they lower the deviance by more than their BIC penalty [1]_
-    and lower the held-out error.
+    Effects are added one by one while they lower the deviance by more than their BIC penalty
+    (Schwarz, 1978) and lower the held-out error.
 
     References
     ----------
-    .. [1] Schwarz, Estimating the dimension of a model, Ann. Stat. 6 (1978) 461-464.
-       https://doi.org/10.1214/aos/1176344136
+    Schwarz, Estimating the dimension of a model, Ann. Stat. 6 (1978) 461-464.
+    https://doi.org/10.1214/aos/1176344136
 
     Examples
     --------
