@@ -69,6 +69,9 @@ def segment_of(kind: str) -> Segment:
     columns = signals()
     if kind == "steady":
         columns["id_a"] = np.repeat([0.0, -4.0, -8.0, -12.0], 1000)
+    if kind == "torque_table":
+        columns["iq_a"] = np.repeat([-9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0, 12.0], 500)
+        columns["theta_mech_rad"] = np.repeat(np.linspace(0.0, 1.0, 80), 50)
     meta = CaptureMeta("m", test, pole_pairs=7, pair="ab", ambient_degc=31.0)
     table = pl.DataFrame({name: columns[name] for name in names})
     campaign = Campaign("m", (Capture("x.csv", "0", "verified", meta, (table,)),))
