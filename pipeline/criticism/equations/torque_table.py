@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.criticism.data.levels import levels_of
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of
@@ -25,12 +26,15 @@ _LEAST_NOISE = 1e-4
 their curve exactly."""
 _FEW_LEVELS = 4
 """Levels of current from which on there is a slope and a scatter, and they can be held out."""
+_PARTS = 12
+"""Parts that a sweep is held out in: by judgement. Fewer leave little to fit, more are like their
+neighbours."""
 _TERMS = 3
 """Terms of the curve of torque over current that noise is told about: offset, slope, sag."""
 
 
 def cut(capture: Capture, _: Machine) -> Segment | None:
-    """Rows of the table; levels of current are held out one by one.
+    """Rows of the table; levels of current, or parts of a sweep, are held out one by one.
 
     The noise is the scatter about T0 + k i + s i³, with a curve of its own for every rotor angle:
     friction that holds torque back on the way up and down is in it. The transducer's zero, and the
@@ -40,8 +44,8 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     found = capture.arrays(*names)
     fine = np.all([np.isfinite(column) for column in found.values()], axis=0)
     found = {name: column[fine] for name, column in found.items()}
-    torque, levels = found[TORQUE], levels_of(found["iq_a"])
-    noise = None if levels.max(initial=0) + 1 < _FEW_LEVELS else _noise(found)
+    torque, parts = found[TORQUE], _parts(found["iq_a"])
+    noise = None if parts is None else _noise(found)
     if noise is None:
         return None
     made = segment_of(
@@ -53,7 +57,7 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
         sensors=Sensors({TORQUE: noise}),
         channels=(TORQUE,),
         weak=None,
-        blocks=levels,
+        blocks=parts,
         offsets=np.full((1, torque.size), float(np.abs(torque).max())),
     )
     # angles that were set stand apart by more than the encoder's step
@@ -90,6 +94,19 @@ def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Va
 
     """
     return as_sensed(net_torque(x, pieces), model, values)[None]
+
+
+def _parts(current: Array) -> NDArray[np.int64] | None:
+    """Number of the level [n], of a sweep without levels that of its part; None of too few."""
+    levels = levels_of(current)
+    if levels.max(initial=0) + 1 >= _FEW_LEVELS:
+        return levels
+    reach = float(np.ptp(current)) if current.size else 0.0
+    if levels.max(initial=0) > 0 or reach == 0.0:
+        return None
+    place = (current - current.min()) / reach * _PARTS
+    parts: NDArray[np.int64] = np.minimum(place.astype(np.int64), _PARTS - 1)
+    return parts
 
 
 def _noise(found: Mapping[str, Array]) -> float | None:

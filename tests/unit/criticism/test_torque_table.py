@@ -96,6 +96,18 @@ def test_too_few_levels_are_no_table():
     assert segments(campaign, machine_of(campaign, Constants())) == ()
 
 
+def test_a_sweep_without_levels_is_held_out_in_parts():
+    current = np.linspace(-12.0, 12.0, 240)
+    rows = {"iq_a": current, "torque_shaft_nm": KT_NM_A * current + 0.01 * np.cos(40 * current)}
+    (capture,) = table().captures
+    sweep = Campaign("m", (replace(capture, tables=(pl.DataFrame(rows),)),))
+    (segment,) = segments_of(sweep)
+    assert set(segment.blocks.tolist()) == set(range(12))
+    assert 1.5 * 7 * fit_of(sweep)[0].values["psi_wb"] == pytest.approx(KT_NM_A, rel=0.01)
+    still = Campaign("m", (replace(capture, tables=(pl.DataFrame(rows).head(1),)),))
+    assert segments_of(still) == ()
+
+
 def test_diagnose_reads_it_beside_a_coast():
     """A coast says nothing of the magnet: that there is enough comes of the table."""
     plan = (("spin_down", "spin_down", {}), ("torque_table", "torque_table", {}))
