@@ -31,6 +31,7 @@ from pipeline.io.storage.publish import canonical_json
 from pipeline.records.capture import Campaign
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder
+from tests.faults.forms import maps
 from tests.faults.grammar import case
 from tests.faults.test_random_damage import FILES, TEXTS
 from tests.unit.io.recordings import small_capture
@@ -111,9 +112,14 @@ def attempt_folder(files: Mapping[str, bytes], folder: Path, maps: dict[str, Sou
             (folder / name).unlink()
 
 
+def every_map() -> dict[str, SourceMap]:
+    """The shipped maps, and one for each reader of a form."""
+    return load_source_maps(configuration_folder() / "source") | maps()
+
+
 def fuzz_folders(numbers: Iterable[int]) -> tuple[int, list[Path]]:
     """How many folders of the grammar were read, and those that were kept."""
-    maps = load_source_maps(configuration_folder() / "source")
+    maps = every_map()
     counted, kept = 0, []
     with tempfile.TemporaryDirectory() as scratch:
         for number in numbers:
@@ -149,7 +155,7 @@ def fuzz_command(numbers: Iterable[int], folder: Path, *words: str) -> tuple[int
 
 def fuzz(minutes: float, examples: int = 100_000_000) -> tuple[int, list[Path]]:
     """How many files were read, and those that were kept."""
-    maps = load_source_maps(configuration_folder() / "source")
+    maps = every_map()
     end = time.monotonic() + 60.0 * minutes
     counted, kept = 0, []
 

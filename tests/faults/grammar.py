@@ -19,6 +19,7 @@ import numpy as np
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorSet
 
 from tests.faults.bombs import MAGIC, record, text
+from tests.faults.forms import WRITERS, written
 from tests.unit.io.recordings import START_NS
 from tests.unit.io.test_cdr import JOINT_STATE, NESTED
 from tests.unit.io.test_source_maps import KEYSIGHT, MDO, MOTEUS, PICO, RIGOL, SIGLENT, TDS, VESC
@@ -338,6 +339,16 @@ def oscilloscope(draw: Draw) -> Folder:
     return {"a.csv": raw(body), "a.meta.yaml": said.encode()}
 
 
+def recorder_form(draw: Draw) -> Folder:
+    """A file of one of the forms that recorders and tools write."""
+    return written(draw.random.choice(sorted(WRITERS)), draw)
+
+
+def recorder_form_again(draw: Draw) -> Folder:
+    """As many files again, for there are eight such forms."""
+    return recorder_form(draw)
+
+
 FORMS: tuple[Callable[[Draw], Folder], ...] = (
     csv_capture,
     checksummed,
@@ -350,6 +361,8 @@ FORMS: tuple[Callable[[Draw], Folder], ...] = (
     moteus_sweep,
     numpy_archive,
     oscilloscope,
+    recorder_form,
+    recorder_form_again,
 )
 
 

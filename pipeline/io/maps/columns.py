@@ -163,7 +163,11 @@ def _mechanical(part: FieldMap, pole_pairs: int | None) -> FieldMap:
 def _converted(
     values: NDArray[Any], part: FieldMap, units: Mapping[str, str]
 ) -> NDArray[np.float64]:
-    """Values in the column's unit."""
+    """Values in the column's unit; raises CaptureError for complex ones."""
+    if np.iscomplexobj(values):
+        words = f"the field {part.field!r} holds complex numbers"
+        remedy = "write its real and imaginary parts as two fields"
+        raise CaptureError("bad_number", words, remedy)
     numbers = values.astype(np.float64, copy=False)
     if part.wraps is not None and part.column != "t_s":
         numbers = np.unwrap(numbers, period=part.wraps)

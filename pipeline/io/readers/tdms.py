@@ -6,6 +6,9 @@ The time of a waveform is `wf_start_offset + n wf_increment` [s] of its channel.
 from __future__ import annotations
 
 import io
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -20,7 +23,10 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     nptdms = library("nptdms", "tdms")
     found: dict[tuple[str, int, float], dict[str, np.ndarray]] = {}
     try:
-        file = nptdms.TdmsFile.read(io.BytesIO(data))
+        with _warnings_of("nptdms") as warnings:
+            file = nptdms.TdmsFile.read(io.BytesIO(data))
+        if warnings:
+            raise ValueError(warnings[0])
         for group in file.groups():
             for channel in group.channels():
                 values = np.asarray(channel[:])
@@ -34,6 +40,31 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     except Exception as fault:
         raise CaptureError("not_tdms", f"it is no TDMS file: {fault}", "write it anew") from fault
     return tuple(RawTable(group, fields) for (group, _, _), fields in sorted(found.items()))
+
+
+@contextmanager
+def _warnings_of(name: str) -> Iterator[list[str]]:
+    """What a library logs as a warning meanwhile, which for a file that is cut off is all it does.
+
+    npTDMS reads such a file as far as it goes.
+    """
+    found: list[str] = []
+
+    class Keeper(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            found.append(record.getMessage())
+
+    logger, keeper = logging.getLogger(name), Keeper(logging.WARNING)
+    children = [one for one in logging.root.manager.loggerDict if one.startswith(f"{name}.")]
+    loggers = [logger, *map(logging.getLogger, children)]
+    before = [(one.propagate, list(one.handlers)) for one in loggers]
+    for one in loggers:
+        one.propagate, one.handlers = False, [keeper]
+    try:
+        yield found
+    finally:
+        for one, (propagate, handlers) in zip(loggers, before, strict=True):
+            one.propagate, one.handlers = propagate, handlers
 
 
 def _time(channel: Any, size: int, step_s: float) -> np.ndarray:

@@ -11,9 +11,11 @@ import polars as pl
 import pytest
 
 from pipeline.io.ingest.capture_reader import read_capture, survey
+from pipeline.io.maps.columns import to_frame
 from pipeline.io.maps.source_map import load_source_maps, parse_source_map
 from pipeline.io.tables import foreign
 from pipeline.io.tables.foreign import find_reader, readers
+from pipeline.io.tables.raw_table import RawTable
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder
 
@@ -228,6 +230,21 @@ def test_a_log_of_entries_tells_arrays_apart_and_leaves_texts() -> None:
     tables = {table.name: table for table in find_reader("wpilog").read(wpilog())}
     assert set(tables) == {"speed", "iq", "both"}
     assert tables["both"].fields["both.1"] == pytest.approx(CURRENT)
+
+
+def test_a_tdms_that_lacks_its_end_is_refused_though_its_library_reads_on() -> None:
+    """NpTDMS logs a warning and gives what there is; nothing is said on standard error."""
+    data = tdms()
+    with pytest.raises(CaptureError, match="less data than expected"):
+        find_reader("tdms").read(data[: len(data) - 40])
+
+
+def test_complex_numbers_are_no_column() -> None:
+    """Their imaginary part was dropped in silence."""
+    source = parse_source_map(b"fields: {t: t_s, i: iq_a}", "x")
+    table = RawTable("npy", {"t": np.arange(3.0), "i": np.array([1j, 2j, 3j])})
+    with pytest.raises(CaptureError, match="complex"):
+        to_frame(table, source)
 
 
 def test_a_log_of_sysid_is_read_by_its_map(tmp_path: Path) -> None:
