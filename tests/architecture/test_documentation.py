@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.site.gallery import signature
+from tests.site.gallery import signature, simulated
 from tests.site.links import broken_in_markdown, broken_in_site
 from tests.site.pages import GROUPS, all_effects, notebook_page
 
@@ -185,3 +185,9 @@ def test_every_package_is_in_the_table() -> None:
         if (path / "__init__.py").is_file() or (path.suffix == ".py" and path.stem != "__init__")
     }
     assert names == there
+
+
+def test_nearly_every_effect_has_a_picture() -> None:
+    """The simulator has nine in ten effects at least."""
+    drawn = [simulated(effect) for effect in all_effects()]
+    assert sum(drawn) >= 0.9 * len(drawn)

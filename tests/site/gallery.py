@@ -24,6 +24,7 @@ from pipeline.settings import SimulateSettings
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.catalogue import with_effects
 from pipeline.simulator.design import Recording
+from pipeline.simulator.effects import FORMS
 
 Array = NDArray[np.float64]
 
@@ -73,6 +74,11 @@ class Signature:
         series = Series("", self.x[kept], self.change[kept], np.empty(0))
         drawn = Evidence("", title, self.cause, self.column, "scatter", (series,))
         return figure(f"{title}: change of {self.column} in {self.capture}", chart(drawn))
+
+
+def simulated(effect: Effect) -> bool:
+    """Whether the simulator has the effect."""
+    return effect.name in FORMS or effect.name == "clock_scale"
 
 
 def signature(effect: Effect) -> Signature:

@@ -12,7 +12,7 @@ from typing import Any
 import pipeline
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.library.registry import effects
-from tests.site.gallery import signature
+from tests.site.gallery import signature, simulated
 
 TOP = {
     "README.md": "index.md",
@@ -125,23 +125,24 @@ def gallery_page(images: Path) -> str:
         "",
     ]
     for effect in all_effects():
-        found = signature(effect)
-        found.figure(effect.name).save(images / f"effect-{effect.name}.svg")
         tests = ", ".join(f"`{test}`" for test in effect.tests)
-        lines += [
-            f"## {effect.name}",
-            "",
-            f"{_sentence(effect.words)} {_sentence(effect.signature)}",
-            "",
-            f"![Change of {found.column} in {found.capture}](images/effect-{effect.name}.svg)",
-            "",
-            f"Change of `{found.column}` in `{found.capture}`, against `{found.cause}`.",
-            "",
-            f"- Tests that show it: {tests}. Experiment: {effect.experiment}.",
-            f"- Reference: {effect.reference}",
-            "",
-        ]
+        lines += [f"## {effect.name}", ""]
+        lines += [f"{_sentence(effect.words)} {_sentence(effect.signature)}", ""]
+        lines += _picture(effect, images)
+        lines += [f"- Tests that show it: {tests}. Experiment: {effect.experiment}."]
+        lines += [f"- Reference: {effect.reference}", ""]
     return "\n".join(lines)
+
+
+def _picture(effect: Effect, images: Path) -> list[str]:
+    """The picture of a signature with its caption; a sentence where the simulator has no effect."""
+    if not simulated(effect):
+        return ["The simulator does not have this effect, so there is no picture.", ""]
+    found = signature(effect)
+    found.figure(effect.name).save(images / f"effect-{effect.name}.svg")
+    picture = f"![Change of {found.column} in {found.capture}](images/effect-{effect.name}.svg)"
+    caption = f"Change of `{found.column}` in `{found.capture}`, against `{found.cause}`."
+    return [picture, "", caption, ""]
 
 
 def all_effects() -> list[Effect]:
