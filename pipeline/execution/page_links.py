@@ -18,12 +18,13 @@ from pipeline.records.naming import file_stem
 from pipeline.report.link_block import Link, with_links
 
 INDEX, LOTS = "report/index.html", "regression/report.html"
-_DATASHEET = ("Datasheet", "report/{}.html")
+MOTOR = "report/{}.html"
+_DATASHEET = ("Datasheet", MOTOR)
 _DIAGNOSIS = ("Diagnosis", "diagnosis/{}.html")
 _COMPARISON = ("Comparison", "comparison/{}.html")
 _LOTS = ("Lots", LOTS)
 _OF_PAGE = {
-    "report/{}.html": (
+    MOTOR: (
         _DIAGNOSIS,
         _COMPARISON,
         _LOTS,
@@ -72,14 +73,15 @@ def links_of(
     return tuple(found)
 
 
-def relink(output: Path, motor_id: str) -> dict[str, str]:
+def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, str]:
     """Rewrites the pages of a motor whose links are out of date; names and digests of them.
 
-    What a run keeps of its work learns of its own page: it is still what that work came to.
+    What a run keeps of its work learns of its own page: it is still what that work came to. Pages
+    of the kinds `but` are left alone.
     """
     changed: dict[str, str] = {}
     for page in _OF_PAGE:
-        if "{}" in page:
+        if "{}" in page and page not in but:
             name = page.format(file_stem(motor_id))
             changed |= _relinked(output, name, links_of(output, page, motor_id))
     own: Files = tuple(one for one in changed.items() if one[0].startswith("report/"))

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.execution.jobs import Files, MotorResult
-from pipeline.execution.page_links import INDEX, links_of, relink
+from pipeline.execution.page_links import INDEX, MOTOR, links_of, relink
 from pipeline.execution.run_cache import note_files
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheet
@@ -60,8 +60,8 @@ def with_current_statuses(
             sheet = read_datasheet(output / name)
             current = current_status(sheet, versions.get(sheet.motor_id, ()), files[name])
             statuses[sheet.motor_id] = current
-            changed = _rewritten(output, sheet, current) | relink(output, sheet.motor_id)
-            files |= {name: sha256 for name, sha256 in changed.items() if name in files}
+            files |= _rewritten(output, sheet, current)
+            relink(output, sheet.motor_id, but=(MOTOR,))
         finished = replace(result.finished, files=tuple(files.items()))
         updated.append(replace(result, finished=finished))
     return updated, statuses
@@ -72,6 +72,7 @@ def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[s
 
     The run cache is updated too, as the page still belongs to the same work.
     """
+    from pipeline.report.link_block import with_links
     from pipeline.report.status_block import with_status
 
     name = f"report/{file_stem(sheet.motor_id)}.html"
@@ -79,7 +80,8 @@ def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[s
     if not path.is_file():
         return {}
     before = path.read_bytes()
-    after = with_status(before.decode(), sheet, current).encode()
+    page = with_status(before.decode(), sheet, current)
+    after = with_links(page, links_of(output, MOTOR, sheet.motor_id)).encode()
     if after == before:
         return {}
     write_whole(path, after)

@@ -6,9 +6,10 @@ import re
 from collections.abc import Sequence
 from functools import lru_cache
 
-from pipeline.physics.notation import quantity, reading
+from pipeline.physics.notation import reading
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
+from pipeline.views.motor import check_number, ordered_checks
 
 _MARKS = {"fail": "✗ fail", "marginal": "⚠ marginal", "not_evaluated": "–", "pass": "✓ pass"}
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&])")
@@ -49,10 +50,10 @@ def checks_markdown(datasheet: Datasheet) -> str:
 def _checks(datasheet: Datasheet) -> list[str]:
     """The failed ones first."""
     lines = ["| | check | value | limit | meaning |", "| --- | --- | --- | --- | --- |"]
-    for check in sorted(datasheet.checks, key=lambda c: (list(_MARKS).index(c.status), c.name)):
+    for check in ordered_checks(datasheet.checks):
         suspect = f"; suspect: {check.suspect}" if check.suspect else ""
-        value = "" if check.value is None else quantity(check.value, check.unit)
-        limit = "" if check.limit is None else quantity(check.limit, check.unit)
+        value = check_number(check.value, check.unit)
+        limit = check_number(check.limit, check.unit, 3)
         lines.append(
             f"| {_MARKS[check.status]} | {plain(check.name)} | {value} | {limit} "
             f"| {plain(check.meaning + suspect)} |"

@@ -291,7 +291,7 @@ def test_no_temporary_file_is_left(recording: Path) -> None:
 def test_the_sheet_escapes_what_markdown_would_read() -> None:
     text = sheet_markdown(make_sheet(), PATH)
     assert text.startswith("# a\\|b \\*x\\*: provisional\n")
-    row = "| ✗ fail | kt\\_vs\\_ke | 1.150 | 0.01000 | x \\| y; suspect: 2/sqrt\\(3\\) |"
+    row = "| ✗ fail | kt\\_vs\\_ke | 1.15 | 0.01 | x \\| y; suspect: 2/sqrt\\(3\\) |"
     assert row in text
     assert "| r\\_phase\\_ohm | 310.00 ± 0.80 mΩ | step |" in text
     assert text.index("Constants from this capture") < text.index("## Checks")
