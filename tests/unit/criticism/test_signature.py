@@ -98,5 +98,24 @@ def test_a_wave_that_windows_smooth_is_taken_from_the_maps_of_the_turn(
     assert one.after == pytest.approx((0.001 * wave).tolist())
 
 
+def test_what_an_effect_explains_wholly_comes_before_what_it_only_lessens(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of v_q ten volts go and ten stay, of v_d one goes and none stays."""
+    speed = np.linspace(5.0, 200.0, N)
+    step = np.sign(speed - 100.0)
+    told = iter(
+        [
+            [errors("vq_v", 20.0 * step), errors("vd_v", 1.0 * step)],
+            [errors("vq_v", 10.0 * step, seed=2), errors("vd_v", 0.0 * step, seed=3)],
+        ]
+    )
+    monkeypatch.setattr(module, "window_errors", lambda *_: next(told))
+    rung: Any = SimpleNamespace(around=SimpleNamespace(residual=np.empty(0)))
+    one = signature([segment("a.mcap")], (rung, rung), (EMPTY, EMPTY))
+    assert one is not None
+    assert one.signal == "vd_v"
+
+
 def test_without_cells_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found_in(monkeypatch, []) is None

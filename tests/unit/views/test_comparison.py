@@ -58,6 +58,16 @@ def test_each_signal_is_told_before_and_after() -> None:
     assert "before" not in comparison_text(without).splitlines()[1]
 
 
+def test_a_capture_counts_by_its_windows() -> None:
+    """Ninety windows of 1 mV and ten of 10 mV: sqrt(0.9 + 10) = 3.30 mV."""
+    errors = (
+        replace(error("a.mcap", 1e-3), n=90),
+        replace(error("b.mcap", 1e-2), n=10),
+    )
+    (row,) = comparison_view(replace(make_comparison(), errors=errors)).signals
+    assert row.rmse == "3.30 mV"
+
+
 def test_the_page_shows_sizes_moves_maps_and_the_worst_capture_of_each_signal() -> None:
     html = render_comparison(make_comparison(), links=(Link("Diagnosis", "../diagnosis/m.html"),))
     for words in (
