@@ -96,7 +96,8 @@ class RungError:
 class Signature:
     """What came with a rung, as people look at it: mean errors of a signal [unit] without it and
     with it, [n] each, `at` values of a variable, a glossary name [its unit]. `capture` is None
-    where it is of all captures together.
+    where it is of all captures together. With an `order` above 1, `at` is the angle [rad] within
+    one of so many waves a turn of the variable, laid over each other.
     """
 
     signal: str
@@ -106,10 +107,17 @@ class Signature:
     at: tuple[float, ...]
     before: tuple[float, ...]
     after: tuple[float, ...]
+    order: int = 1
+
+    @property
+    def x_name(self) -> str:
+        """What `at` is, as a name of the glossary's form."""
+        return self.variable if self.order == 1 else f"theta_in_one_of_{self.order}_waves_rad"
 
     def document(self) -> dict[str, Any]:
         """The JSON form: an extension of `contract/outputs.md`."""
         return {
+            "order": self.order,
             "signal": self.signal,
             "unit": self.unit,
             "variable": self.variable,

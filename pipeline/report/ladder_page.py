@@ -118,8 +118,8 @@ def _shown(rung: RungView) -> Shown:
     one: Signature = rung.signature
     before, after = np.array(one.before), np.array(one.after)
     series = (Series("", np.array(one.at), before, before - after),)
-    drawn = Evidence("", rung.title, one.variable, one.signal, "scatter", series, one.capture)
-    words = f"{quantity_words(one.signal)} over {quantity_words(one.variable)}"
+    drawn = Evidence("", rung.title, one.x_name, one.signal, "scatter", series, one.capture)
+    words = f"{quantity_words(one.signal)} over {quantity_words(one.x_name)}"
     where = one.capture or "all captures"
     return Shown(rung, chart(drawn), f"{words}, {where}")
 

@@ -28,7 +28,8 @@ ARITHMETIC = {
     "regression/normal_equations.py": {"_TIE"},  # rounding
     "regression/parallel.py": {"_THREADS"},  # how work is run
     "validation/free_run.py": {"_SEED"},
-    "validation/signature.py": {"_CELLS", "_FEWEST", "_TURN"},  # cells of a picture; a turn
+    # cells of a picture, when its waves are laid over each other; a turn
+    "validation/signature.py": {"_CELLS", "_FEWEST", "_TURN", "_MANY_WAVES", "_FINE"},
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
     "design/experiments.py": {"_SEED"},
 }

@@ -23,6 +23,8 @@ from pipeline.records.error_map import ErrorMap
 
 _CELLS, _FEWEST = 48, 6
 """Cells of a curve, and the fewest that make one. By judgement, for people to look at."""
+_MANY_WAVES, _FINE = 6, 72
+"""Waves a turn from which on they are laid over each other, and cells of one wave."""
 _TURN = 2.0 * math.pi
 _VARIABLES = (
     "omega_mech_rad_s",
@@ -47,6 +49,7 @@ class _Curve:
     after: Array
     count: Array
     noise: Array
+    order: int = 1
 
     @property
     def contrast(self) -> float:
@@ -93,6 +96,7 @@ def signature(
         tuple(best.at.tolist()),
         tuple((scale * best.before).tolist()),
         tuple((scale * best.after).tolist()),
+        best.order,
     )
 
 
@@ -188,18 +192,44 @@ def _turn_curves(records: tuple[LadderRung, LadderRung]) -> Iterator[_Curve]:
         if seen.sum() < _FEWEST:
             continue
         edges = np.array(one.x.edges)
-        at = (edges[1:] + edges[:-1]) / 2.0
-        none = np.zeros(int(seen.sum()))
-        yield _Curve(
+        whole = _Curve(
             one.signal,
             one.x.variable,
             None,
-            at[seen],
+            ((edges[1:] + edges[:-1]) / 2.0)[seen],
             one.mean[seen],
             other.mean[seen],
             one.count[seen].astype(float),
-            none,
+            np.zeros(int(seen.sum())),
         )
+        if (folded := _folded(whole, one.x.count)) is not None:
+            yield folded
+
+
+def _folded(curve: _Curve, cells: int) -> _Curve | None:
+    """A curve over a turn with its waves laid over each other, where there are many; None where the
+    cells are too few to see the shape of a wave.
+    """
+    change = np.zeros(cells)
+    change[np.floor(curve.at / _TURN * cells).astype(np.int64) % cells] = curve.before - curve.after
+    order = 1 + int(np.argmax(np.abs(np.fft.rfft(change))[1:]))
+    if order < _MANY_WAVES:
+        return curve
+    phase = np.mod(order * curve.at, _TURN)
+    _, cell = np.unique(np.round(phase / _TURN * _FINE) % _FINE, return_inverse=True)
+    count: Array = np.bincount(cell, curve.count).astype(np.float64)
+    if np.count_nonzero(count) < _FEWEST:
+        return None
+
+    def mean(values: Array) -> Array:
+        summed: Array = np.bincount(cell, curve.count * values) / count
+        return summed
+
+    # an angle on a circle has no mean of its own where the first and the last cell meet
+    at = mean(np.where(phase > _TURN * (1.0 - 0.5 / _FINE), phase - _TURN, phase))
+    before, after = mean(curve.before), mean(curve.after)
+    noise = np.zeros(at.size)
+    return _Curve(curve.signal, curve.variable, None, at, before, after, count, noise, order)
 
 
 def _key(one: ErrorMap) -> tuple[str, str]:

@@ -17,7 +17,6 @@ from pipeline.records.error_map import Bins, ErrorMap
 
 N, TURNS, INERTIA_KGM2 = 2000, 40, 3e-5
 EMPTY = LadderRung((), 1.0, {})
-TURN = Bins("theta_mech_rad", tuple(np.linspace(0.0, 2 * np.pi, 73).tolist()))
 
 
 def segment(capture: str, *, turning: bool = True) -> Any:
@@ -82,20 +81,48 @@ def test_an_error_of_acceleration_is_told_as_torque(monkeypatch: pytest.MonkeyPa
     assert one.before[0] == pytest.approx(-40.0 * INERTIA_KGM2, rel=0.01)
 
 
+def turn_maps(order: int, cells: int, variable: str) -> tuple[LadderRung, LadderRung]:
+    """Records whose torque has a wave over the angle, without and nearly without it."""
+    turn = Bins(variable, tuple(np.linspace(0.0, 2 * np.pi, cells + 1).tolist()))
+    middles = (np.array(turn.edges[1:]) + np.array(turn.edges[:-1])) / 2.0
+    wave = 0.01 * np.sin(order * middles)
+    count, chance = np.full(cells, 500), np.full(cells, 0.5)
+    loud = ErrorMap("torque_shaft_nm", "N·m", turn, None, count, wave, chance, 0.9, 0.1)
+    quiet = replace(loud, mean=0.001 * wave)
+    return replace(EMPTY, maps=(loud,)), replace(EMPTY, maps=(quiet,))
+
+
 def test_a_wave_that_windows_smooth_is_taken_from_the_maps_of_the_turn(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    middles = (np.array(TURN.edges[1:]) + np.array(TURN.edges[:-1])) / 2.0
-    wave = 0.01 * np.sin(12 * middles)
-    count, chance = np.full(72, 500), np.full(72, 0.5)
-    loud = ErrorMap("torque_shaft_nm", "N·m", TURN, None, count, wave, chance, 0.9, 0.1)
-    quiet = replace(loud, mean=0.001 * wave)
-    records = (replace(EMPTY, maps=(loud,)), replace(EMPTY, maps=(quiet,)))
+    records = turn_maps(2, 72, "theta_mech_rad")
     one = found_in(monkeypatch, [errors("vd_v", np.zeros(N))], records)
     assert one is not None
     assert (one.signal, one.variable, one.capture) == ("torque_shaft_nm", "theta_mech_rad", None)
-    assert one.before == pytest.approx(wave.tolist())
-    assert one.after == pytest.approx((0.001 * wave).tolist())
+    assert (one.order, one.x_name) == (1, "theta_mech_rad")
+    assert one.before == pytest.approx(records[0].maps[0].mean.tolist())
+    assert one.after == pytest.approx(records[1].maps[0].mean.tolist())
+
+
+def test_many_waves_a_turn_are_laid_over_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """84 waves in 480 cells are a zigzag; folded they are one wave with its shape."""
+    records = turn_maps(84, 480, "theta_mech_rad")
+    one = found_in(monkeypatch, [errors("vd_v", np.zeros(N))], records)
+    assert one is not None
+    assert (one.order, one.x_name) == (84, "theta_in_one_of_84_waves_rad")
+    assert len(one.at) >= 36
+    assert one.before == pytest.approx((0.01 * np.sin(one.at)).tolist(), abs=1e-3)
+    assert list(one.at) == sorted(one.at)
+
+
+def test_a_wave_of_which_the_cells_show_no_shape_is_not_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Twelve waves in 36 cells have three points each."""
+    records = turn_maps(12, 36, "theta_elec_rad")
+    one = found_in(monkeypatch, [errors("vd_v", np.linspace(-1.0, 1.0, N))], records)
+    assert one is not None
+    assert one.signal == "vd_v"
 
 
 def test_what_an_effect_explains_wholly_comes_before_what_it_only_lessens(
