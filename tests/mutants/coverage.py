@@ -58,7 +58,7 @@ class Coverage:
         if run and not at_import:
             return run
         run |= self.by_import[mutant.path]
-        if at_import:
+        if mutant.function.isupper():
             for path, line in _uses(root, mutant.function):
                 run |= self.by_line[path, line]
         return run or self.by_file[mutant.path]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
-from pipeline.estimation.mechanical.locked_rotor import HARMONICS, SOURCE, ripple_share
+from pipeline.estimation.mechanical.locked_rotor import HARMONICS, RIPPLES, SOURCE, ripple_share
 from pipeline.estimation.method import Method, over_x
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
@@ -42,10 +42,13 @@ REFERENCE_DEGC = 25.0
 STEP_1_K = 1e-5
 
 
-def torque(iq_a: Array, id_a: Array, warm: Array) -> tuple[Array, dict[str, Array]]:
+def torque(
+    iq_a: Array, id_a: Array, warm: Array, theta_elec_rad: Array | None = None
+) -> tuple[Array, dict[str, Array]]:
     """What a clamped shaft's torque is linear in.
 
     T = T0 + Kt (1 + α (T_m - 25)) i_q + K_r i_d i_q - s i_q³ - c sign(i_q)
+        + i_q Σ (a_n cos nε + b_n sin nε), n = 6, 12
 
     Parameters
     ----------
@@ -53,14 +56,16 @@ def torque(iq_a: Array, id_a: Array, warm: Array) -> tuple[Array, dict[str, Arra
         Rotor-frame currents, amplitude-invariant.
     warm : array [n], 1
         1 + α (T_m - 25 °C) of the magnets.
+    theta_elec_rad : array [n], rad, optional
+        Electrical angle ε that each row was clamped at.
 
     Returns
     -------
     base : array [n, 2 or 3]
         Columns of T0, Kt, and K_r where i_d moves.
     candidates : dict of array [n]
-        Columns that enter where a test asks for them: saturation (i_q³, i_q⁵), and friction that
-        holds torque back from the transducer.
+        Columns that enter where a test asks for them: saturation (i_q³, i_q⁵), friction that
+        holds torque back from the transducer, and the torque ripple of the angles.
 
     References
     ----------
@@ -71,6 +76,10 @@ def torque(iq_a: Array, id_a: Array, warm: Array) -> tuple[Array, dict[str, Arra
     if np.ptp(id_a) > policy().aligned.least_d_share * np.ptp(iq_a):
         base.append(id_a * iq_a)
     candidates = {"iq^3": iq_a**3, "iq^5": iq_a**5, "sign iq": np.sign(iq_a)}
+    if theta_elec_rad is not None:
+        for order in RIPPLES:
+            candidates[f"iq cos {order}"] = iq_a * np.cos(order * theta_elec_rad)
+            candidates[f"iq sin {order}"] = iq_a * np.sin(order * theta_elec_rad)
     return np.column_stack(base), candidates
 
 
@@ -85,6 +94,8 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     if rows.iq_a.size < LEAST_ROWS + len(captures) or rows.levels < LEAST_LEVELS:
         note = f"{rows.iq_a.size} rows of {rows.levels} currents; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    rows = rows.with_electrical_angle(pairs)
     alpha, alpha_budget = magnet_coefficient(known)
     base, candidates = rows.columns(alpha)
     chosen = needed_columns(
@@ -94,7 +105,6 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     kt = float(found.coefficients[1])
     if not found.full_rank or found.dof < 1 or kt == 0.0:
         return METHOD.nothing(GIVES, EXPERIMENT)
-    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     warmer = _solve(rows, alpha + STEP_1_K, chosen).coefficients[1]
     parts = [
         *_instruments(rows, captures, alpha, chosen),
@@ -111,7 +121,10 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Rows [n] of all tables, one after the other; `table` is the number of each row's table."""
+    """Rows [n] of all tables, one after the other; `table` is the number of each row's table.
+
+    `theta_elec_rad` is None where angles or pole pairs are not known.
+    """
 
     iq_a: Array
     id_a: Array
@@ -119,6 +132,7 @@ class _Rows:
     excess_k: Array
     theta_rad: Array
     table: NDArray[np.int64]
+    theta_elec_rad: Array | None = None
 
     @classmethod
     def of(cls, captures: Sequence[Capture]) -> _Rows:
@@ -134,9 +148,16 @@ class _Rows:
         reach = float(np.ptp(self.iq_a)) if self.iq_a.size else 0.0
         return np.unique(np.round(self.iq_a / (SAME * reach))).size if reach > 0.0 else 0
 
+    def with_electrical_angle(self, pole_pairs: int | None) -> _Rows:
+        """The rows with their electrical angle, where all angles and the pole pairs are known."""
+        if pole_pairs is None or not np.all(np.isfinite(self.theta_rad)):
+            return self
+        return replace(self, theta_elec_rad=pole_pairs * self.theta_rad)
+
     def columns(self, alpha_1_k: float) -> tuple[Array, dict[str, Array]]:
         """`torque` of these rows, with an offset a further table."""
-        base, candidates = torque(self.iq_a, self.id_a, 1.0 + alpha_1_k * self.excess_k)
+        warm = 1.0 + alpha_1_k * self.excess_k
+        base, candidates = torque(self.iq_a, self.id_a, warm, self.theta_elec_rad)
         offsets = [(self.table == n).astype(float) for n in range(1, int(self.table[-1]) + 1)]
         return np.column_stack([base, *offsets]), candidates
 

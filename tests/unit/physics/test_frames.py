@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.physics.frames import space_vector
+from pipeline.physics.frames import space_vector, vector_of_lines
 
 
 def _balanced(theta: np.ndarray, amplitude: float) -> list[np.ndarray]:
@@ -26,3 +26,15 @@ def test_power_needs_the_factor_three_halves() -> None:
     by_phase = sum(v * i for v, i in zip(volts, amps, strict=True))
     v, i = space_vector(*volts), space_vector(*amps)
     assert 1.5 * float((v * np.conj(i)).real) == pytest.approx(by_phase)
+
+
+@pytest.mark.parametrize("left_out", ["vab_v", "vbc_v", "vca_v", None])
+def test_two_lines_give_what_three_phases_do(left_out: str | None) -> None:
+    """Any two line voltages, or three with something common to them, are the phases' vector."""
+    a, b, c = (np.array([3.0, -1.0]), np.array([-1.5, 4.0]), np.array([-1.5, -3.0]))
+    common = 0.7 if left_out is None else 0.0
+    lines = {"vab_v": a - b + common, "vbc_v": b - c + common, "vca_v": c - a + common}
+    lines.pop(left_out or "", None)
+    assert vector_of_lines(lines) == pytest.approx(space_vector(a, b, c))
+    with pytest.raises(KeyError):
+        vector_of_lines({"vab_v": a})
