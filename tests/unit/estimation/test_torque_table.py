@@ -37,11 +37,9 @@ def test_intervals_hold_the_truth_over_benches_with_gains_of_their_own():
 
 
 def test_the_ripple_of_many_angles_is_no_scatter():
-    """1 % of a back-EMF's harmonics at seven angles: fitted, u is that of the instruments."""
-    rippled, _ = found(motor=MOTOR.having(bemf_harmonics=0.01))
-    smooth, _ = found()
-    assert rippled.u_a < 3.0 * smooth.u_a
-    assert rippled.u_a < 0.1 * rippled.u_b
+    """Harmonics of 1 % at seven angles: as noise they made u_a more than twice what gains make."""
+    kt, _ = found(motor=MOTOR.having(bemf_harmonics=0.01))
+    assert kt.u_a < 0.2 * kt.u_b
 
 
 def test_gains_are_in_the_budget_with_their_signs():
