@@ -54,6 +54,7 @@ PACKAGES = {
                 "tests/contracts",
                 "tests/unit/test_glossary.py",
                 "tests/faults/test_coverage.py",
+                "tests/faults/test_duplicates.py",
                 "tests/faults/test_gaps.py",
                 "tests/faults/test_phases.py",
                 "tests/faults/test_several_captures.py",

@@ -98,12 +98,13 @@ def test_packed_arrays_equal_the_library(sizes: list[int], random: Any) -> None:
 
 
 @pytest.mark.parametrize("n", [1, 5, 400])
-def test_unpacked_arrays_are_arrays_too(n: int) -> None:
-    """proto2 writers repeat the tag before every item."""
+@pytest.mark.parametrize("numbers", [(1, 2), (300, 301)])
+def test_unpacked_arrays_are_arrays_too(n: int, numbers: tuple[int, int]) -> None:
+    """proto2 writers repeat the tag before every item, of one byte or of two."""
 
     def fill(file: FileDescriptorProto) -> None:
         message = file.message_type.add(name="M")
-        for number, name in ((1, "ia_a"), (2, "t_s")):
+        for number, name in zip(numbers, ("ia_a", "t_s"), strict=True):
             part = add_field(message, name, number, F.TYPE_DOUBLE, F.LABEL_REPEATED)
             part.options.packed = False
 

@@ -108,6 +108,13 @@ def test_faults_of_the_rules(tmp_path: Path, rules: str, fault: str) -> None:
     assert any(fault in one for one in lint(written(tmp_path, text), CONSTANTS))
 
 
+@pytest.mark.parametrize(
+    "rules", ["{order_share: 0.05}", "{order_share: 0}", "{alpha: 0.4}", "{min_lots: 3}"]
+)
+def test_rules_inside_their_bounds_have_no_fault(tmp_path: Path, rules: str) -> None:
+    assert lint(written(tmp_path, f"required: []\nrules: {rules}\n"), CONSTANTS) == ()
+
+
 def test_every_fault_at_once(tmp_path: Path) -> None:
     text = "required: []\ngolden: [a, a]\nconstants: {nothing_v: {}, ld_h: {tolerance: -1}}\n"
     found = lint(written(tmp_path, text), CONSTANTS)

@@ -79,6 +79,24 @@ def test_readings_that_disagree_widen_the_uncertainty() -> None:
     assert found.u_of_contrast({"A": -1.0, "B": 1.0}) == pytest.approx(expected)
 
 
+def test_every_further_reading_is_a_degree_of_freedom() -> None:
+    """The ring read by two motors a side: chi² 1.2²/(3 s²) = 12 of four degrees, so √3."""
+    s = 0.2
+    pairs = (("A", "B", 1.0), ("B", "C", 1.0), ("C", "A", -0.8))
+    readings = [
+        reading
+        for motor in ("m", "n")
+        for low, high, gap in pairs
+        for reading in (
+            Reading(f"{motor}{low}", low, 3.0, s),
+            Reading(f"{motor}{low}", high, 3.0 + gap, s),
+        )
+    ]
+    found = station_correction(readings, [])
+    expected = math.sqrt(2.0 / 3.0) * s * math.sqrt(3.0)
+    assert found.u_of_contrast({"A": -1.0, "B": 1.0}) == pytest.approx(expected)
+
+
 def test_each_linked_set_stands_alone() -> None:
     readings = [
         Reading("m1", "A", 1.0, 0.1),

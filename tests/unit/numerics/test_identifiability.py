@@ -165,3 +165,11 @@ def test_fewer_rows_than_parameters_leave_the_rest_open():
 def test_a_size_of_nothing_is_refused():
     with pytest.raises(ValueError, match="size above zero"):
         identify(np.eye(2), np.array([1.0, 0.0]))
+
+
+def test_a_walk_moves_nothing_that_is_left_out_of_its_direction():
+    """What is in a product moves by its factor alone: the ends are each other's inverse."""
+    found = coast()
+    ratios = known_combinations(found, COAST, [0, 1, 2], [0])
+    up, down = (there for _, there in walked(found, COAST, ratios, math.log(3.0)))
+    assert up * down == pytest.approx(COAST**2, rel=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from pipeline.numerics.quantisation import (
     noise_after_rounding,
@@ -58,3 +59,25 @@ def test_the_step_is_the_least_spacing_and_not_the_rounding_of_a_sum() -> None:
     )
     assert resolution(np.ones(5)) == 0.0
     assert rounding_rms(0.0, 1.0) == 0.0
+
+
+def scatter_after(sigma: float) -> float:
+    """Of a rounded level in steps, over all levels alike: from the probability of each code."""
+    codes = np.arange(-15, 16)
+    squares = []
+    for level in np.linspace(-0.5, 0.5, 201):
+        above = norm.cdf((codes + 0.5 - level) / sigma) - norm.cdf((codes - 0.5 - level) / sigma)
+        squares.append(float(above @ codes**2 - (above @ codes) ** 2))
+    return float(np.sqrt(np.trapezoid(squares, dx=1.0 / 200.0)))
+
+
+@pytest.mark.parametrize("sigma", [0.08, 0.15, 0.3, 0.6, 1.5])
+def test_noise_before_the_converter_from_the_normal_integral(sigma: float) -> None:
+    assert noise_before_rounding(scatter_after(sigma), 1.0) == pytest.approx(sigma, rel=0.01)
+
+
+def test_much_noise_gains_a_twelfth_of_the_steps_square() -> None:
+    for share in (2.0, 3.0):
+        expected = STEP * np.sqrt(share**2 - 1.0 / 12.0)
+        assert noise_before_rounding(share * STEP, STEP) == pytest.approx(expected, rel=1e-12)
+    assert noise_before_rounding(0.7, 0.0) == 0.7

@@ -102,3 +102,10 @@ def test_blocks_are_means_and_at_most_two_thousand() -> None:
         (300, LOCKED),
         (309, MOTORING),
     ]
+
+
+def test_a_record_of_a_few_rows_is_told_row_by_row() -> None:
+    """Three blocks are the least of a long record; ten rows have no such thing as confetti."""
+    speed = np.array([100.0, 100.0, 0.0, 100.0, 100.0, 100.0])
+    told = regimes(speed, np.full(6, 3.0))
+    assert [(one.state, one.start) for one in told] == [(MOTORING, 0), (LOCKED, 2), (MOTORING, 3)]

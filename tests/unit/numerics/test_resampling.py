@@ -230,3 +230,23 @@ def test_coast_down_under_constant_drag_is_a_parabola_and_then_rest() -> None:
     theta, omega = coast_down(np.array([-1.0, 0.0, 1.0, 3.0, 5.0, 9.0]), 50.0, lambda w: 10 + 0 * w)
     assert omega == pytest.approx([50.0, 50.0, 40.0, 20.0, 0.0, 0.0], abs=1e-9)
     assert theta == pytest.approx([0.0, 0.0, 45.0, 105.0, 125.0, 125.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("factor", "joins"), [(1.02, True), (0.98, False)])
+def test_the_second_column_is_judged_with_the_first_one_in(factor: float, joins: bool) -> None:
+    """By its F(1, n - k - 2), from two least-squares fits; one candidate is left then."""
+    rng = np.random.default_rng(5)
+    n = 14
+    x, z = rng.standard_normal((2, n))
+    y = 3.0 * x + 0.8 * z + 0.6 * rng.standard_normal(n)
+    base = np.ones((n, 1))
+
+    def left(*columns: np.ndarray) -> float:
+        design = np.column_stack([base, *columns])
+        return float(np.sum((y - design @ np.linalg.lstsq(design, y, rcond=None)[0]) ** 2))
+
+    dof = n - 3
+    p = float(f.sf((left(x) - left(x, z)) / (left(x, z) / dof), 1.0, dof))
+    assert 1e-4 < p < 0.5
+    chosen = needed_columns(base, {"x": x, "z": z}, y, np.ones(n), factor * p)
+    assert chosen == (["x", "z"] if joins else ["x"])
