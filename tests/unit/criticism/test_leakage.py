@@ -41,11 +41,25 @@ def _aliases(tree: ast.AST) -> set[str]:
         if isinstance(node, ast.arg) and "CaptureMeta" in ast.unparse(node.annotation or node)
     }
     for node in ast.walk(tree):
-        if isinstance(node, ast.Assign) and _is_meta(node.value, names):
-            names |= {one.id for one in node.targets if isinstance(one, ast.Name)}
+        for target, value in _assigned(node):
+            if _is_meta(value, names) and isinstance(target, ast.Name):
+                names.add(target.id)
         if isinstance(node, ast.NamedExpr) and _is_meta(node.value, names):
             names.add(node.target.id)
     return names
+
+
+def _assigned(node: ast.AST) -> list[tuple[ast.AST, ast.AST]]:
+    """Targets of an assignment with their values, those of `a, b = c, d` one by one."""
+    if not isinstance(node, ast.Assign):
+        return []
+    pairs = []
+    for target in node.targets:
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+            pairs += zip(target.elts, node.value.elts, strict=True)
+        else:
+            pairs.append((target, node.value))
+    return pairs
 
 
 def reads_of(tree: ast.AST) -> tuple[set[str], set[str]]:
@@ -54,17 +68,18 @@ def reads_of(tree: ast.AST) -> tuple[set[str], set[str]]:
     """
     names = _aliases(tree)
     parent = {id(child): node for node in ast.walk(tree) for child in ast.iter_child_nodes(node)}
+    named = {id(value) for node in ast.walk(tree) for _, value in _assigned(node)}
     read, extra = set(), set()
     for node in ast.walk(tree):
         above = parent.get(id(node))
         if isinstance(node, ast.Attribute) and _is_meta(node.value, names):
-            read.add(node.attr)
+            read.add(_key(node, above) if node.attr == "instrument_u" else node.attr)
             if node.attr in ("extra", "stated_u_rel"):
                 extra.add(_key(node, above))
         elif _is_meta(node, names) and isinstance(getattr(node, "ctx", None), ast.Load):
             own = isinstance(above, ast.Call) and getattr(above.func, "id", "").startswith("_")
-            named = isinstance(above, ast.Assign | ast.NamedExpr)
-            if not isinstance(above, ast.Attribute) and not own and not named:
+            kept = id(node) in named or isinstance(above, ast.NamedExpr)
+            if not isinstance(above, ast.Attribute) and not own and not kept:
                 read.add("?")
         if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "nameplate":
             read.add(getattr(node.args[0], "value", "?"))
@@ -72,7 +87,7 @@ def reads_of(tree: ast.AST) -> tuple[set[str], set[str]]:
 
 
 def _key(extra: ast.AST, above: ast.AST | None) -> str:
-    """The key of `extra[KEY]` or `stated_u_rel(KEY)`."""
+    """The key of `extra[KEY]`, `stated_u_rel(KEY)` or `instrument_u(KEY)`."""
     if isinstance(above, ast.Subscript) and above.value is extra:
         return str(getattr(above.slice, "value", "?"))
     if isinstance(above, ast.Call) and above.func is extra and len(above.args) == 1:
@@ -92,6 +107,10 @@ def _key(extra: ast.AST, above: ast.AST | None) -> str:
         ("meta = capture.meta\nfor k in meta.extra: pass", {"extra"}, {"?"}),
         ("capture.meta.extra['truth']", {"extra"}, {"truth"}),
         ("capture.meta.stated_u_rel('truth')", {"stated_u_rel"}, {"truth"}),
+        ("meta, found = capture.meta, {}\nmeta.lot", {"lot"}, set()),
+        ("both = capture.meta, {}", {"?"}, set()),
+        ("capture.meta.instrument_u('u_rel_current')", {"u_rel_current"}, set()),
+        ("capture.meta.instrument_u(key)", {"?"}, set()),
         ("capture.meta.stated_u_rel(key)", {"stated_u_rel"}, {"?"}),
         ("ask = capture.meta.stated_u_rel\nask('truth')", {"stated_u_rel"}, {"?"}),
         ("more = capture.meta.extra\nmore['truth']", {"extra"}, {"?"}),

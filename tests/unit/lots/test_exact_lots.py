@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import nct, ttest_ind
 from scipy.stats import t as student
 
+from pipeline.lots.assess import _p_value
 from pipeline.lots.cogging import cogging_bands, order_levels
 from pipeline.lots.regression import compare_lots
 from pipeline.lots.traits import Shown, compare_traits, orders_shown
@@ -211,3 +212,10 @@ def test_the_headline_counts_lots() -> None:
     )
     assert one.headline.startswith("Lot N: ")
     assert two.headline.startswith("Lots N, M: ")
+
+
+@pytest.mark.parametrize("difference", [-0.9, 0.0, 0.4, 1.3])
+def test_a_difference_of_motors_has_the_two_sided_p_of_student(difference: float) -> None:
+    expected = 2.0 * student.sf(abs(difference) / 0.5, 7.0)
+    assert _p_value(difference, 0.5, 7.0) == pytest.approx(expected, rel=1e-9)
+    assert _p_value(difference, 0.0, 7.0) == float(difference == 0.0)
