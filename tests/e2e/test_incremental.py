@@ -14,6 +14,8 @@ from pipeline.execution.worker_pool import WorkerPool
 from pipeline.stages import run
 
 WORDS = ("report=true", "recordings=false")
+CLEAN: dict[object, tuple[int, dict[str, bytes]]] = {}
+"""Clean runs by the bytes of their input and their words."""
 
 
 class Folder:
@@ -40,17 +42,28 @@ class Folder:
         self.worked.clear()
         code = main(["run", f"input={self.input}", f"output={self.output}", *WORDS, *more])
         worked = list(self.worked)
-        clean = self.place / "clean"
-        shutil.rmtree(clean, ignore_errors=True)
-        words = [f"input={self.input}", f"output={clean}", *WORDS, *more, "cache=false"]
-        assert main(["run", *words]) == code
-        assert results(self.output) == results(clean)
+        assert (code, results(self.output)) == self.clean(*more)
         return worked
+
+    def clean(self, *more: str) -> tuple[int, dict[str, bytes]]:
+        """Exit code and results of a clean run, which hang on bytes and words alone: done once."""
+        content = {p.relative_to(self.input).as_posix(): p.read_bytes() for p in files(self.input)}
+        key = (tuple(sorted(content.items())), more)
+        if key not in CLEAN:
+            output = self.place / "clean"
+            shutil.rmtree(output, ignore_errors=True)
+            words = [f"input={self.input}", f"output={output}", *WORDS, *more, "cache=false"]
+            code = main(["run", *words])
+            CLEAN[key] = code, results(output)
+        return CLEAN[key]
+
+
+def files(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
 
 
 def results(output: Path) -> dict[str, bytes]:
-    files = (path for path in output.rglob("*") if path.is_file())
-    named = {path.relative_to(output).as_posix(): path.read_bytes() for path in files}
+    named = {path.relative_to(output).as_posix(): path.read_bytes() for path in files(output)}
     return {k: v for k, v in named.items() if not k.startswith((".cache/", "registry/"))}
 
 
@@ -64,6 +77,8 @@ ONE, TWO = "motor gimbal/one", "motor gimbal/two"
 
 
 def test_nothing_changed_nothing_done(folder: Folder, capsys: pytest.CaptureFixture[str]) -> None:
+    folder.clean()
+    capsys.readouterr()
     assert folder.run() == [LOOK, ONE, TWO]
     first = capsys.readouterr()
     assert folder.run() == []
@@ -124,7 +139,7 @@ def test_results_that_are_not_whole_are_made_again(folder: Folder, kind: str) ->
 def test_notes_are_not_believed_blindly(folder: Folder) -> None:
     """Every note replaced by another of its kind, or by noise: the work is done again."""
     folder.run()
-    notes = [p for p in (folder.output / ".cache").rglob("*") if p.is_file()]
+    notes = files(folder.output / ".cache")
     assert len(notes) == 8  # survey, batch, and of each motor: it, its fits, its model
     for note in notes:
         note.write_bytes(note.read_bytes().replace(b"gimbal", b"gimbol"))

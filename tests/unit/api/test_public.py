@@ -34,6 +34,11 @@ def fits(recordings):
     return pipeline.fit(recordings)
 
 
+@pytest.fixture(scope="module")
+def sheets(fits):
+    return pipeline.check(fits)
+
+
 def test_every_public_name_is_there():
     assert all(callable(getattr(pipeline, name)) for name in pipeline.__all__)
     assert set(pipeline.__all__) <= set(dir(pipeline))
@@ -73,11 +78,11 @@ def test_the_examples_in_docstrings_run(name, monkeypatch):
     assert result.failed == 0
 
 
-def test_a_run_and_the_functions_give_the_same_datasheet(recordings, fits, tmp_path):
+def test_a_run_and_the_functions_give_the_same_datasheet(sheets, tmp_path):
     """To the byte: version, constants, checks and reasons."""
     captures = tmp_path / "captures"
     shutil.copytree(DEMO / MOTOR, captures / MOTOR)
-    sheet = pipeline.check(fits)[MOTOR]
+    sheet = sheets[MOTOR]
     output = tmp_path / "out"
     words = ["recordings=false", "report=false", "workers=1"]
     assert main(["run", f"input={captures}", f"output={output}", *words]) in (0, 1)
@@ -85,9 +90,7 @@ def test_a_run_and_the_functions_give_the_same_datasheet(recordings, fits, tmp_p
     assert json.loads(json.dumps(sheet.document())) == written
     loaded = pipeline.load(output)
     assert loaded[MOTOR] == sheet or loaded[MOTOR].document() == sheet.document()
-    assert loaded.constants.filter(pl.col("motor_id") == MOTOR).equals(
-        pipeline.check(fits).constants
-    )
+    assert loaded.constants.filter(pl.col("motor_id") == MOTOR).equals(sheets.constants)
 
 
 def test_frames_are_tidy_and_agree_with_the_records(recordings, fits):
