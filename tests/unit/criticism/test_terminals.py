@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segments import segments
 from pipeline.criticism.equations.residuals import residual
+
+from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.machine.model import Model
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import record
