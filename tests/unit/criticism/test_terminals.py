@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipeline.criticism.data.segments import segments
-from pipeline.criticism.equations.residuals import residual
 
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.residuals.segments import segments
 from pipeline.records.constants import Constants
 from pipeline.simulator.bench import record
 from tests.simulated import QUIET, campaign_of, design
