@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from pipeline.lots.bounds import conformity, hold
+from pipeline.lots.bounds import Held, _inside, conformity, hold
 from pipeline.lots.guard import Tolerance, risks
 from pipeline.lots.sample import Value
 from pipeline.records.limits import Amount, ConstantLimits
@@ -111,3 +111,12 @@ def test_conformity_counts_names_the_worst_and_tells_the_risks() -> None:
     assert (fine.worst, fine.worst_motor, fine.risk_false_accept) == ("pass", None, None)
     nobody = conformity(found, [], numbers, 0.0, None)
     assert (nobody.worst, nobody.worst_motor, nobody.counts) == ("not_evaluated", None, ())
+
+
+@pytest.mark.parametrize(
+    ("value", "inside"), [(1.0, 0.1), (1.05, 0.05), (0.93, 0.03), (1.2, -0.1), (0.8, -0.1)]
+)
+def test_how_far_inside_counts_to_the_nearer_limit(value: float, inside: float) -> None:
+    held = Held(None, None, {}, Tolerance(0.9, 1.1))
+    assert _inside(held, value) == pytest.approx(inside)
+    assert _inside(Held(None, None, {}, None), value) == 0.0

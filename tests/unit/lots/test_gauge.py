@@ -70,6 +70,16 @@ def test_verdict_and_interval() -> None:
     assert study(READINGS) == found
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1e3])
+def test_a_study_has_no_unit(unit: float) -> None:
+    """Micro-ohms or kilo-ohms: shares, interval and verdict are the same."""
+    here, there = study(READINGS), study(unit * READINGS)
+    for name in ("percent", "percent_low", "percent_high"):
+        assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-9)
+    assert there.verdict == here.verdict
+    assert there.rr == pytest.approx(unit * here.rr, rel=1e-9)
+
+
 def test_interval_covers() -> None:
     """95 % intervals of the share cover the truth in 90 to 99.5 % of 150 simulated studies."""
     rng = np.random.default_rng(11)

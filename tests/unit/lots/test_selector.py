@@ -166,3 +166,11 @@ def test_a_selector_has_4096_characters() -> None:
     assert parse_selector(f"{long} ", SHELF).takes(SHELF[0])
     with pytest.raises(UsageError, match="too long"):
         parse_selector(f"{long}  ", SHELF)
+
+
+def test_any_of_several_codes_or_days_will_do() -> None:
+    for text in ("code:0.1.0+ab,0.2.0", "date:2026-03-01,2026-03-05"):
+        query = parse_selector(text, SHELF)
+        assert query.takes_content("0.2.0+ffff", "2026-03-05T08:00:00Z")
+        assert query.takes_content("0.1.0+abcd", "2026-03-01T08:00:00Z")
+        assert not query.takes_content("0.3.0", "2026-03-03T08:00:00Z")
