@@ -30,7 +30,8 @@ changed. {count} mutants a package and seed; the same seed draws the same ones w
 the code promises; each was judged by a person, with the reason, in `tests/mutants/judged.yaml`. The
 rate is killed / (drawn - equivalent); at least 85 % is asked. The tests of a mutant stop at
 {limit:g} s of CPU time, measured under a tracer, the quickest first. A mutant that does not end
-counts as killed.
+counts as killed. A seed is measured once, before tests are added because of it; what these are
+worth the next seed shows, which they have not seen.
 
 """
 
