@@ -15,6 +15,8 @@ READS = {
     # what the station states of its own instruments
     *("voltage_kind", "u_rel_current", "u_rel_voltage", "u_rel_torque", "u_temp_degc"),
     *("u_rel_clock", "stated_u_rel"),
+    # what it states of its inverter
+    *("vdc_v", "pwm_hz"),
 }
 EXTRA = {"u_rel_lcr"}
 """Keys beyond the contract, each asked for by name: `meta.extra[KEY]`, `meta.stated_u_rel(KEY)`."""
