@@ -6,16 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.criticism.data.q_log import QLog, in_time, q_log
+from pipeline.criticism.data.q_log import in_time, q_log
 from pipeline.criticism.data.segment import Segment, segment_of
-from pipeline.criticism.data.traces import (
-    even_clock,
-    prepared,
-    shaft_angle,
-    thinned,
-    window_of,
-    with_angle,
-)
+from pipeline.criticism.data.traces import thinned, window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes
 from pipeline.criticism.machine.model import Model, Pieces, clock_gain
@@ -34,26 +27,19 @@ TORQUE, RECORDER = "torque_shaft_nm", "log"
 _MOTION_WINDOWS, _PAD = 160, 8
 """Windows of the motion at the most, and samples kept at either side. By judgement: cost goes with
 both, and the angle's second difference needs a few beyond a window."""
-_LEAST_RAD = 0.1
-"""Angle that a shaft must turn for its motion to tell of drags, as for the torque of a log."""
 _FINEST = 6
 """Parts of a log's sample at the most: a bound of the cost, by judgement."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Angle and current, in a selection of the windows: waves of the angle are dear at speed.
+    """Angle and q current, in a selection of the windows: waves of the angle are dear at speed.
 
     Only where there is an angle, and no transducer: with one the shaft is not known to run free.
-    Logs of both axes are held out as a whole, as their voltages are.
     """
-    if capture.has(TORQUE):
-        return None
-    both = capture.has("vd_v", "id_a")
-    log = _both_axes(capture, machine) if both else q_log(capture, machine)
+    log = None if capture.has(TORQUE) else q_log(capture, machine)
     if log is None or not log.angle:
         return None
-    names = ("theta_mech_rad", "id_a", "iq_a", "travel_rad", "run")
-    shaft = {name: log.columns[name] for name in names if name in log.columns}
+    shaft = {name: log.columns[name] for name in ("theta_mech_rad", "iq_a", "travel_rad", "run")}
     shaft["row"] = np.arange(log.keep.size, dtype=float)
     window = window_of(log.period_s, log.keep.size)
     shaft, starts = thinned(shaft, log.keep, window, _MOTION_WINDOWS, _PAD)
@@ -68,20 +54,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         sensors=log.sensors,
         channels=(TORQUE,),
         weak=weak,
-        blocks=None if both else blocks,
+        blocks=blocks,
     )
-
-
-def _both_axes(capture: Capture, machine: Machine) -> QLog | None:
-    """Angle and currents of a log of both axes; None where it has no angle or hardly turns."""
-    names = with_angle(capture, ["id_a", "iq_a"])
-    if not any("theta" in name for name in names):
-        return None
-    period, found, keep = even_clock(capture, tuple(names))
-    shaft_angle(found, period, machine)
-    if float(np.ptp(found["theta_mech_rad"])) < _LEAST_RAD:
-        return None
-    return QLog(period, found, keep, prepared(found, period), speed=False, angle=True)
 
 
 def state(
