@@ -64,7 +64,10 @@ def test_other_seeds_are_another_block():
 @pytest.mark.parametrize(
     ("changed", "drawn_anew"),
     [
-        ("pipeline.estimation.estimators.resistance", {"resistance", "heat_run", "thermal"}),
+        (
+            "pipeline.estimation.estimators.resistance",
+            {"resistance", "soak", "heat_run", "thermal"},
+        ),
         ("pipeline.estimation.estimators.spin_down", {"spin_down"}),
         ("pipeline.estimation.electrical.step_model", {"current_step"}),
         ("pipeline.simulator.sensors", set(CASES)),
