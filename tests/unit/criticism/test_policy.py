@@ -61,7 +61,7 @@ def test_a_command_hands_it_on(tmp_path):
 
     def judge(task):
         seen.append(task.spec)
-        return Judged("", undecided=False)
+        return Judged(document={}, text="", undecided=False)
 
     settings = DiagnoseSettings(
         input="data/demo",
@@ -70,5 +70,5 @@ def test_a_command_hands_it_on(tmp_path):
         model=ModelSettings(name="ideal"),
         policy={"selection": {"tie": 9.0}},
     )
-    each_motor(settings, judge, "pipeline.criticism.diagnosis")
+    each_motor(settings, judge, "pipeline.criticism.diagnosis", "diagnosis")
     assert [spec.policy for spec in seen] == [(("selection.tie", 9.0),)]
