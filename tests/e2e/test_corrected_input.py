@@ -50,7 +50,6 @@ class Hall:
         self.input, self.output, self.conf = folder / "in", folder / "out", folder / "conf"
         self.input.mkdir()
         shutil.copytree(configuration_folder(), self.conf)
-        monkeypatch.setattr("pipeline.stages.run.configuration_folder", lambda: self.conf)
         monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "home"))
         self.state("A")
         rng = np.random.default_rng(7)
@@ -78,6 +77,7 @@ class Hall:
 
     def run(self, output: Path | None = None, *more: str) -> int:
         words = [f"input={self.input}", f"output={output or self.output}", "workers=1"]
+        words.append(f"config_dir={self.conf}")
         return main(["run", *words, "report=false", "recordings=false", *more])
 
     def sheet(self, output: Path | None = None) -> tuple[bytes, dict[str, Any]]:

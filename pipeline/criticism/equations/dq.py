@@ -84,9 +84,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     made = segment_of(
         capture, "dq", "drive", period, found=found, sensors=told, channels=channels, weak=weak
     )
-    # of the magnet, as large as the machine's voltage and speed say
-    ke = machine.pole_pairs * machine.scales["flux_wb"]
-    return replace(made, whole=whole, log=log, fixed={**made.fixed, "ke_v_s_rad": ke})
+    return replace(made, whole=whole, log=log)
 
 
 def state(

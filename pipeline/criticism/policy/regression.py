@@ -153,18 +153,6 @@ class NoiseFloors:
         meaning="prior of a sensor's offset in one capture",
         why="larger lets offsets explain a drag; with none an offset passes for an effect",
     )
-    magnet_k: float = chosen(
-        5.0,
-        unit="K",
-        meaning="prior of a magnet's temperature over the ambient one, in a log that has none",
-        why="a rotor warms by some kelvin a test; with none, ψ of two logs 0.2 % apart is unknown",
-    )
-    magnet_coefficient_1_k: float = chosen(
-        1.2e-3,
-        unit="1/K",
-        meaning="share of the magnet's flux that goes with a kelvin where its temperature is prior",
-        why="NdFeB 0.9e-3 to 1.2e-3, ferrite 2e-3",
-    )
     terminal_offset: float = chosen(
         2e-3,
         unit="1",

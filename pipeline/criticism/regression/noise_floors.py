@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, clock, projected, row_index
+from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
 from pipeline.criticism.effect import Array, Effect, Operating, Values
 from pipeline.criticism.library.equations import equation_of
@@ -250,8 +250,6 @@ def offsets(
         return own + made
     if segment.weak is None:
         return []
-    if segment.kind == "dq" and "temp_magnet_degc" not in segment.recorded:
-        made += [projected(segment, one)[valid] * whiten for one in _warmed(segment, policy)]
     for place, channel in enumerate(segment.channels):
         offset = channel_of(segment, channel).offset
         prior = policy.offset * segment.noise.get(channel, 0.0)
@@ -263,21 +261,6 @@ def offsets(
         constant[place] = prior
         made.append(projected(segment, constant)[valid] * whiten)
     return made
-
-
-def _warmed(segment: Segment, policy: NoiseFloors) -> list[Array]:
-    """What a magnet of unknown temperature may do to a log's voltages and torque [C, n each].
-
-    It may be off by as much throughout, and by half of that more at the end than at the start.
-    """
-    share = policy.magnet_k * policy.magnet_coefficient_1_k
-    speed = np.gradient(segment.recorded["theta_mech_rad"], segment.ts_s)
-    ke = share * segment.fixed.get("ke_v_s_rad", 0.0)
-    rows = {"vq_v": ke * speed, "torque_shaft_nm": 1.5 * ke * segment.recorded["iq_a"]}
-    even = np.stack([rows.get(name, np.zeros(segment.size)) for name in segment.channels])
-    time = clock(segment)
-    late = (time - time.mean()) / max(float(np.ptp(time)), segment.ts_s)
-    return [even, 0.5 * late * even] if np.any(even) else []
 
 
 def window_gain(segment: Segment) -> float:
