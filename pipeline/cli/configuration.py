@@ -193,6 +193,8 @@ def _composed(command: Command, overrides: list[str], config_dir: str | None) ->
     try:
         with initialize_config_dir(str(folder.resolve()), version_base="1.3"):
             config = compose(None, overrides=overrides)
+        if "${" in repr(OmegaConf.to_container(config, resolve=False)):
+            raise UsageError(f"{config_dir} holds ${{...}}", "write the value itself")
         made: Settings = typing.cast(Settings, OmegaConf.to_object(config))
     except (HydraException, OmegaConfBaseException) as error:
         reasons = [str(one).splitlines()[0].rstrip(".") for one in (error, error.__cause__) if one]

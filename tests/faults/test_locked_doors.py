@@ -93,7 +93,6 @@ def test_hostile_serial_numbers(
         "~report",
         "hydra.run.dir=/tmp/elsewhere",
         "+hydra/launcher=evil",
-        "--config-dir=/tmp",
         "--multirun",
     ],
 )
@@ -107,6 +106,21 @@ def test_the_command_line_reaches_no_resolver_and_no_target(
     assert line.startswith("error: ")
     assert os.environ.get("HOME", "/root") + "/" not in line.replace(str(tmp_path), "")
     assert not output.exists()
+
+
+@pytest.mark.parametrize("value", ["${oc.env:HOME}", "{_target_: os.system}"])
+def test_a_configuration_folder_reaches_no_resolver_and_no_target(
+    value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file of the user's own folder holds values and nothing that is looked up or called."""
+    (tmp_path / "conf" / "model").mkdir(parents=True)
+    (tmp_path / "conf" / "model" / "own.yaml").write_text(f"name: {value}\n")
+    words = [f"input={tmp_path}", f"output={tmp_path / 'out'}", "model=own"]
+    assert main(["run", *words, f"--config-dir={tmp_path / 'conf'}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ")
+    assert os.environ.get("HOME", "/root") + "/" not in line.replace(str(tmp_path), "")
+    assert not (tmp_path / "out").exists()
 
 
 def test_text_keys_are_taken_as_typed() -> None:

@@ -96,8 +96,8 @@ def segment_of(
     stated = capture.meta.ambient_degc
     ambient = 0.0 if stated is None else stated - _REFERENCE_DEGC
     timing, pwm_hz = capture.meta.voltage_timing, capture.meta.pwm_hz
-    if pwm_hz and capture.meta.vdc_v:
-        fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v}
+    if pwm_hz:
+        fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}
     return Segment(
         capture.path,
         capture.meta.test,

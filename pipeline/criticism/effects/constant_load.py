@@ -27,4 +27,5 @@ EFFECT = Effect(
         "torque_offset": "the transducer read with the load taken off",
     },
     torque=_torque,
+    headline="a load of {torque_nm} in one direction",
 )

@@ -31,4 +31,6 @@ EFFECT = Effect(
         "torque_offset": "coasts in both senses, which no transducer sees",
     },
     torque=_torque,
+    headline="friction that differs by direction, by {coulomb_nm} and at the highest speed "
+    "{viscous_nm} more",
 )

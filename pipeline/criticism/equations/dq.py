@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +32,6 @@ from pipeline.criticism.signals.true_state import (
     operating,
 )
 from pipeline.criticism.signals.voltage import (
-    RIPPLES,
     ahead,
     central,
     forward,
@@ -46,6 +44,8 @@ from pipeline.records.capture import Capture
 
 VOLTS = ("vd_v", "vq_v")
 TORQUE = "torque_shaft_nm"
+_SLOWER = 0.75
+"""A log is slower than the PWM where a PWM period is below this part of its own."""
 _WINDOWS_MAP, _WINDOWS_LOG = 48, 32
 """Windows of a map, and of a drive's log, at the most. By judgement: cost goes with them, and a
 programme has several logs."""
@@ -128,34 +128,51 @@ def predicted(
 
 
 def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Complex:
-    """Rotor-frame voltage [n, V] that is held in the stationary frame while the rotor turns.
+    """Rotor-frame voltage [n, V] of vectors that the stationary frame holds as the rotor turns.
 
-    Its mean is shorter by sinc of half the turn; `ripple_edge` and `ripple_shift` are what the log
-    samples otherwise.
+    A log that is slower than the PWM has the mean of such vectors in the rotor frame. `ripple_edge`
+    and `ripple_shift` are what the log samples otherwise.
     """
     period, held = segment.ts_s, segment.timing == "held"
     difference = forward if held else central
-    omega, turn, shrink = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
+    omega, turn = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
     voltage = (held_voltage if held else rotor_voltage)(pieces, omega, period)
-    if any(values[name] for name in RIPPLES):
-        shrink = shrink - values["ripple_edge"] * turn**2
+    edge, shift = values["ripple_edge"], values["ripple_shift"]
+    averaged = 1.0 if segment.timing != "instant" else 0.0
+    mean: Complex = _shortened((averaged / 24.0 + edge) * turn**2) * voltage
+    if shift:
         psi = ahead(pieces.psi_wb) if held else pieces.psi_wb
-        lag = values["ripple_shift"] * 1j * psi * np.gradient(turn) / period
-        mean: Complex = shrink * voltage - lag
-    else:
-        mean = shrink * voltage
+        mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)
     return mean
+
+
+def _shortened(lost: Array) -> Array:
+    """What is left [n] of a vector's mean over a turn φ [rad] of which `lost` is φ²/24.
+
+    Notes
+    -----
+    sinc: sin(φ/2) / (φ/2), continued to a mean that is too long: sinh for a negative φ².
+
+    """
+    half = np.sqrt(6.0 * np.abs(lost))
+    left: Array = np.where(lost > 0.0, np.sinc(half / math.pi), 1.0)
+    longer = lost < 0.0
+    left[longer] = np.sinh(half[longer]) / half[longer]
+    return left
+
+
+def _hold_s(segment: Segment) -> float:
+    """Time [s] for which a voltage vector is held: a PWM period, or that of a log as fast."""
+    pwm_s = segment.fixed.get("pwm_s", math.inf)
+    return pwm_s if pwm_s < _SLOWER * segment.ts_s else segment.ts_s
 
 
 def _pace(
     segment: Segment, x: Operating, difference: Callable[[Array, float], Array]
-) -> tuple[Array, Array, Any]:
-    """Electrical speed [n, rad/s], what it turns in a sample period [n, rad], and what is left of
-    a voltage's mean while it turns.
-    """
-    turn = x.machine.pole_pairs * x.omega_rad_s * segment.ts_s
-    shrink = np.sinc(turn / (2 * math.pi)) if segment.timing != "instant" else 1.0
-    return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn, shrink
+) -> tuple[Array, Array]:
+    """Electrical speed [n, rad/s], and what it turns [n, rad] while a voltage vector is held."""
+    turn = x.machine.pole_pairs * x.omega_rad_s * _hold_s(segment)
+    return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn
 
 
 def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> Array:

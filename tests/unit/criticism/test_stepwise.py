@@ -90,7 +90,7 @@ def test_a_small_effect_matters_where_it_takes_what_would_be_told_as_a_remainder
 def test_what_a_small_effect_explains_is_not_named_after_another():
     """Windage that is too small to matter leaves friction its second best explanation."""
     segments = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
-    start = cautious(segments, 3.0)
+    start = cautious(segments, 2.0)
     without = {k: v for k, v in LIBRARY.items() if k != "windage"}
     other = search(segments, start, without)[-1].added
     assert other

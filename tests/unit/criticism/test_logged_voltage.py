@@ -1,0 +1,69 @@
+"""What a voltage in a drive's log stands for: vectors that are held for a PWM period."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.equations.dq import _shortened
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.residuals.residual import residual
+from tests.unit.criticism.machines import BASE, log, machine
+
+EVERY = 60
+PAIRS = 7
+
+
+def slow(pwm_s: float | None, timing: str = "centred") -> Segment:
+    """A log of 3 ms of a shaft that turns by up to 2.1 rad, electrical, in that time.
+
+    Its voltages are those in the rotor frame: a vector that is held for 50 us loses nothing.
+    """
+    fast = log()
+    fixed = dict(fast.fixed) if pwm_s is None else {**fast.fixed, "pwm_s": pwm_s}
+    recorded = {name: column[::EVERY] for name, column in fast.recorded.items()}
+    return replace(
+        fast, ts_s=EVERY * fast.ts_s, recorded=recorded, fixed=fixed, timing=timing, weak=None
+    )
+
+
+def left(segment: Segment, **changed: float) -> float:
+    """Largest voltage that is left of the q axis [V], away from the ends."""
+    found = residual(segment, Model(machine(), ()), {**BASE, **changed})
+    return float(np.abs(found[1, 2:-2]).max())
+
+
+def test_a_log_slower_than_the_pwm_holds_means_in_the_rotor_frame() -> None:
+    assert np.abs(slow(5e-5).recorded["vq_v"]).max() > 4.5
+    assert left(slow(5e-5)) < 1e-3
+    assert left(slow(3e-3)) > 0.5, "a vector held for as long as the log's period is shorter"
+
+
+def test_where_the_pwm_is_not_known_the_data_decide() -> None:
+    """`ripple_edge` goes from a vector held for a whole period, 0, to one that is not, -1/24."""
+    assert left(slow(None)) > 0.5
+    assert left(slow(None), ripple_edge=-1.0 / 24.0) == pytest.approx(left(slow(None, "instant")))
+    assert left(slow(None), ripple_edge=-1.0 / 24.0) < 1e-3
+
+
+def test_a_log_as_fast_as_the_pwm_holds_one_vector_a_period() -> None:
+    """Of the mean of a vector over a turn φ there is left sin(φ/2) / (φ/2)."""
+    one, all_ = slow(3e-3), slow(5e-5)
+    speed = PAIRS * np.gradient(one.recorded["theta_mech_rad"], one.ts_s)
+    model = Model(machine(), ())
+    shrunk, whole = (one.recorded["vq_v"] - residual(each, model, BASE)[1] for each in (one, all_))
+    half = 0.5 * speed[3:-3] * one.ts_s
+    held = 0.5 * speed[3:-3] * 5e-5
+    expected = np.sin(half) / half / (np.sin(held) / held)
+    assert (shrunk / whole)[3:-3] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("turn", [1e-6, 0.3, 2.4])
+def test_what_is_left_of_a_mean_has_one_form_through_zero(turn: float) -> None:
+    lost = np.array([turn**2 / 24.0, 0.0, -(turn**2) / 24.0])
+    half = turn / 2.0
+    assert _shortened(lost) == pytest.approx([math.sin(half) / half, 1.0, math.sinh(half) / half])
