@@ -223,6 +223,8 @@ ELSEWHERE = {
     "workers": "workers=3",
     "cache": "cache=false",
     "timings": "timings=true",
+    "json": "json=true",
+    "config_dir": "config_dir={place}/in_another_place",
     "registry_options": "registry_options.timeout=30s",
 }
 
@@ -233,6 +235,7 @@ def test_what_no_key_holds_changes_no_byte(hall: Hall, tmp_path: Path, name: str
     assert set(ELSEWHERE) | OF_DASK == keys.NOT_OF_A_BATCH
     assert {"input", "output", "key", "refused"} == keys.NOT_OF_A_MOTOR
     shutil.copytree(hall.input, tmp_path / "moved")
+    shutil.copytree(hall.conf, tmp_path / "in_another_place")
     output = tmp_path / ("another" if name == "output" else "out")
     words = ["report=true", ELSEWHERE[name].format(place=tmp_path)]
     hall.run(tmp_path / "plain", "report=true")

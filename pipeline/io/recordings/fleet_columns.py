@@ -25,6 +25,6 @@ SHOWN = (
     Shown("psi_pm_wb", "psi_pm_mwb", "ψ [mWb]", 1e3),
     Shown("kt_peak_nm_a", "kt_peak_mnm_a", "Kt [mN·m/A]", 1e3),
     Shown("cogging_amplitude_nm", "cogging_mnm", "cogging [mN·m]", 1e3),
-    Shown("j_rotor_kgm2", "j_rotor_1e6_kgm2", "J [×10⁻⁶ kg·m²]", 1e6),
+    Shown("j_rotor_kgm2", "j_rotor_1e6_kgm2", "J [1e-6 kg·m²]", 1e6),
     Shown("torque_coulomb_nm", "torque_coulomb_mnm", "friction [mN·m]", 1e3),
 )
