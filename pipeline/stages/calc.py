@@ -29,11 +29,6 @@ def main(settings: CalcSettings) -> Outcome:
     return Outcome(text=text, result=answer)
 
 
-def calculate(kind: str, mapping: Mapping[str, str]) -> str:
-    """The printed answer of `answered`."""
-    return answered(kind, mapping)[0]
-
-
 def answered(kind: str, mapping: Mapping[str, str]) -> tuple[str, Answer | None]:
     """The printed answer of one calculator for the keys as typed, and the answer itself.
 

@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from pipeline.execution.captures import ReadTask, usable_captures
 from pipeline.execution.pools import Cluster, core_count, open_pool
@@ -24,9 +24,6 @@ from pipeline.records.errors import MachineError, UsageError, meant
 from pipeline.records.finding import Finding, lines_of
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.console import nothing_usable
-
-if TYPE_CHECKING:
-    pass
 
 
 class Gathered(NamedTuple):

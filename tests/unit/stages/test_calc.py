@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.records.errors import UsageError
-from pipeline.stages.calc import KINDS, calculate
+from pipeline.stages.calc import KINDS, answered
 
 POSITIVE = st.floats(1e-5, 1e4)
 
@@ -18,7 +18,7 @@ POSITIVE = st.floats(1e-5, 1e4)
 def answers(line: str) -> dict[str, float]:
     """The printed answers of one command line, by name."""
     kind, *words = line.split()
-    text = calculate(kind, dict(word.split("=", 1) for word in words))
+    text = answered(kind, dict(word.split("=", 1) for word in words))[0]
     rows = re.findall(r"^  (\S.*?) += (\S+)", text, flags=re.MULTILINE)
     return {name: float(value) for name, value in rows}
 
@@ -180,10 +180,10 @@ def test_kv_round_trip(kv: float, reading: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_lists_its_keys(kind: str) -> None:
-    text = calculate(kind, {})
+    text = answered(kind, {})[0]
     for name in KINDS[kind].shown_names():
         assert re.search(rf"^  {name} ", text, flags=re.MULTILINE)
-    assert kind in calculate("", {})
+    assert kind in answered("", {})[0]
 
 
 def test_short_names_mean_one_key() -> None:
@@ -195,11 +195,11 @@ def test_short_names_mean_one_key() -> None:
 
 
 def test_the_answer_names_formula_and_convention() -> None:
-    text = calculate("copper", {"r": "0.5", "from": "20", "to": "70"})
+    text = answered("copper", {"r": "0.5", "from": "20", "to": "70"})[0]
     assert "R0·(234.5 + T)/(234.5 + T0)" in text
     assert "convention: annealed copper" in text
-    assert "DC-equivalent" in calculate("ke-kt", {"ke": "0.1"})
-    assert "wye equivalent" in calculate("wye-delta", {"r_ll": "1"})
+    assert "DC-equivalent" in answered("ke-kt", {"ke": "0.1"})[0]
+    assert "wye equivalent" in answered("wye-delta", {"r_ll": "1"})[0]
     assert math.isclose(
         0.5 * 304.5 / 254.5, answers("copper r=0.5 from=20 to=70")["r_ohm"], rel_tol=1e-5
     )
