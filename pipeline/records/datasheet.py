@@ -12,7 +12,9 @@ from pipeline.records.model_verdict import MODEL_REASON, ModelVerdict
 CheckStatus = Literal["pass", "marginal", "fail", "not_evaluated"]
 DatasheetStatus = Literal["released", "provisional", "refused"]
 
-AWAITS_APPROVAL = "not approved: approve it in the registry, or run with release=auto"
+AWAITS_APPROVAL = (
+    "not approved: approve it in the registry; release=auto releases what has no other reason here"
+)
 """The reason in `why` of every datasheet that is not released by itself."""
 
 
