@@ -125,11 +125,8 @@ def test_inspect_ends_as_a_run_of_the_file_would(
 
 
 def test_little_memory_reads_a_small_file(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """The threads of the libraries are begun before the limit is, and panic at none.
-
-    20 MB above the least: at the least itself a busy machine was seen to lack 8 MB.
-    """
-    assert main(["inspect", str(folder / "whole.csv"), f"read_memory_mb={LEAST_MB + 20}"]) == 0
+    """The threads of the libraries are begun before the limit is, and panic at none."""
+    assert main(["inspect", str(folder / "whole.csv"), LITTLE]) == 0
     assert not capfd.readouterr().err
 
 
