@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import zlib
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import zstandard
 
 from pipeline.__main__ import main
 from pipeline.io.ingest.guard import LEAST_MB
-from tests.faults.bombs import MB, chunk, file_of
+from tests.faults.bombs import MB, chunk, file_of, record, text
 
 pytestmark = pytest.mark.workers
 PARSERS = (
@@ -28,7 +29,8 @@ LITTLE = f"read_memory_mb={LEAST_MB}"
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A whole resistance test, and a chunk that keeps every rule but unpacks to 64 MiB.
+    """A whole resistance test, and a chunk that keeps every rule but unpacks to 60 MiB of
+    messages, whose times and places alone take as much again.
 
     Whatever parses a file is broken in this process; workers begin anew and know nothing of that.
     """
@@ -36,9 +38,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     rows = "".join(f"{n / 1000},{n // 50},{2 * (n // 50)},25.0\n" for n in range(400))
     head = "# contract: 1\n# motor_id: m\n# test: resistance\n# pair: ab\n"
-    text = f"{head}t_s,vab_v,ia_a,temp_winding_degc\n{rows}"
-    (folder / "whole.csv").write_text(text)
-    plain = os.urandom(MB // 8) + bytes(64 * MB - MB // 8)
+    (folder / "whole.csv").write_text(f"{head}t_s,vab_v,ia_a,temp_winding_degc\n{rows}")
+    channel = struct.pack("<HH", 1, 0) + text(b"/s") + text(b"json") + text(b"")
+    message = record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + b"{}")
+    noise = record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + os.urandom(MB // 8))
+    plain = record(4, channel) + noise + message * (60 * MB // len(message))
     packed = zstandard.compress(plain)
     (folder / "heavy.mcap").write_bytes(file_of(chunk(packed, len(plain), zlib.crc32(plain))))
 
