@@ -13,10 +13,27 @@ Array = NDArray[np.float64]
 
 
 def block_length(series: Array) -> int:
-    """Length of a block [samples] for a series [n]: n^(1/3) samples that count as one, or so.
+    """Length of the blocks that keep a series' correlation and still leave many blocks.
 
-    Blocks must be long against the correlation and short against the series. Reference: Politis
-    and White, Econometric Reviews 23(1), 2004 (growth with n^(1/3)).
+    Parameters
+    ----------
+    series
+        Samples in order of time [n, any unit].
+
+    Returns
+    -------
+    int
+        Rows a block [1]: at least 1, at most a quarter of the series.
+
+    Notes
+    -----
+    l = τ (n/τ)^(1/3) = τ^(2/3) n^(1/3), with τ the autocorrelation time [samples]: n/τ samples
+    count as independent, and the best block grows with the third root of their number.
+
+    References
+    ----------
+    Politis and White, Econometric Reviews 23(1), 2004, 53, doi:10.1081/ETC-120028836.
+
     """
     tau = autocorrelation_time(series)
     length = max(1.0, tau) ** (2.0 / 3.0) * series.size ** (1.0 / 3.0)
@@ -30,11 +47,36 @@ def block_bootstrap(
     replicates: int,
     rng: np.random.Generator,
 ) -> Array:
-    """Values [replicates, k] of statistic(samples) [k] over resampled series.
+    """Values of a statistic over series resampled in blocks; their scatter is its standard error.
 
-    samples [n] or [n, m] are resampled in blocks of `length` rows that wrap round the end, so
-    correlation shorter than a block is kept. Reference: Politis and Romano, in Exploring the
-    Limits of Bootstrap, 1992.
+    Parameters
+    ----------
+    statistic
+        Takes samples like `samples` and returns [k] or one number.
+    samples
+        Rows in order of time [n] or [n, m].
+    length
+        Rows a block [1]; correlation that is shorter than a block is kept.
+    replicates
+        How many series are drawn.
+    rng
+        Source of the draws; the same state gives the same values.
+
+    Returns
+    -------
+    array [replicates, k]
+        The statistic of each series drawn.
+
+    Notes
+    -----
+    The circular block bootstrap: blocks begin at any row and wrap round the end, so every row is
+    drawn equally often.
+
+    References
+    ----------
+    Politis and Romano, A circular block-resampling procedure for stationary data, in Exploring the
+    Limits of Bootstrap, Wiley, 1992, 263.
+
     """
     n = samples.shape[0]
     count = -(-n // length)

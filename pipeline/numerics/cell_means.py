@@ -37,19 +37,67 @@ class CellMeans:
 
 
 def visits_of(cell: Indices, record: Indices) -> Indices:
-    """Numbers [n] of visits: a new one wherever the cell or the record changes."""
+    """Number of the visit that each row belongs to: a new one where the cell or the record changes.
+
+    Parameters
+    ----------
+    cell
+        Number of the cell of each row [n].
+    record
+        Number of the record of each row [n].
+
+    Returns
+    -------
+    array [n]
+        0, 1, 2, ... in order of rows.
+
+    Examples
+    --------
+    >>> visits_of(np.array([4, 4, 7, 7, 4]), np.array([0, 0, 0, 1, 1])).tolist()
+    [0, 0, 1, 2, 3]
+
+    """
     changed = (np.diff(cell) != 0) | (np.diff(record) != 0)
     numbers: Indices = np.concatenate([[0], np.cumsum(changed)])
     return numbers[: cell.size]
 
 
 def cell_means(error: Array, sigma: Array, cell: Indices, visit: Indices, cells: int) -> CellMeans:
-    """Means of `error` [n] over `cells`, weighted by its noise `sigma` [n].
+    """Weighted means of an error over cells; the p-values allow for correlation within a visit.
 
-    `cell` [n] and `visit` [n] number where each error was made; a visit stays in one cell. With
-    visit means m, weights W, and cell means M, s² = Σ W (m − M)²/(visits − cells), and
-    M √ΣW/s follows Student's t where visits are independent. Fewer than `FEWEST_VISITS` more
-    visits than cells tell nothing of chance: the p-values are NaN.
+    Parameters
+    ----------
+    error
+        Residuals [n, any unit].
+    sigma
+        Their noise [n, same unit], above zero.
+    cell
+        Cell of each row [n], 0 to `cells` - 1.
+    visit
+        Visit of each row [n], see `visits_of`; all rows of a visit are in one cell.
+    cells
+        How many cells there are.
+
+    Returns
+    -------
+    CellMeans
+        NaN where a cell has no row. The p-values are NaN where the visits are less than
+        `FEWEST_VISITS` more than the cells seen, and where visits do not scatter at all.
+
+    Notes
+    -----
+    With visit means m, weights W = Σ 1/σ² and cell means M,
+
+    s² = Σ W (m − M)²/(visits − cells),
+
+    M √ΣW/s follows Student's t, and Σ W (M − mean)²/((cells − 1) s²) Fisher's F, with visits −
+    cells degrees of freedom, where visits are independent.
+
+    References
+    ----------
+    Cameron, Gelbach and Miller, Rev. Econ. Stat. 90(3), 2008, 414, doi:10.1162/rest.90.3.414.
+    Student, Biometrika 6(1), 1908, 1, doi:10.1093/biomet/6.1.1.
+
     """
     weight = sigma**-2
     count = np.bincount(cell, minlength=cells)

@@ -11,11 +11,37 @@ Array = NDArray[np.float64]
 def cluster_covariance(
     design: Array, residuals: Array, sigma: Array, cluster: NDArray[np.int64]
 ) -> tuple[Array, int]:
-    """Covariance [k, k] of weighted least squares under any correlation inside clusters, and dof.
+    """Covariance of weighted least squares under any correlation of the rows within a cluster.
 
-    design [n, k], residuals and sigma [n] in the unit of y, `cluster` [n] numbers. Sandwich with
-    the small-sample factor G/(G-1) (n-1)/(n-k); dof = G - 1. Reference: Cameron and Miller,
-    J. Human Resources 50(2), 2015, eqs. 11-12.
+    Parameters
+    ----------
+    design
+        Derivatives of y by the coefficients [n, k].
+    residuals
+        Of the fit [n, unit of y].
+    sigma
+        Noise by which the rows were weighted [n, unit of y], above zero.
+    cluster
+        Number of the cluster of each row [n]; clusters are independent of each other.
+
+    Returns
+    -------
+    covariance [k, k]
+        Of the coefficients.
+    dof
+        Degrees of freedom: clusters less one, at least 1.
+
+    Notes
+    -----
+    V = c (X'X)⁻¹ (Σ_g X_g' e_g e_g' X_g) (X'X)⁻¹, X and e divided by sigma, with the small-sample
+    factor c = G/(G − 1) · (n − 1)/(n − k). A single cluster has no covariance: its scores sum to
+    zero, and so does V.
+
+    References
+    ----------
+    Cameron and Miller, J. Human Resources 50(2), 2015, 317, eqs. 11 and 12,
+    doi:10.3368/jhr.50.2.317.
+
     """
     n, k = design.shape
     scaled = design / sigma[:, None]

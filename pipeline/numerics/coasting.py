@@ -17,11 +17,24 @@ REST, TOP, LEAST_TOP = 0.005, 0.995, 0.05
 
 
 def coasting_rows(speed: Array) -> list[tuple[slice, int]]:
-    """Rows and sense (+1, -1) of every coast that a smooth speed [n, any unit] holds.
+    """Rows and sense of every coast in a record of speed: the falls from a high speed to rest.
 
-    A coast falls from its highest speed to `REST` of the fastest of all. It begins in the last
-    row within `TOP` of its highest speed, for the shaft may have been held there before; one
-    whose highest speed is below `LEAST_TOP` of the fastest is none.
+    Parameters
+    ----------
+    speed
+        Smooth speed [n, any unit].
+
+    Returns
+    -------
+    list of (slice, sense)
+        Rows, and +1 or -1; forward coasts first. Empty where the speed is zero throughout.
+
+    Notes
+    -----
+    A coast ends where the speed falls below `REST` of the fastest of all. It begins in the last row
+    within `TOP` of its own highest speed, for the shaft may have been held there before. One whose
+    highest speed is below `LEAST_TOP` of the fastest is none.
+
     """
     fastest = float(np.max(np.abs(speed), initial=0.0))
     if fastest == 0.0:
@@ -40,11 +53,39 @@ def coasting_rows(speed: Array) -> list[tuple[slice, int]]:
 def coast_down(
     t_s: Array, speed_rad_s: float, deceleration_rad_s2: Deceleration
 ) -> tuple[Array, Array]:
-    """Angle travelled [n, rad] and speed [n, rad/s] at times t_s [n] after speed_rad_s > 0.
+    """Angle and speed of a shaft that coasts down from a speed.
 
-    dw/dt = -D(w): time and angle follow from quadrature over speed, t(w) = int dw/D and
-    theta(w) = int w dw/D, Simpson's rule on a grid of w; at and after standstill the shaft rests.
-    Between grid points cubic Hermite interpolation (both derivatives are known).
+    Parameters
+    ----------
+    t_s
+        Times since the start [n, s]; at times before it the shaft is where it starts.
+    speed_rad_s
+        Speed at time 0 [rad/s], above zero.
+    deceleration_rad_s2
+        D(ω) [m, rad/s²] of speeds [m, rad/s], positive; below 1e-9 of its largest value it is taken
+        as that, so that the coast ends.
+
+    Returns
+    -------
+    angle [n, rad]
+        Travelled since time 0.
+    speed [n, rad/s]
+        0 once the shaft stands.
+
+    Notes
+    -----
+    dω/dt = −D(ω), so t(ω) = ∫ dω/D and θ(ω) = ∫ ω dω/D from ω up to the start: Simpson's rule on
+    `GRID` steps of speed, and cubic Hermite interpolation in time between them, for both
+    derivatives are known.
+
+    Examples
+    --------
+    A constant drag of 2 rad/s² takes 5 s to stop 10 rad/s, within 10 · 5/2 = 25 rad.
+
+    >>> angle, speed = coast_down(np.array([2.5, 9.0]), 10.0, lambda w: np.full(w.size, 2.0))
+    >>> np.round(speed, 6).tolist(), np.round(angle, 6).tolist()
+    ([5.0, 0.0], [18.75, 25.0])
+
     """
     grid = np.linspace(speed_rad_s, 0.0, GRID + 1)
     middle = 0.5 * (grid[1:] + grid[:-1])

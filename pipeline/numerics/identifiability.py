@@ -96,13 +96,64 @@ class Identified:
 
 
 def within(u: Array, sizes: Array) -> NDArray[np.bool_]:
-    """Whether numbers with standard uncertainties `u` are known better than to their `sizes`."""
+    """Whether numbers are known better than to their own size.
+
+    Parameters
+    ----------
+    u
+        Standard uncertainties [p].
+    sizes
+        Magnitudes at which the numbers matter [p, same units].
+
+    Returns
+    -------
+    array [p]
+        True where the half width of the 95 % interval, `REACH` u, is below the size.
+
+    """
     known: NDArray[np.bool_] = REACH * u < sizes
     return known
 
 
 def identify(rows: Array, sizes: Array) -> Identified:
-    """What whitened rows [n, p] of data and priors say of parameters with these `sizes` [p] > 0."""
+    """What whitened rows of data and priors say of parameters.
+
+    Parameters
+    ----------
+    rows
+        Derivatives of the residuals by the parameters, over their standard deviation [n, p].
+    sizes
+        Magnitude at which each parameter matters [p, its unit], above zero.
+
+    Returns
+    -------
+    Identified
+        The directions without information, and a root of the covariance of all else.
+
+    Raises
+    ------
+    ValueError
+        A size is not above zero.
+
+    Notes
+    -----
+    A column is unobserved where the parameter's size moves all rows together by less than
+    `_UNOBSERVED` standard deviations. The others are scaled to unit length; directions whose
+    singular value is below `TIED` of the largest hold no information.
+
+    References
+    ----------
+    Belsley, Kuh and Welsch, Regression Diagnostics, Wiley, 1980, ch. 3.
+
+    Examples
+    --------
+    Two parameters that are seen only as their sum: neither is known, the sum is.
+
+    >>> found = identify(np.array([[1.0, 1.0], [1.0, 1.0]]), np.ones(2))
+    >>> found.u.tolist(), round(found.u_of(np.array([1.0, 1.0])), 6)
+    ([inf, inf], 0.707107)
+
+    """
     if not (sizes > 0.0).all():
         raise ValueError("every parameter needs a size above zero")
     length = np.linalg.norm(rows, axis=0)
@@ -158,11 +209,30 @@ class Combination:
 def known_combinations(
     found: Identified, values: Array, places: Sequence[int], positive: Sequence[int]
 ) -> tuple[Combination, ...]:
-    """The simplest functions of the parameters at `places` that are known, independent of each
-    other: ratios and products first, then sums.
+    """The simplest functions of parameters that are known although the parameters are not.
 
-    What stands below a fraction is one of the `positive`, the first that serves. Sums have two
-    terms.
+    Parameters
+    ----------
+    found
+        What the data say of all parameters.
+    values
+        The parameters [p].
+    places
+        Indices of the parameters that may enter.
+    positive
+        Indices of those that are above zero: one of them, the first that serves, stands below a
+        fraction.
+
+    Returns
+    -------
+    tuple of Combination
+        Independent of each other: ratios and products first, then sums of two terms.
+
+    Notes
+    -----
+    A combination is known where `within` holds for it, and independent where its gradient is no
+    linear combination of the gradients of those before it.
+
     """
     kept: list[Combination] = []
     for one in (*_products(found, values, places, positive), *_sums(found, values, places)):
@@ -233,11 +303,27 @@ def _sums(found: Identified, values: Array, places: Sequence[int]) -> Iterator[C
 def walked(
     found: Identified, values: Array, combinations_: Sequence[Combination], far: float
 ) -> Iterator[tuple[NDArray[np.bool_], Array]]:
-    """Values [p] at either end of every direction without information along which the combinations
-    stay as they are, and which parameters [p] it moves.
+    """Values at either end of every direction without information, the combinations being kept.
 
-    What is in a product goes up or down by a common factor's power, exp(`far`) at the most, what
-    is not by `far` of its size.
+    Parameters
+    ----------
+    found
+        What the data say of all parameters.
+    values
+        The parameters [p].
+    combinations_
+        Functions of them that stay as they are.
+    far
+        How far to go: a parameter that is in a product goes up or down by a factor of exp(`far`) at
+        the most, any other by `far` of its size.
+
+    Yields
+    ------
+    moved [p]
+        Which parameters the direction moves.
+    values [p]
+        The parameters there; two a direction, ahead first.
+
     """
     factors = np.zeros((values.size, 0))
     inside = np.zeros(values.size, dtype=bool)

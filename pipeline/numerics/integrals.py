@@ -15,20 +15,60 @@ GAP = 1.5
 
 
 def trapezoid(t_s: Array, y: Array) -> Array:
-    """Running integral [n] of samples y [n] at times t_s [n, s], 0 at the first, by straight lines.
+    """Running integral of samples by straight lines between them, 0 at the first.
 
-    It takes (w h)²/12 off a sine, and no noise nor gap makes it worse than its samples.
+    Parameters
+    ----------
+    t_s
+        Times [n, s], rising.
+    y
+        Samples [n, any unit].
+
+    Returns
+    -------
+    array [n]
+        Unit of y times second.
+
+    Notes
+    -----
+    It takes (ω h)²/12 off a sine of ω [rad/s] at steps of h [s], and no noise nor gap makes it
+    worse than its samples.
+
+    Examples
+    --------
+    >>> trapezoid(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 4.0])).tolist()
+    [0.0, 1.0, 4.0]
+
     """
     return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t_s))])
 
 
 def cubic(t_s: Array, v: NDArray[Any]) -> NDArray[Any]:
-    """Running integral [n] of samples v [n] at times t_s [n, s], 0 at the first.
+    """Running integral of samples by cubics between them, 0 at the first.
 
-    A step is that of the cubic with the slopes of the parabolas through each sample and its
-    neighbours, h (v0 + v1)/2 + h² (v0' - v1')/12. The trapezoid alone takes (w h)²/12 off a sine,
-    this `REST` (w h)⁴. Steps over a gap are trapezoids, for which the slopes beside it say
-    nothing. Reference: Davis and Rabinowitz, Methods of Numerical Integration, 2nd ed., 2.9.
+    Parameters
+    ----------
+    t_s
+        Times [n, s], rising; two samples or more.
+    v
+        Samples [n, any unit], real or complex.
+
+    Returns
+    -------
+    array [n]
+        Unit of v times second.
+
+    Notes
+    -----
+    A step is that of the cubic with the slopes v' of the parabolas through each sample and its
+    neighbours: h (v₀ + v₁)/2 + h² (v₀' − v₁')/12. The trapezoid alone takes (ω h)²/12 off a sine,
+    this `REST` (ω h)⁴. Steps longer than `GAP` times the median are trapezoids, for which the
+    slopes beside a gap say nothing.
+
+    References
+    ----------
+    Davis and Rabinowitz, Methods of Numerical Integration, 2nd ed., Academic Press, 1984, 2.9.
+
     """
     step = np.diff(t_s)
     slope = np.gradient(v, t_s)

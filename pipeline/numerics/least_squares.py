@@ -55,11 +55,38 @@ class LinearFit:
 
 
 def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> LinearFit:
-    """Weighted least squares of y [n] on design [n, k].
+    """Weighted linear least squares of y on the columns of a design.
 
-    With `sigma` (the standard deviation of each y) the covariance is (X'WX)^-1; without it, the
-    residual variance is estimated, s² = r'r/(n - k), infinite where n = k. Columns are scaled
-    before the decomposition. Reference: Golub and Van Loan, Matrix Computations, 4th ed., 5.3.
+    Parameters
+    ----------
+    design
+        Derivatives of y by the coefficients [n, k].
+    y
+        Observations [n].
+    sigma
+        Standard deviation of each observation [n, unit of y], or one for all; None where unknown.
+
+    Returns
+    -------
+    LinearFit
+        Of minimum norm where the columns are tied: its `u` is infinite for what they do not part.
+
+    Notes
+    -----
+    With `sigma` the covariance is (X'WX)⁻¹, W = diag(σ⁻²). Without, the residual variance is
+    estimated, s² = r'r/(n − rank), infinite where n = rank. The columns are scaled to unit length
+    before the singular value decomposition, so their units do not matter.
+
+    References
+    ----------
+    Golub and Van Loan, Matrix Computations, 4th ed., Johns Hopkins, 2013, 5.3 and 5.5.
+
+    Examples
+    --------
+    >>> line = np.column_stack([np.ones(3), [0.0, 1.0, 2.0]])
+    >>> np.round(linear_fit(line, np.array([1.0, 3.0, 5.0])).coefficients, 9).tolist()
+    [1.0, 2.0]
+
     """
     weight = np.ones(y.size) if sigma is None else 1.0 / np.broadcast_to(sigma, y.shape)
     rows = design * weight[:, None]
@@ -81,11 +108,30 @@ def linear_fit(design: Array, y: Array, sigma: Array | float | None = None) -> L
 
 
 def autocorrelation_time(residuals: Array, longest: int | None = None) -> float:
-    """How many samples count as one: 1 + 2 sum rho_k, at least 1.
+    """How many samples of a series count as one independent sample.
 
-    The sum runs over pairs of lags while their sum is positive (initial positive sequence) and at
-    most to `longest` (a third of the series). The standard error of a mean is s sqrt(tau/n).
-    Reference: Geyer, Statistical Science 7(4), 1992, 3.3.
+    Parameters
+    ----------
+    residuals
+        Series [n, any unit], evenly sampled.
+    longest
+        Longest lag looked at [samples]; a third of the series by default.
+
+    Returns
+    -------
+    float
+        τ = 1 + 2 Σ ρ_k [samples], at least 1. It is 1 for fewer than eight samples, for a constant
+        series, and where ρ₁ is below its standard error twice, 2/√n, so that chance makes none.
+
+    Notes
+    -----
+    The sum runs over pairs of lags while their sum is positive (initial positive sequence). The
+    standard error of a mean is s √(τ/n).
+
+    References
+    ----------
+    Geyer, Statistical Science 7(4), 1992, 473, section 3.3, doi:10.1214/ss/1177011137.
+
     """
     n = residuals.size
     longest = min(longest if longest is not None else n // 3, n - 2)
@@ -150,11 +196,40 @@ def gauss_newton(
     iterations: int = 40,
     tolerance: float = 1e-5,
 ) -> NonlinearFit:
-    """Minimises sum r² from `start`, r already divided by its sigma; bounds are kept by clipping.
+    """Nonlinear least squares within bounds, by Levenberg-Marquardt.
 
-    Levenberg-Marquardt with the diagonal's scaling. The covariance is (J'J)^-1 at the solution.
-    Converged where no step moves the prediction by more than `tolerance` of the residuals' rms.
-    Reference: Nocedal and Wright, Numerical Optimization, 2nd ed., 10.3.
+    Parameters
+    ----------
+    residuals_and_jacobian
+        Of parameters [k]: residuals [n] divided by their standard deviation, and their derivatives
+        by the parameters [n, k].
+    start
+        Parameters to begin with [k]; clipped to the bounds.
+    low, high
+        Bounds [k]; none by default. They are kept by clipping, and a parameter on its bound is left
+        out of a step that would lead across it.
+    iterations
+        Most steps that are tried.
+    tolerance
+        Converged where a step changes the prediction, through any one parameter, by less than this
+        part of the residuals' root mean square √(Σ r²/(n − k)) [1].
+
+    Returns
+    -------
+    NonlinearFit
+        At the last step that did not make the sum of squares larger; see its `converged`.
+
+    Notes
+    -----
+    Minimises Σ r². A step solves (J'J + λ diag J'J) Δ = −J'r; λ begins at 0 (Gauss-Newton), rises
+    tenfold after a step that fails and falls tenfold after one that succeeds. The covariance is
+    (J'J)⁻¹ at the solution.
+
+    References
+    ----------
+    Marquardt, J. SIAM 11(2), 1963, 431, doi:10.1137/0111030.
+    Nocedal and Wright, Numerical Optimization, 2nd ed., Springer, 2006, 10.3.
+
     """
     low = np.full(start.size, -np.inf) if low is None else low
     high = np.full(start.size, np.inf) if high is None else high
@@ -204,7 +279,23 @@ def _step(normal: Array, gradient: Array, damping: float, free: NDArray[np.bool_
 
 
 def central_jacobian(function: Callable[[Array], Array], x: Array, width: Array) -> Array:
-    """Jacobian [n, k] of function(x) [n] by central differences of half width `width` [k]."""
+    """Derivatives of a function by central differences.
+
+    Parameters
+    ----------
+    function
+        Of parameters [k]; returns [n].
+    x
+        Where [k].
+    width
+        Half the width of each difference [k, unit of x], above zero.
+
+    Returns
+    -------
+    array [n, k]
+        (f(x + h) − f(x − h))/2h, exact for parabolas; the error is h²/6 f'''.
+
+    """
     columns = []
     for index in range(x.size):
         up, down = x.copy(), x.copy()

@@ -74,10 +74,25 @@ class OrderLine:
 
 
 def passes(theta_rad: Array, back_rad: float = 0.2) -> list[tuple[slice, int]]:
-    """Stretches of one sense of rotation as (slice, +1 or -1).
+    """Stretches of a record in which the shaft keeps one sense of rotation.
 
-    A turning point is where the angle [n, rad] falls back by more than `back_rad` from its
-    extreme, so noise and vibration make none.
+    Parameters
+    ----------
+    theta_rad
+        Unwrapped shaft angle [n, rad], finite.
+    back_rad
+        By how much the angle falls back from its extreme at a turning point [rad], so that noise
+        and vibration make none.
+
+    Returns
+    -------
+    list of (slice, sense)
+        Rows, and +1 or -1, in order of time; empty where the angle never moves by `back_rad`.
+
+    Notes
+    -----
+    Of a long record every k-th row is looked at, 20,000 to 40,000 of them.
+
     """
     found: list[tuple[slice, int]] = []
     start, extreme, sense = 0, 0, 0
@@ -99,12 +114,26 @@ def passes(theta_rad: Array, back_rad: float = 0.2) -> list[tuple[slice, int]]:
 
 
 def whole_turns(theta_rad: Array, value: Array) -> list[Turn]:
-    """The whole turns of every pass over angle [n, rad] and value [n]; the rest is left out."""
+    """The whole turns of every pass; what is left of a pass is left out.
+
+    Parameters
+    ----------
+    theta_rad
+        Unwrapped shaft angle [n, rad].
+    value
+        What is measured over the angle [n, any unit]; rows that are not finite are left out.
+
+    Returns
+    -------
+    list of Turn
+        In order of time. The last turn of a pass may lack up to 1 - `WHOLE_TURN` of a turn.
+
+    """
     turns = []
+    fine = np.isfinite(theta_rad) & np.isfinite(value)
+    theta_rad, value = theta_rad[fine], value[fine]
     for rows, sense in passes(theta_rad):
         angle, y = theta_rad[rows], value[rows]
-        fine = np.isfinite(angle) & np.isfinite(y)
-        angle, y = angle[fine], y[fine]
         if angle.size < 16:
             continue
         travelled = (angle - angle[0]) * sense / TURN_RAD
@@ -116,15 +145,43 @@ def whole_turns(theta_rad: Array, value: Array) -> list[Turn]:
 
 
 def largest_order(turns: Sequence[Turn], ceiling: int) -> int:
-    """The highest order that every turn samples with more than two positions a cycle."""
+    """The highest order that every turn samples with more than two positions a cycle.
+
+    Parameters
+    ----------
+    turns
+        Turns of the shaft.
+    ceiling
+        Highest order wanted [1/turn].
+
+    Returns
+    -------
+    int
+        Order [1/turn], at most `ceiling`; 0 without a turn.
+
+    """
     counts = [np.unique(turn.theta_rad).size for turn in turns]
     return int(max(0, min(ceiling, (min(counts, default=0) - 1) // 2)))
 
 
 def even_positions(turns: Sequence[Turn]) -> int | None:
-    """How many evenly spaced positions every turn was sampled at; None where they are uneven.
+    """How many evenly spaced positions every turn was sampled at.
 
-    On n even positions the orders k, n - k, n + k, ... cannot be separated.
+    Parameters
+    ----------
+    turns
+        Turns of the shaft, one or more.
+
+    Returns
+    -------
+    int or None
+        Positions a turn; None where they are uneven or differ from turn to turn.
+
+    Notes
+    -----
+    On n even positions the orders k, n − k, n + k, ... are the same numbers and cannot be
+    separated.
+
     """
     counts = set()
     for turn in turns:
@@ -139,11 +196,27 @@ def even_positions(turns: Sequence[Turn]) -> int | None:
 
 
 def spectrum(turns: Sequence[Turn], highest: int) -> Spectrum:
-    """Fourier coefficients of each turn for orders 1..`highest`.
+    """Fourier coefficients of each turn over the shaft angle.
 
-    c_k = 2/2pi sum_i w_i y_i exp(-j k theta_i) with the trapezoidal rule's weights w_i, by fast
-    transforms on a fine grid whose rounding of the angle is undone to third order. Samples far
-    denser than needed are averaged first, which keeps all weights alike.
+    Parameters
+    ----------
+    turns
+        Turns of the shaft.
+    highest
+        Highest order [1/turn].
+
+    Returns
+    -------
+    Spectrum
+        Orders 1 to `highest`, in the unit of the turns' values.
+
+    Notes
+    -----
+    c_k = 2 Σ_i w_i y_i exp(−j k θ_i), with weights w_i of the trapezoidal rule, Σ w_i = 1. The sums
+    are fast transforms on a fine grid; that an angle is rounded to the grid is undone to third
+    order of its Taylor series. Samples more than `DENSE` an order are averaged in bins first, which
+    keeps the weights alike.
+
     """
     rows, means = [], []
     for turn in turns:
@@ -189,10 +262,22 @@ def _transform(angle: Array, value: Array, highest: int) -> ComplexArray:
 
 
 def noise_power(spec: Spectrum) -> tuple[Array, Array, float]:
-    """E|noise|² of one turn's coefficient: local mean [k], own order [k], dof of the local mean.
+    """Mean square of the noise in one turn's coefficients, from how the turns differ.
 
-    From the deviations of the turns from their mean (needs two turns or more), averaged over
-    `NEIGHBOURS` orders either side.
+    Parameters
+    ----------
+    spec
+        Coefficients of two turns or more.
+
+    Returns
+    -------
+    local [k]
+        E|noise|² [unit²], averaged over `NEIGHBOURS` orders either side.
+    own [k]
+        The same of each order alone [unit²], with 2 (turns − 1) degrees of freedom.
+    dof
+        Degrees of freedom of `local`, where the fewest orders were averaged.
+
     """
     deviation = spec.coefficients - spec.coefficients.mean(axis=0)
     own = np.sum(np.abs(deviation) ** 2, axis=0) / (spec.turns - 1)
@@ -205,7 +290,19 @@ def noise_power(spec: Spectrum) -> tuple[Array, Array, float]:
 
 
 def held_out_gain(spec: Spectrum) -> Array:
-    """Share [k] of turns whose own power falls when the mean of the *other* turns is taken off."""
+    """Share of the turns whose own power falls when the mean of the other turns is taken off.
+
+    Parameters
+    ----------
+    spec
+        Coefficients of two turns or more.
+
+    Returns
+    -------
+    array [k]
+        0 to 1, each order; 0.5 or so is chance where the noise is strong.
+
+    """
     total = spec.coefficients.sum(axis=0)
     others = (total - spec.coefficients) / (spec.turns - 1)
     gain = np.abs(spec.coefficients) ** 2 - np.abs(spec.coefficients - others) ** 2
@@ -216,12 +313,38 @@ def held_out_gain(spec: Spectrum) -> Array:
 def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> list[OrderLine]:
     """The orders whose mean coefficient is not noise, strongest first.
 
-    Three tests: F = r |mean|² / local noise with (2, dof) degrees of freedom, Bonferroni-corrected
-    to `level` over all orders; the same against the scatter of this very order, at 0.05 (drops
-    what changes with the sense of rotation); a held-out gain in at least `share` of the turns.
-    `u` is from the local noise, or from the order's own scatter where that is larger (p < 0.01).
-    Needs two turns or more. Reference: Brillinger, Time Series (2001), section 5.6 (local
-    averages of the periodogram).
+    Parameters
+    ----------
+    spec
+        Coefficients of two turns or more.
+    level
+        Chance that any order at all is found in noise [1].
+    share
+        Least share of the turns that the others' mean has to predict [1].
+
+    Returns
+    -------
+    list of OrderLine
+        `u` is the standard uncertainty of the amplitude from the local noise, or from the order's
+        own scatter where that is larger (p < 0.01).
+
+    Notes
+    -----
+    An order has to pass three tests:
+
+    1. F = r |mean|²/local noise with (2, dof) degrees of freedom, for r turns, at `level` over the
+       number of orders (Bonferroni).
+    2. The same against the scatter of this very order, at 0.05. It drops what changes with the
+    sense
+       of rotation.
+    3. `held_out_gain` of at least `share`.
+
+    References
+    ----------
+    Brillinger, Time Series: Data Analysis and Theory, SIAM, 2001, section 5.6 (local averages of
+    the
+    periodogram), doi:10.1137/1.9780898719246.
+
     """
     from scipy.special import fdtrc
 
@@ -251,13 +374,36 @@ def orders_present(spec: Spectrum, level: float = 0.01, share: float = 0.75) -> 
 def find_orders(
     turns: Sequence[Turn], highest: int, level: float = 0.01
 ) -> tuple[Spectrum, list[OrderLine]]:
-    """Spectrum of the turns and the orders present, strongest first.
+    """The orders present over the shaft angle, none of them the ghost of a stronger one.
 
-    The strongest order present joins (with others nearly as strong), all orders found are fitted
-    to each turn together by least squares and taken off, and the rest is looked at again until
-    nothing is left (or `MOST_LINES` are found). Published is the mean of an order's fits over the
-    turns, with the uncertainty of `orders_present`. Reference: Högbom, Astron. Astrophys. Suppl.
-    15, 1974 (CLEAN).
+    Parameters
+    ----------
+    turns
+        Two turns or more.
+    highest
+        Highest order looked at [1/turn].
+    level
+        Chance that any order at all is found in noise [1].
+
+    Returns
+    -------
+    spectrum
+        Coefficients of each turn: those of the orders found by least squares, all others of the
+        rest.
+    lines
+        The orders present, strongest first: means over the turns, with the uncertainty of
+        `orders_present`.
+
+    Notes
+    -----
+    The strongest order present joins, with those of at least `ALIKE` of its amplitude. All orders
+    found so far are fitted to each turn together by least squares and taken off, and the rest is
+    looked at again, until nothing is left or `MOST_LINES` are found.
+
+    References
+    ----------
+    Högbom, Astron. Astrophys. Suppl. 15, 1974, 417 (CLEAN).
+
     """
     whole = rest = spectrum(turns, highest)
     orders: list[int] = []
@@ -290,7 +436,21 @@ def _fit_orders(turn: Turn, orders: Sequence[int]) -> tuple[ComplexArray, Turn]:
 
 
 def waveform(lines: Sequence[OrderLine], theta_rad: Array) -> Array:
-    """Sum of the orders at the angles [n, rad]."""
+    """Sum of the orders at given angles.
+
+    Parameters
+    ----------
+    lines
+        The orders.
+    theta_rad
+        Shaft angle [n, rad].
+
+    Returns
+    -------
+    array [n]
+        Σ Re(c_k exp(j k θ)), without a mean, in the unit of the coefficients.
+
+    """
     out = np.zeros(theta_rad.size)
     for line in lines:
         out += np.real(line.coefficient * np.exp(1j * line.order * theta_rad))
@@ -300,9 +460,33 @@ def waveform(lines: Sequence[OrderLine], theta_rad: Array) -> Array:
 def half_peak_to_peak(lines: Sequence[OrderLine]) -> tuple[float, float]:
     """Half the peak-to-peak of the sum of the orders, and its standard uncertainty.
 
-    The grid follows the highest order over the common period of all, and Newton's method takes
-    both extremes from it to where the slope is zero. u² = sum_k u_k² |exp(j k theta_max) -
-    exp(j k theta_min)|² / 4, first order. Raises ValueError without an order.
+    Parameters
+    ----------
+    lines
+        The orders, one or more.
+
+    Returns
+    -------
+    value, u
+        In the unit of the coefficients.
+
+    Raises
+    ------
+    ValueError
+        There is no order.
+
+    Notes
+    -----
+    u² = Σ u_k² |exp(j k θ_max) − exp(j k θ_min)|²/4, to first order. The extremes are the largest
+    and the smallest point of a grid of `GRID_A_CYCLE` points a cycle of the highest order, moved to
+    where the slope is zero by Newton's method.
+
+    Examples
+    --------
+    >>> line = OrderLine(12, 0.03 + 0.04j, 0.001, 10.0, 0.0)
+    >>> [round(number, 6) for number in half_peak_to_peak([line])]
+    [0.05, 0.001]
+
     """
     if not lines:
         raise ValueError("no order, no peak")
@@ -337,12 +521,30 @@ def _extreme(lines: Sequence[OrderLine], theta_rad: float, cell_rad: float) -> f
 
 
 def phase_modulated(lines: Sequence[OrderLine], order: int) -> list[OrderLine]:
-    """The sidebands order±n (n = 1..3) that an eccentric encoder makes of one order.
+    """The sidebands of an order that an eccentric encoder makes, and not the motor.
 
-    A once-a-turn angle error turns A sin(k theta) into a phase-modulated wave of the same power,
-    whose first sidebands obey c[k+1]/c[k] = -conj(c[k-1]/c[k]); true sidebands of a modulated
-    amplitude carry the other sign. Empty where that does not hold to a tenth and three u.
-    Reference: Carson, Proc. IRE 10(1), 1922.
+    Parameters
+    ----------
+    lines
+        All orders found.
+    order
+        The order whose sidebands are in question [1/turn]; it need not be among the lines.
+
+    Returns
+    -------
+    list of OrderLine
+        Those of order ± 1, 2, 3 that were found; empty where the two first ones are not both there,
+        or do not obey the relation below to a tenth and three standard uncertainties.
+
+    Notes
+    -----
+    An angle error once a turn makes A sin(kθ) a phase-modulated wave, whose first sidebands obey
+    c[k+1]/c[k] = −conj(c[k−1]/c[k]). Sidebands of a modulated amplitude carry the other sign.
+
+    References
+    ----------
+    Carson, Notes on the theory of modulation, Proc. IRE 10(1), 1922, 57.
+
     """
     by_order = {line.order: line for line in lines}
     if not all(k in by_order for k in (order - 1, order, order + 1)):
@@ -358,10 +560,27 @@ def phase_modulated(lines: Sequence[OrderLine], order: int) -> list[OrderLine]:
 
 
 def detection_limit(spec: Spectrum, level: float = 0.01, power: float = 0.95) -> float:
-    """The amplitude that would be found with probability `power` at every order tested.
+    """The amplitude that would be found at whatever order it were.
 
-    Approximation: threshold amplitude plus the normal quantile of its scatter, at the noisiest
-    order.
+    Parameters
+    ----------
+    spec
+        Coefficients of two turns or more.
+    level
+        Chance that any order at all is found in noise [1].
+    power
+        Probability with which it would be found [1].
+
+    Returns
+    -------
+    float
+        Amplitude [unit of the coefficients].
+
+    Notes
+    -----
+    √(N F) + z √(N/2): N the noise power of the mean at the noisiest order, F the threshold of the
+    test, z the normal quantile of `power`. An approximation; the held-out test is not in it.
+
     """
     from scipy.special import fdtri, ndtri
 

@@ -30,11 +30,24 @@ class Plateau:
 
 
 def white_noise_sigma(signal: Array) -> float:
-    """Standard deviation of the sample-to-sample noise of a signal [n] that steps or drifts.
+    """Standard deviation of the sample-to-sample noise of a signal that steps or drifts.
 
-    From second differences x[k-1] - 2 x[k] + x[k+1] (variance 6 sigma²), robustly by their median
-    absolute deviation; falls back to their root mean square where quantisation makes more than
-    half of them vanish.
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit]; those that are not finite are left out.
+
+    Returns
+    -------
+    float
+        In the unit of the signal; 0 for fewer than six samples.
+
+    Notes
+    -----
+    Second differences x[k−1] − 2 x[k] + x[k+1] of white noise have the variance 6 σ². σ comes from
+    their median absolute value; where rounding makes more than half of them vanish, from the root
+    mean square of those up to the 95th percentile.
+
     """
     second = np.diff(signal[np.isfinite(signal)], n=2)
     if second.size < 4:
@@ -53,12 +66,34 @@ def find_plateaus(
     tolerance: float = 0.01,
     least_span: float = 0.0,
 ) -> tuple[Plateau, ...]:
-    """Settled stretches of at least `least` rows of a stepped signal [n].
+    """Settled stretches of a signal that was stepped from level to level.
 
-    A row belongs to a step where the means of the `window` rows before and after it differ by
-    more than six of their standard errors, `tolerance` of the signal's span (taken as
-    `least_span` where that is more) and what rounding of the running sum can make up, eps n max|x|.
-    What is left is trimmed at its start while blocks still approach the level of its later half.
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit], finite.
+    least
+        Fewest rows a stretch.
+    window
+        Rows a mean; by default a hundredth of the record, at least 3 and at most `least`.
+    tolerance
+        Part of the signal's span [1] by which a settled signal may drift within two windows.
+    least_span
+        Span that is taken where the signal's own is less [unit of the signal].
+
+    Returns
+    -------
+    tuple of Plateau
+        In order of rows. A record shorter than two stretches is one plateau, or none where it is
+        shorter than `least`.
+
+    Notes
+    -----
+    A row belongs to a step where the means of the windows before and after it differ by more than
+    the largest of: six standard errors of their difference, `tolerance` of the span, and what
+    rounding of the running sum can make up, eps n max|x|. From what is left, blocks are cut off at
+    the start while they still approach the level of the later half.
+
     """
     n = signal.size
     if n < 2 * least:
@@ -84,7 +119,24 @@ def find_plateaus(
 
 
 def true_runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and stop (excluded) of every run of true values in flags [n]."""
+    """Start and stop of every run of true values.
+
+    Parameters
+    ----------
+    flags
+        Booleans [n].
+
+    Returns
+    -------
+    list of (start, stop)
+        Row numbers; stop is excluded.
+
+    Examples
+    --------
+    >>> true_runs(np.array([True, True, False, True]))
+    [(0, 2), (3, 4)]
+
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
@@ -100,12 +152,40 @@ def _trim(signal: Array, start: int, stop: int, window: int, sigma: float, limit
 
 
 def block_means(values: Array, size: int) -> Array:
-    """Means of consecutive blocks of `size` rows of values [n] or [n, k]; the rest is dropped."""
+    """Means of consecutive blocks of rows; rows that fill no block are dropped.
+
+    Parameters
+    ----------
+    values
+        [n] or [n, k], any unit.
+    size
+        Rows a block.
+
+    Returns
+    -------
+    array [n // size] or [n // size, k]
+        Unit of the values.
+
+    """
     blocks = values.shape[0] // size
     means: Array = values[: blocks * size].reshape(blocks, size, *values.shape[1:]).mean(axis=1)
     return means
 
 
 def decimated(size: int, most: int = 2000) -> slice:
-    """A slice that keeps every k-th row so that at most `most` of `size` rows are left."""
+    """A slice that keeps every k-th row.
+
+    Parameters
+    ----------
+    size
+        How many rows there are.
+    most
+        How many may be left.
+
+    Returns
+    -------
+    slice
+        From the first row, with the smallest step that leaves at most `most`.
+
+    """
     return slice(None, None, max(1, -(-size // most)))

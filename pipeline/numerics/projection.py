@@ -39,14 +39,39 @@ class Projection:
         return int(self.functions.shape[2])
 
     def project(self, residuals: Array) -> Array:
-        """Weak residuals [C, W, M] of sampled ones [C, n]."""
+        """Weak residuals: sums of sampled ones times the test functions.
+
+        Parameters
+        ----------
+        residuals
+            [C, n], any unit.
+
+        Returns
+        -------
+        array [C, W, M]
+            In the same unit, of the same standard deviation where the residuals are white: the
+            functions have unit sum of squares.
+
+        """
         windows = sliding_window_view(residuals, self.length, axis=1)[:, self.starts, :]
         by_window = np.ascontiguousarray(windows.transpose(1, 2, 0))
         projected: Array = np.matmul(self.functions, by_window).transpose(2, 0, 1)
         return projected
 
     def means(self, signals: Array) -> Array:
-        """Window means [C, W] of signals [C, n], weighted with the plain window."""
+        """Means over each window, weighted with the plain window.
+
+        Parameters
+        ----------
+        signals
+            [C, n], any unit.
+
+        Returns
+        -------
+        array [C, W]
+            Same unit.
+
+        """
         plain = self.functions[:, :1, :]
         weights = plain / plain.sum(axis=2, keepdims=True)
         windows = sliding_window_view(signals, self.length, axis=1)[:, self.starts, :]
@@ -61,7 +86,19 @@ class Projection:
 
 
 def bump(length: int) -> Array:
-    """The window (1 − u²)⁴ [length], u from −1 to 1 at the centres of equal cells."""
+    """A smooth window that vanishes, with three derivatives, at both ends.
+
+    Parameters
+    ----------
+    length
+        Samples [1].
+
+    Returns
+    -------
+    array [length]
+        (1 − u²)⁴ with u from −1 to 1 at the centres of equal cells.
+
+    """
     u = (2.0 * np.arange(length) + 1.0) / length - 1.0
     window: Array = (1.0 - u * u) ** 4
     return window
@@ -70,9 +107,30 @@ def bump(length: int) -> Array:
 def window_starts(
     keep: NDArray[np.bool_], length: int, hop: int | None = None, most: int | None = None
 ) -> NDArray[np.int64]:
-    """First samples [W] of the windows that hold usable samples only, one every `hop`.
+    """First samples of the windows that hold usable samples only.
 
-    `hop` is half a window by default; of more than `most` windows an even selection stays.
+    Parameters
+    ----------
+    keep
+        Which samples are usable [n].
+    length
+        Samples a window.
+    hop
+        Samples from one window to the next; half a window by default.
+    most
+        Most windows; of more than that an even selection stays.
+
+    Returns
+    -------
+    array [W]
+        Rising row numbers.
+
+    Examples
+    --------
+    >>> keep = np.array([True, True, True, True, False, True, True, True])
+    >>> window_starts(keep, 3, hop=1).tolist()
+    [0, 1, 5]
+
     """
     starts: NDArray[np.int64] = np.arange(
         0, max(keep.size - length, -1) + 1, hop or max(length // 2, 1)
@@ -92,10 +150,28 @@ def projection(
     cycles: float = 3.0,
     margin: float = 16.0,
 ) -> Projection:
-    """Windows of `length` samples from `starts` [W], times {1, cos kθ, sin kθ}.
+    """Test functions over one clock: smooth windows, plain and times harmonics of the shaft angle.
 
-    theta_rad [n] is the shaft angle. An order counts in windows that hold `cycles` of it with at
-    least `margin` samples each; an order that counts in none is left out.
+    Parameters
+    ----------
+    theta_rad
+        Unwrapped shaft angle [n, rad].
+    starts
+        First samples of the windows [W].
+    length
+        Samples a window.
+    orders
+        Orders [1/turn]; one that counts in no window is left out.
+    cycles
+        Least cycles of an order in a window where it counts [1].
+    margin
+        Least samples a cycle there [1].
+
+    Returns
+    -------
+    Projection
+        Of each order a cosine and a sine, after the plain window.
+
     """
     window = bump(length)
     tags: list[float] = [0]

@@ -20,9 +20,28 @@ _K = np.arange(1.0, 65.0)
 
 
 def resolution(signal: Array) -> float:
-    """The step q of a signal [n]: the least spacing of its values, 0 where all are one.
+    """The step of a converter: the least spacing of a signal's values.
 
-    Spacings below 1e-7 of the span are rounding of a sum of channels, not steps.
+    Parameters
+    ----------
+    signal
+        Readings [n, any unit]; those that are not finite are left out.
+
+    Returns
+    -------
+    float
+        Step q in the unit of the signal; 0 where all values are one.
+
+    Notes
+    -----
+    Spacings below 1e-7 of the span are rounding of a sum of channels, not steps. Readings of a
+    continuous channel have a least spacing too: that it is a step has to show elsewhere.
+
+    Examples
+    --------
+    >>> resolution(np.array([0.5, 1.5, 1.0, 3.0]))
+    0.5
+
     """
     values = np.unique(signal[np.isfinite(signal)])
     spacing = np.diff(values)
@@ -33,7 +52,32 @@ def resolution(signal: Array) -> float:
 def rounding_rms(step: float, sigma: float) -> float:
     """Root mean square of what rounding leaves in the mean of many samples of one level.
 
-    `step` and the noise before the converter `sigma` in one unit.
+    Parameters
+    ----------
+    step
+        Step q of the converter [any unit].
+    sigma
+        Standard deviation of the noise before the converter [same unit].
+
+    Returns
+    -------
+    float
+        [same unit], over all levels alike: q/√12 without noise, next to none at half a step of
+        noise.
+
+    Notes
+    -----
+    q²/(2π²) Σ_k exp(−4π² k² σ²/q²)/k², its square.
+
+    References
+    ----------
+    Widrow and Kollar, Quantization Noise, Cambridge University Press, 2008, ch. 4.
+
+    Examples
+    --------
+    >>> round(rounding_rms(1.0, 0.0) * math.sqrt(12.0), 2), round(rounding_rms(1.0, 0.5), 4)
+    (1.0, 0.0016)
+
     """
     if step <= 0.0:
         return 0.0
@@ -42,10 +86,26 @@ def rounding_rms(step: float, sigma: float) -> float:
 
 
 def noise_after_rounding(signal: Array, step: float) -> float:
-    """Standard deviation of the sample-to-sample scatter of a rounded signal [n].
+    """Standard deviation of the sample-to-sample scatter of a rounded signal.
 
-    From second differences (variance 6 s²) below 8 of their standard deviations, taken as a step
-    at least: no median, which is 0 or a whole step where the noise is less than that.
+    Parameters
+    ----------
+    signal
+        Readings [n, any unit]; those that are not finite are left out.
+    step
+        Step of the converter [same unit].
+
+    Returns
+    -------
+    float
+        [same unit]; 0 for fewer than six samples.
+
+    Notes
+    -----
+    Second differences have the variance 6 s². The mean square is taken of those below eight of
+    their standard deviations, itself taken as one step at least: a median would be 0 or a whole
+    step where the noise is less than a step.
+
     """
     second = np.diff(signal[np.isfinite(signal)], n=2)
     if second.size < 4:
@@ -56,9 +116,25 @@ def noise_after_rounding(signal: Array, step: float) -> float:
 
 
 def noise_before_rounding(sigma: float, step: float) -> float:
-    """The noise that a converter of `step` makes a scatter `sigma` of, over all levels alike.
+    """The noise before a converter that scatters by a given amount after it.
 
-    s_after² = s² + q²/12 - (mean square of the means' error), which is 0 without noise.
+    Parameters
+    ----------
+    sigma
+        Standard deviation of the readings' scatter [any unit].
+    step
+        Step q of the converter [same unit]; 0 where there is none.
+
+    Returns
+    -------
+    float
+        Standard deviation [same unit], over all levels alike; 0 where rounding alone explains it.
+
+    Notes
+    -----
+    s_after² = s² + q²/12 − (mean square of the means' error, see `rounding_rms`), which is 0
+    without noise, solved for s.
+
     """
     if step <= 0.0 or sigma >= 2.0 * step:
         return math.sqrt(max(sigma**2 - step**2 / 12.0, 0.0))

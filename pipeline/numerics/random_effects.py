@@ -31,18 +31,46 @@ class Between(NamedTuple):
 
 
 def between(values: Array, covariance: Array, covariance_dof: float = np.inf) -> Between:
-    """Random effects of k `values` [k] with their `covariance` [k, k] known to `covariance_dof`.
+    """Whether values of one quantity agree, and what they scatter beyond their covariance.
 
-    What the values share stands off the covariance's diagonal, and cancels in their differences.
-    With W its inverse and P = W - W 1 (1'W 1)^-1 1'W, chi2 = y'P y does not know the mean, and
-    E[chi2] = (k - 1) + sd² trace(P) where the values scatter by sd beyond their covariance: solved
-    for sd (method of moments). chi2/(k - 1) is judged as F(k - 1, covariance_dof). Fewer than two
-    values agree.
+    Parameters
+    ----------
+    values
+        Estimates of one quantity [k, any unit].
+    covariance
+        Of the values [k, k, unit²]. What they share stands off its diagonal, and cancels in their
+        differences.
+    covariance_dof
+        Degrees of freedom to which the covariance is known.
 
-    References: DerSimonian and Laird, Controlled Clinical Trials 7, 1986, 177-188,
-    doi:10.1016/0197-2456(86)90046-2; Jackson, White and Riley, Statistics in Medicine 31, 2012,
-    3805-3820, doi:10.1002/sim.5453 (matrix form); Birge, Phys. Rev. 40, 1932, 207,
-    doi:10.1103/PhysRev.40.207.
+    Returns
+    -------
+    Between
+        Fewer than two values agree.
+
+    Notes
+    -----
+    With W the inverse covariance and P = W − W 1 (1'W 1)⁻¹ 1'W, chi2 = y'P y does not depend on the
+    mean, and E[chi2] = (k − 1) + sd² trace(P) where the values scatter by sd beyond their
+    covariance: solved for sd (method of moments). chi2/(k − 1) is judged as F(k − 1,
+    covariance_dof).
+
+    References
+    ----------
+    DerSimonian and Laird, Controlled Clinical Trials 7, 1986, 177,
+    doi:10.1016/0197-2456(86)90046-2.
+    Jackson, White and Riley, Statistics in Medicine 31, 2012, 3805, doi:10.1002/sim.5453
+    (matrices).
+    Birge, Phys. Rev. 40, 1932, 207, doi:10.1103/PhysRev.40.207.
+
+    Examples
+    --------
+    Two values 2 apart, each with a standard uncertainty of 1: chi2 = 2²/(1 + 1) = 2.
+
+    >>> found = between(np.array([1.0, 3.0]), np.eye(2))
+    >>> round(found.chi2, 9), found.dof, round(found.sd, 9)
+    (2.0, 1, 1.0)
+
     """
     count = values.size
     if count < 2:

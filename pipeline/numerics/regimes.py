@@ -30,19 +30,34 @@ class Stretch:
 
 
 def regimes(speed_rad_s: Array, current_a: Array) -> tuple[Stretch, ...]:
-    """States of a record [n] of shaft speed and q current, in order of rows.
+    """What a machine was doing, stretch by stretch: at rest, motoring, generating, ...
 
-    At rest is below 1 % of the largest speed, no current below 3 % of the largest current;
-    motoring is current in the sense of the speed. Means over at most 2000 blocks are judged, and
-    stretches of fewer than three blocks join the one before, so that noise around a threshold
-    makes no confetti. Not finite is at rest, without current.
+    Parameters
+    ----------
+    speed_rad_s
+        Shaft speed [n, rad/s].
+    current_a
+        q current [n, A]; positive makes torque in the sense of positive speed.
+
+    Returns
+    -------
+    tuple of Stretch
+        In order of rows, from row 0 on; empty for an empty record.
+
+    Notes
+    -----
+    At rest is a speed of at most `SPEED_SHARE` of the largest, no current at most `CURRENT_SHARE`
+    of the largest; motoring is current in the sense of the speed. Means over at most `BLOCKS`
+    blocks are judged, and stretches of fewer than `SHORTEST_BLOCKS` blocks join the one before, so
+    that noise about a threshold makes none. A value that is not finite counts as 0.
+
     """
     if speed_rad_s.size == 0:
         return ()
     block = -(-speed_rad_s.size // BLOCKS)
     starts = np.arange(0, speed_rad_s.size, block)
-    speed = _means(np.nan_to_num(speed_rad_s), starts)
-    current = _means(np.nan_to_num(current_a), starts)
+    speed = _means(np.where(np.isfinite(speed_rad_s), speed_rad_s, 0.0), starts)
+    current = _means(np.where(np.isfinite(current_a), current_a, 0.0), starts)
     moving = np.abs(speed) > SPEED_SHARE * np.abs(speed).max(initial=0.0)
     powered = np.abs(current) > CURRENT_SHARE * np.abs(current).max(initial=0.0)
     states = np.where(
@@ -56,7 +71,23 @@ def regimes(speed_rad_s: Array, current_a: Array) -> tuple[Stretch, ...]:
 def stretches(
     states: NDArray[np.str_], starts: NDArray[np.int64], shortest: int = 1
 ) -> tuple[Stretch, ...]:
-    """Equal states in a row [b] become one stretch; shorter ones than `shortest` join the last."""
+    """Equal states in a row as one stretch.
+
+    Parameters
+    ----------
+    states
+        State of each block [b].
+    starts
+        First row of each block [b].
+    shortest
+        Fewest blocks; a run of fewer joins the stretch before it.
+
+    Returns
+    -------
+    tuple of Stretch
+        In order of rows.
+
+    """
     cuts = np.flatnonzero(np.concatenate([[True], states[1:] != states[:-1]]))
     lengths = np.diff(np.append(cuts, states.size))
     stretches: list[Stretch] = []

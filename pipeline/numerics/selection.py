@@ -22,14 +22,42 @@ def needed_columns(
     most: int | None = None,
     dependence: float = 1.0,
 ) -> list[str]:
-    """Names of the candidate columns [n each] that y [n] demands beside `base` [n, k].
+    """Which of many candidate columns a weighted least-squares fit needs beside its base.
 
+    Parameters
+    ----------
+    base
+        Columns that are in the fit whatever comes [n, k].
+    candidates
+        Further columns [n] by name.
+    y
+        Observations [n].
+    sigma
+        Their standard deviations [n, unit of y]; only their ratios count.
+    level
+        Chance that a column joins that explains nothing [1].
+    most
+        Most columns that may join.
+    dependence
+        How many rows count as one, where they are correlated [1].
+
+    Returns
+    -------
+    list of str
+        Names in the order in which they joined.
+
+    Notes
+    -----
     Forward selection: the column with the largest fall of the weighted sum of squares joins while
-    its F(1, n-k-1) is significant at `level` over the candidates left, at most `most` of
-    them and never more, with the base, than half of the rows that count: `dependence` rows are one
-    where they are correlated. Columns are kept orthogonal to those already in, so one step costs
-    one product. References: Draper and Smith, Applied Regression Analysis, 3rd ed., 15.3; Chen,
-    Billings and Luo, Int. J. Control 50(5), 1989 (orthogonal forward selection).
+    its F(1, n − k − 1) is significant at `level` over the candidates left (Bonferroni), n being
+    divided by `dependence`. With the base there are never more columns than half of the rows that
+    count. Candidates are kept orthogonal to what is in, so that a step costs one product.
+
+    References
+    ----------
+    Draper and Smith, Applied Regression Analysis, 3rd ed., Wiley, 1998, 15.3.
+    Chen, Billings and Luo, Int. J. Control 50(5), 1989, 1873, doi:10.1080/00207178908953472.
+
     """
     names = list(candidates)
     most_columns = max(0, int(y.size / (2.0 * dependence)) - base.shape[1])

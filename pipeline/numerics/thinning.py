@@ -10,11 +10,26 @@ Indices = NDArray[np.intp]
 
 
 def line_points(y: Array, limit: int) -> Indices:
-    """Indices [rising] of a curve y [n] that keep each bucket's extremes.
+    """Rows of a curve that a drawing needs: of each bucket its extremes.
 
-    The curve is cut into limit/2 buckets of equal length; of each its least and greatest finite
-    value stay, and the first NaN, so that a gap remains a gap; the ends stay too. A curve of
-    up to `limit` points stays whole, a longer one without gaps keeps at most limit + 2.
+    Parameters
+    ----------
+    y
+        Curve [n, any unit]; NaN is a gap.
+    limit
+        Most points, or so.
+
+    Returns
+    -------
+    array
+        Rising row numbers. All rows where there are up to `limit`; else at most `limit` + 2 of a
+        curve without gaps, and one more a bucket with a gap.
+
+    Notes
+    -----
+    The curve is cut into limit/2 buckets of equal length. Of each the least and the greatest value
+    stay, and the first NaN, so that a gap remains a gap; the two ends stay too.
+
     """
     if y.size <= limit:
         return np.arange(y.size, dtype=np.intp)
@@ -35,9 +50,20 @@ def line_points(y: Array, limit: int) -> Indices:
 
 
 def cloud_points(x_px: Array, y_px: Array, cell_px: float) -> Indices:
-    """Indices [rising] of points that fall in different cells of a grid, the first of each cell.
+    """Points of a cloud that fall in different cells of a grid, the first of each cell.
 
-    Points that are not finite are left out.
+    Parameters
+    ----------
+    x_px, y_px
+        Where the points are drawn [n, pixel]; points that are not finite are left out.
+    cell_px
+        Side of a cell [pixel].
+
+    Returns
+    -------
+    array
+        Rising indices of the points.
+
     """
     finite = np.flatnonzero(np.isfinite(x_px) & np.isfinite(y_px))
     column = np.floor(x_px[finite] / cell_px).astype(np.int64)

@@ -42,10 +42,25 @@ class WeakRows:
         return int(self.starts.size)
 
     def integral(self, signal: Array, order: int = 0) -> Array:
-        """Window averages [w] of a derivative of a signal [n]: the signal, its first or second.
+        """Window averages of a signal or of its first or second derivative.
 
-        integral(phi d^order x/dt^order) / integral(phi), the derivatives thrown onto phi. Exact
-        for constants (order 0), straight lines (1) and parabolas (2) on any clock.
+        Parameters
+        ----------
+        signal
+            Samples on the clock of the windows [n, any unit].
+        order
+            Of the derivative: 0, 1 or 2.
+
+        Returns
+        -------
+        array [w]
+            Unit of the signal over s^order.
+
+        Notes
+        -----
+        ∫φ dᵏx/dtᵏ dt/∫φ dt, the derivatives moved onto φ by partial integration. Exact for
+        constants (order 0), straight lines (1) and parabolas (2) on any clock.
+
         """
         kernel = self.weights[order]
         if self.members.size == 0:
@@ -60,7 +75,20 @@ class WeakRows:
         return _sums(part * kernel, self.sizes)
 
     def noise_gain(self, order: int) -> float:
-        """Standard deviation of `integral(white noise of unit deviation, order)`, typical."""
+        """How much white noise of the signal is left in the window averages.
+
+        Parameters
+        ----------
+        order
+            Of the derivative: 0, 1 or 2.
+
+        Returns
+        -------
+        float
+            Standard deviation of `integral` over that of the samples [s^-order]; on an uneven clock
+            the median over the windows.
+
+        """
         power = self.weights[order] ** 2
         if self.members.size == 0:
             return float(np.sqrt(power.sum()))
@@ -68,10 +96,44 @@ class WeakRows:
 
 
 def weak_rows(t_s: Array, width_s: float, overlap: float = 0.5) -> WeakRows:
-    """Windows of `width_s` over the clock t_s [n], each overlapping the next by `overlap`.
+    """Windows over a clock, with the weights that turn samples into averages of derivatives.
 
-    A window with fewer than nine samples, or with a gap of more than a quarter of its width, is
-    left out. Raises ValueError where no window is left.
+    Parameters
+    ----------
+    t_s
+        Sampling instants [n, s], rising.
+    width_s
+        Width of a window [s].
+    overlap
+        Part of a window that the next one shares [1], below 1.
+
+    Returns
+    -------
+    WeakRows
+        Windows of at least `LEAST_SAMPLES` samples without a gap of more than a quarter of their
+        width.
+
+    Raises
+    ------
+    ValueError
+        No window is left.
+
+    Notes
+    -----
+    φ(u) = (1 − u²)⁴ on −1 < u < 1. The weights are corrected so that they are exact on polynomials
+    of their order, whatever the clock.
+
+    References
+    ----------
+    Messenger and Bortz, Multiscale Model. Simul. 19(3), 2021, 1474, doi:10.1137/20M1343166.
+
+    Examples
+    --------
+    >>> t_s = np.linspace(0.0, 1.0, 101)
+    >>> rows = weak_rows(t_s, 0.5)
+    >>> np.round(rows.integral(3.0 * t_s**2, order=2), 6).tolist()
+    [6.0, 6.0, 6.0]
+
     """
     hop = width_s * (1.0 - overlap)
     firsts = np.arange(t_s[0], t_s[-1] - width_s * (1.0 - 1e-9), hop)
@@ -133,9 +195,32 @@ def _kernels(t_s: Array, sizes: NDArray[np.int64]) -> Array:
 
 
 def smooth_speed(t_s: Array, angle: Array, width_s: float) -> Array:
-    """Rate [n] of an angle [n]: slope of the straight line through the samples of `width_s`.
+    """Rate of an angle: the slope of the straight line through the samples about each row.
 
-    Raises ValueError where the record is shorter than the window.
+    Parameters
+    ----------
+    t_s
+        Sampling instants [n, s], rising.
+    angle
+        Angle, unwrapped [n, any unit].
+    width_s
+        Width of the window [s]; at least five samples are taken.
+
+    Returns
+    -------
+    array [n]
+        Unit of the angle per second. Within half a window of the ends, the rate of the first and of
+        the last whole window.
+
+    Raises
+    ------
+    ValueError
+        The record is shorter than the window.
+
+    References
+    ----------
+    Savitzky and Golay, Anal. Chem. 36(8), 1964, 1627, doi:10.1021/ac60214a047.
+
     """
     reach = max(2, round(0.5 * width_s / float(np.median(np.diff(t_s)))))
     size = 2 * reach + 1

@@ -18,10 +18,32 @@ _THIRD = complex(-0.5, math.sqrt(0.75))
 
 
 def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
-    """Stator-frame vector [n] of three phase quantities [n each], any unit.
+    """Stator-frame vector of three phase quantities, amplitude-invariant.
 
-    x = (2/3)(a + b e^{j2π/3} + c e^{-j2π/3}) [1]; the common part drops out, and the length of a
+    Parameters
+    ----------
+    a, b, c
+        Phase quantities [n each, any unit].
+
+    Returns
+    -------
+    array [n], complex
+        α + jβ in the same unit, α on phase a.
+
+    Notes
+    -----
+    x = (2/3)(a + b e^{j2π/3} + c e^{−j2π/3}). The common part drops out, and the length of a
     balanced system's vector is its phase amplitude.
+
+    References
+    ----------
+    E. Clarke, Circuit Analysis of A-C Power Systems, Wiley, 1943.
+
+    Examples
+    --------
+    >>> complex(np.round(space_vector(2.0, -1.0, -1.0), 9))
+    (2+0j)
+
     """
     vector: Complex = (2.0 / 3.0) * (
         np.asarray(a, dtype=np.float64)
@@ -32,10 +54,36 @@ def space_vector(a: ArrayLike, b: ArrayLike, c: ArrayLike) -> Complex:
 
 
 def vector_of_lines(lines: Mapping[str, Array]) -> Complex:
-    """Stator-frame vector [n, V] of two or three line voltages [n each, V] by their column names.
+    """Stator-frame vector of two or three line voltages, amplitude-invariant.
 
-    a = (2 ab + bc)/3 and b − c = bc where a + b + c = 0; what all three have in common is no line
-    voltage and is taken out. Raises KeyError for fewer than two.
+    Parameters
+    ----------
+    lines
+        Line voltages [n each, V] by column name: vab_v, vbc_v, vca_v, or two of them.
+
+    Returns
+    -------
+    array [n, V], complex
+        α + jβ of the phase voltages, α on phase a.
+
+    Raises
+    ------
+    KeyError
+        There are fewer than two.
+
+    Notes
+    -----
+    With a + b + c = 0, a = (2 v_ab + v_bc)/3 and b − c = v_bc, so α = a and β = v_bc/√3. Three line
+    voltages sum to zero: what they have in common is an error of the instrument and is taken out.
+
+    Examples
+    --------
+    Phases at 2, −1 and −1 V:
+
+    >>> lines = {"vab_v": np.array([3.0]), "vbc_v": np.array([0.0])}
+    >>> vector_of_lines(lines).tolist()
+    [(2+0j)]
+
     """
     if len(lines) == 3:
         mean = sum(lines.values()) / 3.0

@@ -35,7 +35,24 @@ class Term:
 
 
 def suffix_of(name: str) -> str:
-    """The longest known unit suffix that ends a name, or an empty string."""
+    """The unit suffix that ends a name.
+
+    Parameters
+    ----------
+    name
+        Of a column, constant or key.
+
+    Returns
+    -------
+    str
+        The longest suffix of `SUFFIX_UNITS` that fits; empty where none does.
+
+    Examples
+    --------
+    >>> suffix_of("omega_mech_rad_s"), suffix_of("pole_pairs")
+    ('rad_s', '')
+
+    """
     parts = name.split("_")
     for start in range(1, len(parts)):
         tail = "_".join(parts[start:])

@@ -28,9 +28,34 @@ class DqMeans:
 def dq_voltages(
     state: DqMeans, r_ohm: Array, ld_h: float, lq_h: float, psi_wb: Array
 ) -> tuple[Array, Array]:
-    """v_d, v_q [w, V]; `r_ohm` [w] and `psi_wb` [w] at the temperatures of the windows.
+    """Rotor-frame voltages of the ideal machine.
 
-    v_d = R i_d + L_d di_d/dt − ω L_q i_q and v_q = R i_q + L_q di_q/dt + ω (L_d i_d + ψ) [1].
+    Parameters
+    ----------
+    state
+        Means over windows: currents, their rates, electrical speed.
+    r_ohm
+        Phase resistance at the temperature of each window [w, ohm].
+    ld_h, lq_h
+        Inductances [H].
+    psi_wb
+        Magnet flux linkage, phase peak, at the temperature of each window [w, Wb].
+
+    Returns
+    -------
+    v_d, v_q [w, V]
+
+    Notes
+    -----
+    v_d = R i_d + L_d di_d/dt − ω L_q i_q
+
+    v_q = R i_q + L_q di_q/dt + ω (L_d i_d + ψ), with ω the electrical speed.
+
+    References
+    ----------
+    IEEE Std 1812-2014, clause 3.
+    P. Vas, Sensorless Vector and Direct Torque Control, Oxford University Press, 1998, ch. 2.
+
     """
     speed = state.omega_elec_rad_s
     vd = r_ohm * state.id_a + ld_h * state.id_rate_a_s - speed * lq_h * state.iq_a
@@ -41,6 +66,36 @@ def dq_voltages(
 def air_gap_torque(
     id_a: Array, iq_a: Array, kt_nm_a: Array, pole_pairs: float, saliency_h: float
 ) -> Array:
-    """T = K_t i_q + 1.5 p (L_d − L_q) i_d i_q [n, N·m]; `saliency_h` is L_d − L_q [1]."""
+    """Torque of the ideal machine: that of the magnets and that of saliency.
+
+    Parameters
+    ----------
+    id_a, iq_a
+        Rotor-frame currents, phase peak [n, A].
+    kt_nm_a
+        Torque constant 1.5 p ψ [n, N·m/A], of the peak ampere.
+    pole_pairs
+        p [1].
+    saliency_h
+        L_d − L_q [H], below zero with interior magnets.
+
+    Returns
+    -------
+    array [n, N·m]
+
+    Notes
+    -----
+    T = K_t i_q + 1.5 p (L_d − L_q) i_d i_q
+
+    References
+    ----------
+    IEEE Std 1812-2014, clause 3.
+
+    Examples
+    --------
+    >>> float(air_gap_torque(np.array(-2.0), np.array(3.0), np.array(0.5), 4.0, -0.125))
+    6.0
+
+    """
     torque: Array = kt_nm_a * iq_a + 1.5 * pole_pairs * saliency_h * id_a * iq_a
     return torque

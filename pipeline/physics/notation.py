@@ -53,8 +53,25 @@ def unit_text(unit: str) -> str:
 def scale_for(magnitude: float, unit: str) -> Scale:
     """The SI prefix, or power of ten where a prefix would mislead, that fits a magnitude.
 
-    A prefix stands before the first unit of a product (mN·m, µH). Units such as kg·m², rad/s, °C
-    and degrees take a power of a thousand instead, and only outside 0.001 to 10000.
+    Parameters
+    ----------
+    magnitude
+        Of the number [unit].
+    unit
+        As in the glossary.
+
+    Returns
+    -------
+    Scale
+        Of a power of a thousand. A prefix, p to M, stands before the first unit of a product (mN·m,
+        µH). Units such as kg·m² and rad/s take a power of ten instead, and only outside 0.001 to
+        10000; 1/K always does; degrees, of angle or temperature, never.
+
+    Examples
+    --------
+    >>> scale_for(2.5e-4, "H").unit, scale_for(2.5e-6, "kg·m²").unit, scale_for(1e5, "degC").unit
+    ('µH', '×10⁻⁶ kg·m²', '°C')
+
     """
     shown = unit_text(unit)
     if not math.isfinite(magnitude) or magnitude == 0.0 or shown in {"°C", "°"}:
@@ -76,10 +93,34 @@ def times_ten(exponent: int, shown: str) -> str:
 
 
 def reading(value: float, u: float, unit: str, scale: Scale | None = None) -> Reading:
-    """Value ± U (k=2) in engineering notation, both rounded to two digits of U (GUM 7.2.6).
+    """Value and expanded uncertainty in engineering notation, rounded by the uncertainty.
 
-    `u` is the standard uncertainty [unit]; where it is 0 or not finite the value is shown with
-    four significant digits (all digits of a whole number) and no ±.
+    Parameters
+    ----------
+    value
+        The number [unit].
+    u
+        Its standard uncertainty [unit]; 0 or not finite where none is stated.
+    unit
+        As in the glossary.
+    scale
+        Prefix or power of ten; by default what fits the larger of both.
+
+    Returns
+    -------
+    Reading
+        Value and U = 2 u, both to the place of the second digit of U. Without an uncertainty the
+        value has four significant digits, a whole number below a million all of its own.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), 7.2.6.
+
+    Examples
+    --------
+    >>> reading(0.123456, 0.00042, "ohm").text()
+    '123.46 ± 0.84 mΩ'
+
     """
     expanded = COVERAGE_FACTOR * u
     if not math.isfinite(expanded) or expanded <= 0.0:
@@ -99,14 +140,51 @@ def reading(value: float, u: float, unit: str, scale: Scale | None = None) -> Re
 
 
 def number_text(value: float | None, u: float | None, unit: str) -> str:
-    """A reading as one line of text, or that there is none."""
+    """A reading as one line of text, or that there is none.
+
+    Parameters
+    ----------
+    value
+        The number [unit]; None where it is not identifiable.
+    u
+        Its standard uncertainty [unit], if any.
+    unit
+        As in the glossary.
+
+    Returns
+    -------
+    str
+        See `reading`.
+
+    """
     if value is None:
         return "not identifiable"
     return reading(value, 0.0 if u is None else u, unit).text()
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """A number without uncertainty in engineering notation, to some significant digits."""
+    """A number without uncertainty in engineering notation.
+
+    Parameters
+    ----------
+    value
+        The number [unit].
+    unit
+        As in the glossary.
+    digits
+        Significant digits.
+
+    Returns
+    -------
+    str
+        A dash where the number is not finite.
+
+    Examples
+    --------
+    >>> quantity(0.0123456, "N·m"), quantity(9999.96, "V")
+    ('12.35 mN·m', '10.00 kV')
+
+    """
     if not math.isfinite(value):
         return "–"
     scale = scale_for(_rounded_magnitude(value, digits), unit)
@@ -114,7 +192,26 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
 
 
 def significant(value: float, digits: int) -> str:
-    """Plain decimal text with `digits` significant digits, trailing zeros of a fraction kept."""
+    """Plain decimal text with some significant digits, trailing zeros of a fraction kept.
+
+    Parameters
+    ----------
+    value
+        Any number.
+    digits
+        Significant digits, at least 1.
+
+    Returns
+    -------
+    str
+        Without exponent; 0 is `0`, and a number that is not finite a dash.
+
+    Examples
+    --------
+    >>> significant(0.5, 3), significant(1234.0, 2)
+    ('0.500', '1200')
+
+    """
     if value == 0.0 or not math.isfinite(value):
         return "0" if value == 0.0 else "–"
     place = _place_of(value, digits)

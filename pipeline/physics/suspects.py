@@ -117,10 +117,25 @@ MOST_SUSPECTS = 2
 def convention_suspect(
     ratio: float, half_width: float, quantity: Quantity, pole_pairs: int | None = None
 ) -> str | None:
-    """The convention whose number a ratio of two like quantities lands on, or None.
+    """The convention whose number a ratio of two like quantities lands on.
 
-    One of `conventions_hit`, or both of two, the nearest first; None where it hits none, or so many
-    that they say nothing.
+    Parameters
+    ----------
+    ratio
+        Of two values of one quantity [1].
+    half_width
+        Of its coverage interval [1]: the expanded uncertainty U = k u (GUM 6.2).
+    quantity
+        What the ratio is of: a convention that cannot enter it is no explanation of it.
+    pole_pairs
+        Of the machine; a factor by which electrical and mechanical angles differ.
+
+    Returns
+    -------
+    str or None
+        One of `conventions_hit`, or two, the nearest first; None where it hits none, or so many
+        that they say nothing.
+
     """
     hits = conventions_hit(ratio, half_width, quantity, pole_pairs)
     return " or ".join(hits) if 0 < len(hits) <= MOST_SUSPECTS else None
@@ -144,8 +159,15 @@ def conventions_hit(
 
     Returns
     -------
-    One text a convention, `1/` before its number where the ratio is the inverse. None where the
-    interval holds 1: nothing is to be explained then.
+    list of str
+        One text a convention, `1/` before its number where the ratio is the inverse. Empty where
+        the interval holds 1, for nothing is to be explained then, and where a number is not finite
+        or the ratio not above zero.
+
+    Examples
+    --------
+    >>> conventions_hit(1.42, 0.02, "coupling")
+    ['1.4142: peak against rms']
 
     """
     if not (ratio > 0.0 and math.isfinite(ratio) and math.isfinite(half_width)):

@@ -101,6 +101,15 @@ def test_passes_and_whole_turns() -> None:
     assert largest_order(made, 10_000) == pytest.approx(1000, abs=2)
 
 
+def test_turns_are_found_behind_a_first_angle_that_is_missing() -> None:
+    theta = np.linspace(0.0, 5.0 * np.pi, 5001)
+    value = np.ones(theta.size)
+    theta[0], value[7] = np.nan, np.inf
+    made = whole_turns(theta, value)
+    assert [turn.sense for turn in made] == [1, 1]
+    assert all(np.isfinite(turn.theta_rad).all() and np.all(turn.value == 1.0) for turn in made)
+
+
 def test_even_positions() -> None:
     even = [Turn(np.arange(360) * (2.0 * np.pi / 360), np.ones(360), s) for s in (1, -1)]
     assert even_positions(even) == 360

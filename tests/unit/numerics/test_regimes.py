@@ -47,6 +47,12 @@ def test_missing_values_are_standstill_and_an_empty_record_has_none() -> None:
     assert regimes(np.zeros(0), np.zeros(0)) == ()
 
 
+def test_an_infinite_reading_hides_no_other() -> None:
+    speed, current = np.full(50, 10.0), np.full(50, 2.0)
+    speed[3], current[4] = np.inf, -np.inf
+    assert MOTORING in [one.state for one in regimes(speed, current)]
+
+
 def test_a_stretch_that_is_too_short_joins_the_one_before() -> None:
     states = np.array([*"aaabaaacc"])
     starts = 10 * np.arange(9)

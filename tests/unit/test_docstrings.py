@@ -1,0 +1,60 @@
+"""Docstrings of the whole package: examples run, and a Parameters section fits its signature."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import importlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FILES = sorted((ROOT / "pipeline").rglob("*.py"))
+PUBLIC = ROOT / "pipeline" / "api"
+EXAMPLES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for path in FILES
+    if ">>> " in path.read_text() and PUBLIC not in path.parents
+]
+PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-+\n|\Z)", re.DOTALL | re.MULTILINE)
+
+
+def named(text: str) -> list[str]:
+    """The names that a Parameters section describes, in order."""
+    heads = [line.partition(" :")[0] for line in text.splitlines() if line[:1].strip()]
+    return [name.strip() for head in heads for name in head.split(",")]
+
+
+def wrong(source: str) -> Iterator[str]:
+    """Functions whose Parameters section leaves one out, invents one or changes their order."""
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        section = PARAMETERS.search(ast.get_docstring(node) or "")
+        every = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+        every += [one for one in (node.args.vararg, node.args.kwarg) if one is not None]
+        taken = [one.arg for one in every if one.arg not in ("self", "cls")]
+        if section is not None and named(section[1]) != taken:
+            yield f"{node.name}: {named(section[1])} for {taken}"
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_examples_in_docstrings_run(name: str) -> None:
+    result = doctest.testmod(importlib.import_module(name))
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def test_a_parameters_section_names_the_parameters_of_its_function() -> None:
+    found = [f"{path}: {one}" for path in FILES for one in wrong(path.read_text())]
+    assert found == []
+
+
+def test_a_section_that_does_not_fit_is_seen() -> None:
+    source = 'def f(a, b):\n    """Adds.\n\n    Parameters\n    ----------\n    a, c\n        X."""'
+    assert list(wrong(source)) == ["f: ['a', 'c'] for ['a', 'b']"]
+    assert list(wrong(source.replace("a, c", "b, a"))) == ["f: ['b', 'a'] for ['a', 'b']"]
+    assert list(wrong(source.replace("a, c", "a, b"))) == []
