@@ -126,6 +126,12 @@ class RunSettings(ReadingSettings):
         "hold the captures against model= down to their noise, as diagnose does; false: "
         "not_tested, which a person may release and release=auto does not",
     )
+    diagnose: str = key(
+        "auto",
+        "auto: name what the model lacks, with sizes, where residuals are over their floor; true: "
+        "and write diagnosis/ as `diagnose` does; false: say only that something is missing",
+        one_of=("auto", "true", "false"),
+    )
     model: ModelSettings = field(default_factory=ModelSettings)
     policy: dict[str, Any] = key(
         {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"

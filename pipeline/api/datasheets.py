@@ -19,7 +19,7 @@ from pipeline.execution.jobs import MotorJob
 from pipeline.execution.stamp import configuration_digest, stamp_of
 from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.diagnoses import read_diagnoses
-from pipeline.io.storage.limits import limits_file, required_constants
+from pipeline.io.storage.limits import limits_file, release_conditions
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.diagnosis_summary import DiagnosisSummary
 from pipeline.records.outcome import Stopwatch
@@ -99,6 +99,7 @@ def check(
     options: Options | None = None,
     model: str | None = "standard",
     effects: Sequence[str] = (),
+    diagnose: bool = True,
 ) -> Datasheets:
     """Cross-checks the constants of each motor and puts its datasheet together.
 
@@ -116,6 +117,8 @@ def check(
         The model of the residual test; None for no residual test.
     effects : sequence of str
         Effects to add to the model.
+    diagnose : bool
+        Name what the model lacks, with sizes, where its residuals are over their noise floor.
 
     Returns
     -------
@@ -146,21 +149,27 @@ def check(
         release=release,
         residual_test=model is not None,
         model=ModelSettings(name=model or "standard", effects=list(effects)),
+        diagnose="auto" if diagnose else "false",
     )
     check_options(settings)
-    required = required_constants(limits_file(limits))
-    sheets = {name: _datasheet(one, settings, required) for name, one in fits.motors.items()}
+    conditions = release_conditions(limits_file(limits))
+    sheets = {name: _datasheet(one, settings, conditions) for name, one in fits.motors.items()}
     return Datasheets(sheets)
 
 
-def _datasheet(fit: MotorFit, settings: RunSettings, required: tuple[str, ...]) -> Datasheet:
+def _datasheet(
+    fit: MotorFit, settings: RunSettings, conditions: tuple[tuple[str, ...], bool]
+) -> Datasheet:
+    required, model_gates = conditions
     model = model_spec(settings.model.name, settings.model.effects, policy=settings.policy)
     job = MotorJob(
         motor_id=fit.campaign.motor_id,
         entries=(),
         input="",
         output="",
-        config_sha256=configuration_digest(settings, required, fit.sources),
+        config_sha256=configuration_digest(
+            settings, required, fit.sources, model_gates=model_gates
+        ),
         required=required,
         release=settings.release,
         report=False,
@@ -169,6 +178,8 @@ def _datasheet(fit: MotorFit, settings: RunSettings, required: tuple[str, ...]) 
         constants=settings.constants,
         crosscheck=settings.crosscheck,
         model=model if settings.residual_test else None,
+        diagnose=settings.diagnose,
+        model_gates=model_gates,
     )
     found = work.check(job, fit.campaign, fit.constants, None, Stopwatch())
     return work.assemble(job, fit.campaign, found, stamp_of(job, fit.campaign))

@@ -133,7 +133,12 @@ def _model() -> Schema:
     return _object(
         {
             "verdict": _one_of(ModelState),
-            "missing": _list(_object({"effect": NAME, "parameters": _map(quantity)})),
+            "missing": _list(
+                _object(
+                    {"effect": NAME, "parameters": _map(quantity)},
+                    {"headline": TEXT, "confused_with": _list(NAME), "experiment": TEXT},
+                )
+            ),
             "held_out": _or_null(SPREAD),
             "residual": _or_null(SPREAD),
         },
@@ -143,6 +148,18 @@ def _model() -> Schema:
             "worst": _or_null(_object({**excess, "unit": TEXT})),
             "over": COUNT,
             "note": TEXT,
+            "held_out_with": _or_null(SPREAD),
+            "unknown": TEXT,
+            "unexcited": _list(
+                _object(
+                    {
+                        "effect": NAME,
+                        "tests": _list(NAME),
+                        "experiment": TEXT,
+                        "signals": _list(NAME),
+                    }
+                )
+            ),
         },
     )
 

@@ -1,8 +1,8 @@
-"""Whether a model explains a motor's captures down to the noise: the verdict of `diagnose` alone.
+"""Whether a model explains a motor's captures down to the noise, and what it lacks if not.
 
-What is missing is named by `diagnose`. Here the search ends as soon as its verdict can only be that
-something is: where the model leaves something over the noise that is large for the machine, and
-that no slow drift of the instruments explains.
+The search for what is missing is most of the time of a diagnosis. Without it the verdict stands as
+soon as it can only be that something is missing: where the model leaves something over the noise
+that is large for the machine, and that no slow drift of the instruments explains.
 """
 
 from __future__ import annotations
@@ -12,30 +12,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
-from pipeline.criticism.diagnosis import TOO_LITTLE, enough, not_shown, verdict_of
+from pipeline.criticism.diagnosis import base_fit, searched
 from pipeline.criticism.effect import Array
-from pipeline.criticism.ladder import parameters_of
-from pipeline.criticism.library.named_models import model_of
-from pipeline.criticism.library.registry import effects
 from pipeline.criticism.regression.goodness import HeldOut, leave_out, remainder
 from pipeline.criticism.regression.linear_system import own_columns
 from pipeline.criticism.residuals.channels import reported_signal
-from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.search import End, ended
 from pipeline.criticism.selection.drift import wandering
-from pipeline.criticism.selection.requested_model import Begun, fit_of
+from pipeline.criticism.selection.requested_model import Begun
 from pipeline.criticism.validation.error_maps import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.records.diagnosis import ToldParameter
-from pipeline.records.model_verdict import Excess, ModelVerdict
-
-_NAME = "unknown"
+from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 
 
-def model_verdict(campaign: Campaign, model: ModelSpec, start: Constants) -> ModelVerdict:
+def model_verdict(
+    campaign: Campaign, model: ModelSpec, start: Constants, *, search: bool = True
+) -> tuple[ModelVerdict, Diagnosis | None]:
     """Fits a model to a motor's captures and holds the residuals against their noise floors.
 
     Parameters
@@ -46,13 +40,17 @@ def model_verdict(campaign: Campaign, model: ModelSpec, start: Constants) -> Mod
         Which model, by name, and effects to add to it or take from it.
     start
         Constants that give pole pairs and sizes where the captures do not.
+    search
+        Whether to search for what is missing where that something is, is sure without.
 
     Returns
     -------
     ModelVerdict
-        The verdict that `diagnose` gives to the same model of the same captures. Where it would
-        name effects, or an unknown structure, `missing` is said, with names only where they had to
-        be searched for to know the verdict.
+        The verdict that `diagnose` gives to the same model of the same captures, with the effects
+        found and their sizes. Without a search, what `diagnose` would call `unknown` may be
+        `missing`, and nothing is named.
+    Diagnosis or None
+        The diagnosis, where it was made.
 
     Raises
     ------
@@ -67,29 +65,49 @@ def model_verdict(campaign: Campaign, model: ModelSpec, start: Constants) -> Mod
     twice the floor's, and the size is one that somebody would act on.
 
     """
-    machine = machine_of(campaign, start)
-    if machine is None:
-        return _stated(model, ModelVerdict("insufficient", note=PAIRLESS))
-    found = segments(campaign, machine)
-    if not enough(found):
-        return _stated(model, ModelVerdict("insufficient", note=TOO_LITTLE))
-    begun = fit_of(found, model_of(model, machine))
-    around = begun.around
-    large = remainder(around, begun.segments, around.residual, large=True)
-    if large and wandering(begun.segments, begun.fitted, large) is None:
-        return _stated(model, replace(_residuals(begun), verdict="missing"))
-    library = effects(model.effects_path)
-    end = ended(campaign, model, machine, begun, library, _NAME)
-    unseen = not_shown(campaign, library, end)
-    verdict = verdict_of(end, unseen)
-    note = "; ".join(one.words for one in unseen) if verdict == "insufficient" else ""
-    tested = _residuals(begun if verdict in ("missing", "unknown") else end.ladder.begun)
-    missing = _named(end) if verdict == "missing" else {}
-    return _stated(model, replace(tested, verdict=verdict, missing=missing, note=note))
+    begun = base_fit(campaign, model, start)
+    if isinstance(begun, str):
+        return _stated(model, ModelVerdict("insufficient", note=begun)), None
+    if not search and _surely_missing(begun):
+        return _stated(model, replace(_residuals(begun), verdict="missing")), None
+    found, kept = searched(campaign, model, begun)
+    # instruments that drift count as noise where the verdict says that nothing else is left
+    tested = _residuals(begun if found.verdict in ("missing", "unknown") else kept)
+    return _stated(model, _named(tested, found)), found
 
 
 def _stated(model: ModelSpec, found: ModelVerdict) -> ModelVerdict:
     return replace(found, model=model.name, effects=model.effects)
+
+
+def _surely_missing(begun: Begun) -> bool:
+    large = remainder(begun.around, begun.segments, begun.around.residual, large=True)
+    return bool(large) and wandering(begun.segments, begun.fitted, large) is None
+
+
+def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
+    """The residuals of a model with what a diagnosis of it says."""
+    told = {one.effect: one for one in found.ranking}
+    missing = {
+        name: FoundEffect(
+            told[name].parameters,
+            told[name].headline,
+            told[name].confused_with,
+            told[name].experiment,
+        )
+        for name in found.missing
+    }
+    unseen = found.unexcited
+    one = found.unknown
+    return replace(
+        tested,
+        verdict=found.verdict,
+        missing=missing,
+        note="; ".join(u.words for u in unseen) if found.verdict == "insufficient" else "",
+        held_out_with=found.ladder[-1].held_out if missing else None,
+        unknown="" if one is None else f"{one.signal}, {one.shape}",
+        unexcited=unseen,
+    )
 
 
 def _residuals(begun: Begun) -> ModelVerdict:
@@ -122,17 +140,3 @@ def _largest(begun: Begun, residual: Array) -> float:
     around = begun.around
     spreads = around.spreads(residual / around.soft)[around.counts > 0]
     return math.sqrt(float(np.max(spreads, initial=0.0)))
-
-
-def _named(end: End) -> dict[str, dict[str, ToldParameter]]:
-    """Effects at the end of the ladder: value, standard uncertainty and unit of each parameter."""
-    last, held = end.ladder.rungs[-1], end.ladder.held[-1]
-    told = parameters_of(last, held)
-    return {
-        name: {
-            key.removeprefix(f"{name}."): one
-            for key, one in told.items()
-            if key.startswith(f"{name}.")
-        }
-        for name in last.added
-    }

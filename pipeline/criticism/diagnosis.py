@@ -31,7 +31,7 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import End, ended
 from pipeline.criticism.selection.alternatives import experiment_for, remedies, rivals_of
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
-from pipeline.criticism.selection.requested_model import fit_of
+from pipeline.criticism.selection.requested_model import Begun, fit_of
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import Rung, loss_without
 from pipeline.criticism.validation.signature import signature
@@ -68,24 +68,34 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 
     Reads recorded signals, tests and nameplate numbers; `start` gives pole pairs and sizes.
     """
+    begun = base_fit(campaign, model, start)
+    if isinstance(begun, str):
+        return _insufficient(campaign, model, effects(model.effects_path), begun)
+    return searched(campaign, model, begun)[0]
+
+
+def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> Begun | str:
+    """The model fitted to a motor's captures, or why it cannot be."""
     machine = machine_of(campaign, start)
-    library = effects(model.effects_path)
     if machine is None:
-        return _insufficient(campaign, model, library, PAIRLESS)
+        return PAIRLESS
     found = segments(campaign, machine)
-    if not enough(found):
-        return _insufficient(campaign, model, library, TOO_LITTLE)
+    return fit_of(found, model_of(model, machine)) if _enough(found) else TOO_LITTLE
+
+
+def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagnosis, Begun]:
+    """The diagnosis from a model fitted, and the fit that its first step stands on."""
+    library, machine = effects(model.effects_path), begun.fitted.model.machine
     name = f"{file_stem(campaign.motor_id)}_unknown"
-    begun = fit_of(found, model_of(model, machine))
     end = ended(campaign, model, machine, begun, library, name)
     ladder, found, last = end.ladder, end.ladder.begun.segments, end.ladder.rungs[-1]
     offered = candidates(library, last.fitted)
     ranking = _ranking(ladder.rungs, ladder.held, offered, library, found, ladder.cut)
-    unseen = not_shown(campaign, library, end)
-    verdict = verdict_of(end, unseen)
+    unseen = unexcited(campaign, library, last, offered)
+    verdict = _verdict_of(end, unseen)
     together = combinations_told(found, last.fitted, last.around, ladder.held[-1])
     stateless = verdict == "unknown" and end.sketch is None
-    return Diagnosis(
+    told = Diagnosis(
         campaign.motor_id,
         model.name,
         verdict,
@@ -109,6 +119,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
         together,
         policy_digest(last.fitted.policy),
     )
+    return told, ladder.begun
 
 
 def _records(
@@ -149,7 +160,7 @@ def _as_told(
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
 
 
-def enough(found: Sequence[Segment]) -> bool:
+def _enough(found: Sequence[Segment]) -> bool:
     """Whether there is a test under current and one that turns, or one that is both."""
     shown = frozenset[str]().union(*(equation_of(segment).use.shows for segment in found))
     return shown >= {"current", "turning"}
@@ -177,13 +188,7 @@ def _insufficient(
     )
 
 
-def not_shown(campaign: Campaign, library: Mapping[str, Effect], end: End) -> tuple[Unexcited, ...]:
-    """Effects that no capture would show beside the model at the end of the ladder."""
-    last = end.ladder.rungs[-1]
-    return unexcited(campaign, library, last, candidates(library, last.fitted))
-
-
-def verdict_of(end: End, unseen: Sequence[Unexcited]) -> Verdict:
+def _verdict_of(end: End, unseen: Sequence[Unexcited]) -> Verdict:
     """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
     if end.left and not end.ladder.explains(end.left):
         return "unknown"

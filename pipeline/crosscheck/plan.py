@@ -11,8 +11,11 @@ from pipeline.physics.glossary import CONSTANTS, TESTS
 from pipeline.physics.notation import significant
 from pipeline.records.datasheet import Check
 from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import ModelVerdict
 
-DoubtKind = Literal["failed", "missing", "assumed", "at_bound", "uncertain", "not_evaluated"]
+DoubtKind = Literal[
+    "failed", "missing", "assumed", "at_bound", "uncertain", "not_evaluated", "unseen"
+]
 
 # How much one doubt weighs: what keeps a datasheet from its release before what would adorn it.
 WEIGHTS: dict[DoubtKind, float] = {
@@ -22,6 +25,7 @@ WEIGHTS: dict[DoubtKind, float] = {
     "at_bound": 1.0,
     "uncertain": 0.5,
     "not_evaluated": 0.5,
+    "unseen": 0.25,
 }
 REQUIRED = 3.0
 ASSUMED = "assumed:"
@@ -55,12 +59,15 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is there of one motor: a constant a name, its checks, the tests recorded of it."""
+    """What is there of one motor: a constant a name, its checks, the tests recorded of it, and what
+    the residual test of a run came to.
+    """
 
     motor_id: str
     constants: Mapping[str, Estimate]
     checks: tuple[Check, ...]
     tests: frozenset[str]
+    model: ModelVerdict | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,17 +98,27 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps, the most telling first, and what no capture will settle."""
+    """Steps, the most telling first, and what no capture will settle.
+
+    `model` says in lines what the model lacks, which command adds it, and what would tell it from
+    what else it could be.
+    """
 
     motor_id: str
     steps: tuple[Step, ...]
     beyond: tuple[Doubt, ...] = ()
+    model: tuple[str, ...] = ()
 
     def text(self) -> str:
         """The plan in words, one test a paragraph."""
+        head = [f"{self.motor_id}: {line}" for line in self.model]
         if not self.steps and not self.beyond:
-            return f"{self.motor_id}: nothing is missing and nothing is in doubt"
-        lines = [f"{self.motor_id}: what to record next, the most telling first"]
+            return "\n".join(
+                head or [f"{self.motor_id}: nothing is missing and nothing is in doubt"]
+            )
+        lines = head
+        if self.steps:
+            lines.append(f"{self.motor_id}: what to record next, the most telling first")
         for number, step in enumerate(self.steps, 1):
             again = ", again" if step.again else ""
             lines += ["", f"{number}. {step.test}{again}: {TESTS.get(step.test, '')}"]
@@ -154,6 +171,7 @@ def make_plan(
     doubts = [
         *_constants_in_doubt(known, options, aims),
         *_checks_in_doubt(known, options, check_tests),
+        *_not_shown(known),
     ]
     open_doubts = [doubt for doubt in doubts if doubt.tests]
     steps: list[Step] = []
@@ -166,7 +184,34 @@ def make_plan(
         settled = [doubt for doubt in open_doubts if best in doubt.tests]
         steps.append(_step(best, settled, known, options))
         open_doubts = [doubt for doubt in open_doubts if best not in doubt.tests]
-    return Plan(known.motor_id, tuple(steps), tuple(d for d in doubts if not d.tests))
+    beyond = tuple(doubt for doubt in doubts if not doubt.tests)
+    return Plan(known.motor_id, tuple(steps), beyond, _model_lines(known))
+
+
+def _not_shown(known: Known) -> list[Doubt]:
+    """Effects that the motor may have and that no capture would show."""
+    unseen = () if known.model is None else known.model.unexcited
+    return [
+        Doubt("unseen", one.effect, one.words, frozenset(one.tests), WEIGHTS["unseen"])
+        for one in unseen
+    ]
+
+
+def _model_lines(known: Known) -> tuple[str, ...]:
+    """What the model lacks, the command that follows, and what would part it from the likes."""
+    model = known.model
+    if model is None or not model.tested or model.passed:
+        return ()
+    does = "adds it" if model.missing else "tells more"
+    command = model.adding() or model.command(known.motor_id)
+    return (
+        f"{model.headline()}; `{command}` {does}",
+        *(
+            f"{name} could as well be {', '.join(one.confused_with)}: {one.experiment}"
+            for name, one in model.missing.items()
+            if one.confused_with
+        ),
+    )
 
 
 def _step(test: str, doubts: list[Doubt], known: Known, ways: tuple[Way, ...]) -> Step:

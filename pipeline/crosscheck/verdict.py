@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from pipeline.records.datasheet import AWAITS_APPROVAL, CaptureReference, Check, DatasheetStatus
 from pipeline.records.estimate import Estimate
-from pipeline.records.model_verdict import ModelVerdict
 
 
 def verdict(
@@ -15,16 +14,15 @@ def verdict(
     captures: Iterable[CaptureReference],
     required: Sequence[str],
     release: str,
-    model: ModelVerdict,
-    motor_id: str,
+    lacking: str | None,
 ) -> tuple[DatasheetStatus, tuple[str, ...]]:
     """The status of `contract/outputs.md` and every reason that keeps it from `released`.
 
     `required` are the constants that the limits file wants measured; `release` is `auto` or
     `manual` (then a person approves in the registry, and the file stays provisional). A constant
     that came out where no motor is keeps any datasheet back, required or not: what is wrong with
-    its captures is in what else rests on them. So does a model that misses its captures by more
-    than their noise, and one that was not held against them: what was not looked at is not sound.
+    its captures is in what else rests on them. So does what is `lacking` in the model: by more than
+    the noise of the captures, or because it was not held against them.
     """
     failed = [check for check in checks if check.status == "fail"]
     if failed:
@@ -44,7 +42,7 @@ def verdict(
         for name, estimate in sorted(constants.items())
         if estimate.impossible and name not in required
     ]
-    if (lacking := model.reason(motor_id)) is not None:
+    if lacking is not None:
         why.append(lacking)
     if release != "auto":
         why.append(AWAITS_APPROVAL)

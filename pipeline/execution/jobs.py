@@ -31,7 +31,8 @@ class MotorJob:
     `key` is the digest of the work, None where the result is not cached; `refused` are files that
     must not be read, with the reason. `revoked` are the motor's revoked versions: a version of the
     same work with other content supersedes them. `model` is the model of the residual test, None
-    for no test.
+    for no test; `diagnose` is the key of a run. `model_gates` is False where what the model leaves
+    keeps no datasheet from its release.
     """
 
     motor_id: str
@@ -48,6 +49,8 @@ class MotorJob:
     crosscheck: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     constants: Mapping[str, float] = field(default_factory=dict)
     model: ModelSpec | None = None
+    diagnose: str = "auto"
+    model_gates: bool = True
     findings: tuple[Finding, ...] = ()
     limits: ReadLimits = field(default_factory=ReadLimits)
     revoked: tuple[Revocation, ...] = ()

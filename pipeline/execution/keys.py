@@ -146,11 +146,13 @@ def model_parts(
     model: ModelSpec,
     start: Sequence[Estimate],
     revoked: object,
+    *,
+    search: bool,
 ) -> Parts:
     """What the residual test of one motor depends on.
 
     The code of criticism, the captures as they were read, the model, the constants that it starts
-    from, and the revocations, as for fits.
+    from, the revocations, as for fits, and whether what is missing is searched for.
     """
     return {
         "code": code,
@@ -159,4 +161,5 @@ def model_parts(
         "model": model,
         "start": list(start),
         "revoked": revoked,
+        "search": search,
     }

@@ -26,13 +26,17 @@ class ModelMemory:
         """`stamp` is of the new datasheet; a verdict of a revoked version is not used."""
         self._path = Path(job.output) / FOLDER / "models" / f"{file_stem(job.motor_id)}.json"
         self._campaign = stamp.campaign
+        self._search = job.diagnose != "false"
         self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
 
     def key(self, model: ModelSpec, start: Constants) -> str:
         """The key of everything that the verdict depends on."""
         code, libraries = closure_digest(TEST), libraries_version(TEST)
         known = start.estimates
-        return key_of(model_parts(code, libraries, self._campaign, model, known, self._revoked))
+        search, revoked = self._search, self._revoked
+        return key_of(
+            model_parts(code, libraries, self._campaign, model, known, revoked, search=search)
+        )
 
     def recall(self, key: str) -> ModelVerdict | None:
         """The cached verdict of this key, else None."""

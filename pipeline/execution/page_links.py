@@ -11,7 +11,6 @@ from collections.abc import Collection
 from pathlib import Path
 from urllib.parse import quote
 
-from pipeline.execution.jobs import Files
 from pipeline.execution.run_cache import note_files
 from pipeline.io.storage.publish import write_whole
 from pipeline.records.naming import file_stem
@@ -76,17 +75,16 @@ def links_of(
 def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, str]:
     """Rewrites the pages of a motor whose links are out of date; names and digests of them.
 
-    What a run keeps of its work learns of its own page: it is still what that work came to. Pages
-    of the kinds `but` are left alone.
+    What a run keeps of its work learns of its own pages: they are still what that work came to.
+    Pages of the kinds `but` are left alone.
     """
     changed: dict[str, str] = {}
     for page in _OF_PAGE:
         if "{}" in page and page not in but:
             name = page.format(file_stem(motor_id))
             changed |= _relinked(output, name, links_of(output, page, motor_id))
-    own: Files = tuple(one for one in changed.items() if one[0].startswith("report/"))
-    if own:
-        note_files(output, motor_id, own)
+    if changed:
+        note_files(output, motor_id, tuple(changed.items()))
     return changed
 
 

@@ -26,13 +26,18 @@ def stamp_of(job: MotorJob, campaign: Campaign) -> Stamp:
 
 
 def configuration_digest(
-    settings: RunSettings, required: Sequence[str], sources: Iterable[SourceMap | None]
+    settings: RunSettings,
+    required: Sequence[str],
+    sources: Iterable[SourceMap | None],
+    *,
+    model_gates: bool = True,
 ) -> str:
     """Digest of the settings that can change a result.
 
-    It covers the constants that a release requires, and the source maps that the captures need.
+    It covers the conditions of a release, and the source maps that the captures need.
     The limits of a lot change no datasheet.
     """
-    work = canonical_json({**result_document(settings), "required": tuple(required)})
+    conditions = {"required": tuple(required), "model_gates": model_gates}
+    work = canonical_json({**result_document(settings), **conditions})
     maps = sorted({repr(source) for source in sources if source is not None})
     return hashlib.sha256("\n".join([work.decode(), *maps]).encode()).hexdigest()

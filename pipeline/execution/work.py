@@ -24,6 +24,7 @@ from pipeline.records.agreement import Disagreement
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.model_verdict import ModelVerdict
@@ -48,13 +49,16 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """Constants, evidence of the fits, checks, residual test and findings of one motor."""
+    """Constants, evidence of the fits, checks, residual test and findings of one motor; its
+    diagnosis where one was asked for.
+    """
 
     constants: Constants
     evidence: tuple[Evidence, ...]
     checks: tuple[Check, ...]
     model: ModelVerdict
     findings: tuple[Finding, ...]
+    diagnosis: Diagnosis | None = None
 
 
 def read(job: MotorJob, watch: Stopwatch) -> Usable:
@@ -94,8 +98,9 @@ def check(
         apart = captures_apart(campaign, job.fit)
         checks = check_all(constants, campaign, job.crosscheck, apart)
     with watch.stage("residual test"):
-        model, broken = judged_model(campaign, job.model, constants, verdicts)
-    return Judged(constants, (), checks, model, (*agreement.findings(apart), *broken))
+        tested = judged_model(campaign, job.model, constants, verdicts, job.diagnose)
+    findings = (*agreement.findings(apart), *tested.findings)
+    return Judged(constants, (), checks, tested.verdict, findings, tested.diagnosis)
 
 
 def captures_apart(
@@ -122,8 +127,7 @@ def assemble(job: MotorJob, campaign: Campaign, found: Judged, stamp: Stamp) -> 
         references,
         job.required,
         job.release,
-        found.model,
-        campaign.motor_id,
+        found.model.reason(campaign.motor_id) if job.model_gates else None,
     )
     return Datasheet(
         motor_id=campaign.motor_id,

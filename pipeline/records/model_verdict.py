@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pipeline.records.diagnosis import ToldParameter
+from pipeline.records.diagnosis import ToldParameter, Unexcited
 
 ModelState = Literal["adequate", "missing", "unknown", "insufficient", "not_tested"]
 MODEL_REASON = "model: "
@@ -46,26 +46,70 @@ class Excess:
 
 
 @dataclass(frozen=True, slots=True)
+class FoundEffect:
+    """An effect that a model lacks: value, standard uncertainty and unit of its parameters by name.
+
+    `headline` says it with its size; `confused_with` is what else it could be, and `experiment`
+    what would tell.
+    """
+
+    parameters: Mapping[str, ToldParameter]
+    headline: str = ""
+    confused_with: tuple[str, ...] = ()
+    experiment: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form of `contract/outputs.md`, with more keys and without the effect's name."""
+        return {
+            "parameters": {
+                name: {"value": value, "u": u, "unit": unit}
+                for name, (value, u, unit) in self.parameters.items()
+            },
+            "headline": self.headline,
+            "confused_with": list(self.confused_with),
+            "experiment": self.experiment,
+        }
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> FoundEffect:
+        """The record that `document` wrote."""
+        return cls(
+            {
+                name: (parameter["value"], parameter["u"], parameter["unit"])
+                for name, parameter in document["parameters"].items()
+            },
+            document.get("headline", ""),
+            tuple(document.get("confused_with", ())),
+            document.get("experiment", ""),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class ModelVerdict:
     """The residual test of one motor against the noise floors of `diagnose`.
 
     `verdict` is that of a diagnosis of the same model, or `not_tested`. `missing` with an empty
     list of effects says that something is missing and was not searched for. `held_out` and
     `residual` [noise floors] are the error of captures predicted without themselves and the largest
-    residual of any signal in any capture; None where no model was fitted. `worst` is the largest
-    one of a size that matters, `over` how many of that size there are. `effects` were asked for
-    beside the `model`'s own.
+    residual of any signal in any capture; None where no model was fitted. `held_out_with` is the
+    former with the effects found. `worst` is the largest one of a size that matters, `over` how
+    many of that size there are. `effects` were asked for beside the `model`'s own. `unknown` says
+    what depends on what, where no known effect explains it. `unexcited` are effects that no capture
+    would show.
     """
 
     verdict: ModelState
     model: str = "standard"
     effects: tuple[str, ...] = ()
-    missing: Mapping[str, Mapping[str, ToldParameter]] = field(default_factory=dict)
+    missing: Mapping[str, FoundEffect] = field(default_factory=dict)
     held_out: float | None = None
     residual: float | None = None
     worst: Excess | None = None
     over: int = 0
     note: str = ""
+    held_out_with: float | None = None
+    unknown: str = ""
+    unexcited: tuple[Unexcited, ...] = ()
 
     @property
     def tested(self) -> bool:
@@ -91,10 +135,18 @@ class ModelVerdict:
 
         A datasheet does not know its folder: the same captures give the same bytes anywhere.
         """
-        effects = f" model.effects=[{','.join(self.effects)}]" if self.effects else ""
-        model = "" if self.model == "standard" else f" model={self.model}"
         where = f"input={shlex.quote(folder)} motor={shlex.quote(motor_id)}"
-        return f"diagnose {where}{model}{effects}"
+        return f"diagnose {where}{self._asked(self.effects)}"
+
+    def adding(self, folder: str = "FOLDER") -> str:
+        """The command that runs a `folder` with the effects found; empty where none was."""
+        if not self.missing:
+            return ""
+        return f"run input={shlex.quote(folder)}{self._asked((*self.effects, *self.missing))}"
+
+    def _asked(self, effects: Sequence[str]) -> str:
+        model = "" if self.model == "standard" else f" model={self.model}"
+        return model + (f" model.effects=[{','.join(effects)}]" if effects else "")
 
     def headline(self) -> str:
         """What the test came to, in one sentence without a full stop."""
@@ -105,18 +157,35 @@ class ModelVerdict:
         if self.passed:
             largest = number(self.residual or 0.0)
             return f"{self.name} leaves nothing that matters; largest residual {largest} floors"
-        names = f"; found: {', '.join(self.missing)}" if self.missing else ""
+        if self.missing:
+            return f"{self.name} lacks {self._found()}"
+        left = f"; no known effect explains it: {self.unknown}" if self.unknown else ""
         if self.worst is None:
-            return f"{self.name} lacks an effect that shows below the noise floors{names}"
+            return f"{self.name} lacks an effect that shows below the noise floors{left}"
         more = f" and {self.over - 1} more" if self.over > 1 else ""
-        return f"{self.name} misses {self.worst.description}{more}{names}"
+        return f"{self.name} misses {self.worst.description}{more}{left}"
+
+    def _found(self) -> str:
+        """The effects found with their sizes, and what adding them does to the error."""
+        told = [one.headline or name.replace("_", " ") for name, one in self.missing.items()]
+        text = " and ".join(filter(None, (", ".join(told[:-1]), told[-1])))
+        if self.held_out is not None and self.held_out_with is not None:
+            them = {1: "it", 2: "both"}.get(len(told), f"all {len(told)}")
+            text += f"; with {them}, the error falls from {number(self.held_out)} to "
+            text += f"{number(self.held_out_with)} noise floors"
+        if self.verdict == "unknown":
+            text += "; what is left no known effect explains"
+            text += f": {self.unknown}" if self.unknown else ""
+        return text
 
     def reason(self, motor_id: str) -> str | None:
         """Why the datasheet is not released by itself; None where the test was passed."""
         if self.passed:
             return None
         remedy = ""
-        if self.tested:
+        if self.missing:
+            remedy = f"; `{self.adding()}` adds {'it' if len(self.missing) == 1 else 'them'}"
+        elif self.tested:
             remedy = f"; `{self.command(motor_id)}` tells more"
         return f"{MODEL_REASON}{self.headline()}{remedy}"
 
@@ -124,16 +193,7 @@ class ModelVerdict:
         """The JSON form of `contract/outputs.md`, with more keys."""
         return {
             "verdict": self.verdict,
-            "missing": [
-                {
-                    "effect": effect,
-                    "parameters": {
-                        name: {"value": value, "u": u, "unit": unit}
-                        for name, (value, u, unit) in parameters.items()
-                    },
-                }
-                for effect, parameters in self.missing.items()
-            ],
+            "missing": [{"effect": name} | one.document() for name, one in self.missing.items()],
             "held_out": self.held_out,
             "residual": self.residual,
             "name": self.model,
@@ -141,6 +201,9 @@ class ModelVerdict:
             "worst": None if self.worst is None else self.worst.document(),
             "over": self.over,
             "note": self.note,
+            "held_out_with": self.held_out_with,
+            "unknown": self.unknown,
+            "unexcited": [one.document() for one in self.unexcited],
         }
 
     @classmethod
@@ -151,18 +214,20 @@ class ModelVerdict:
             verdict=document["verdict"],
             model=document.get("name", "standard"),
             effects=tuple(document.get("effects", ())),
-            missing={
-                one["effect"]: {
-                    name: (parameter["value"], parameter["u"], parameter["unit"])
-                    for name, parameter in one["parameters"].items()
-                }
-                for one in document["missing"]
-            },
+            missing={one["effect"]: FoundEffect.of(one) for one in document["missing"]},
             held_out=document["held_out"],
             residual=document["residual"],
             worst=None if worst is None else Excess(**worst),
             over=document.get("over", 0),
             note=document.get("note", ""),
+            held_out_with=document.get("held_out_with"),
+            unknown=document.get("unknown", ""),
+            unexcited=tuple(
+                Unexcited(
+                    one["effect"], tuple(one["tests"]), one["experiment"], tuple(one["signals"])
+                )
+                for one in document.get("unexcited", ())
+            ),
         )
 
 

@@ -76,9 +76,10 @@ def _unexplained(datasheets: Sequence[Datasheet], folder: str) -> list[str]:
     who = printable(worst.motor_id)
     if len(told) > 1:
         who = f"{len(told)} motors are not explained down to the noise, {who} least"
+    text, does = (words.add, "adds what is missing") if words.add else (words.command, "tells more")
     # the folder's name is put in last and may stand for another until then
-    command = folder.join(printable(part) for part in words.command.split(folder))
-    return [f"{who}: {printable(words.sentence)}; `{command}` tells more"]
+    command = folder.join(printable(part) for part in text.split(folder))
+    return [f"{who}: {printable(words.sentence)}; `{command}` {does}"]
 
 
 def nothing_usable(folder: str, *, refused: bool) -> str:

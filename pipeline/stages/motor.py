@@ -15,9 +15,10 @@ from pipeline.execution.keys import key_of, superseding_parts
 from pipeline.execution.model_memory import ModelMemory
 from pipeline.execution.run_cache import note_motor
 from pipeline.execution.stamp import stamp_of
-from pipeline.io.storage.publish import together
+from pipeline.io.storage.publish import canonical_json, together
 from pipeline.records.capture import Campaign
 from pipeline.records.datasheet import Datasheet, Superseded
+from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
@@ -51,7 +52,7 @@ def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
     findings = (*findings, *found.findings)
     datasheet = superseding(work.assemble(job, campaign, found, stamp), job.revoked)
     all_findings = (*job.findings, *findings)
-    files = _write(job, campaign, datasheet, found.evidence, all_findings, watch)
+    files = _write(job, campaign, datasheet, found, all_findings, watch)
     return Finished(findings, files)
 
 
@@ -75,7 +76,7 @@ def _write(
     job: MotorJob,
     campaign: Campaign,
     datasheet: Datasheet,
-    evidence: tuple[Evidence, ...],
+    found: work.Judged,
     findings: tuple[Finding, ...],
     watch: Stopwatch,
 ) -> Files:
@@ -91,24 +92,43 @@ def _write(
 
         with watch.stage("datasheet"):
             write(f"datasheets/{stem}.json", work.content_of(datasheet))
+        if found.diagnosis is not None:
+            for name, content in _diagnosis_files(job, stem, found.diagnosis):
+                write(name, content)
         if job.report:
             from pipeline.execution.page_links import links_of
             from pipeline.report.motor_page import render_motor
 
             with watch.stage("report"):
                 terms = {term.name: term for estimator in estimators() for term in estimator.terms}
-                coming = (f"recordings/motor-{stem}.rrd",) if job.recordings else ()
+                coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
+                coming += [] if found.diagnosis is None else [f"diagnosis/{stem}.html"]
                 links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
-                page = render_motor(datasheet, evidence, findings, terms, links)
+                page = render_motor(datasheet, found.evidence, findings, terms, links)
                 write(f"report/{stem}.html", page.encode())
         if job.recordings:
             from pipeline.io.recordings.seal import SEAL, seal_line
 
             with watch.stage("recordings"):
-                for name, content in _recordings(stem, campaign, datasheet, evidence, findings):
+                shown = _recordings(stem, campaign, datasheet, found.evidence, findings)
+                for name, content in shown:
                     sha256 = write(name, content)
                     write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
     return tuple(files)
+
+
+def _diagnosis_files(job: MotorJob, stem: str, found: Diagnosis) -> Iterator[tuple[str, bytes]]:
+    """Name and content of what `diagnose` writes, less the ladder's recording."""
+    yield f"diagnosis/{stem}.json", canonical_json(found.document())
+    if found.unknown is not None and found.unknown.sketch:
+        yield f"diagnosis/effects/{found.unknown.effect}.py", found.unknown.source.encode()
+    if job.report:
+        from pipeline.execution.page_links import links_of
+        from pipeline.report.ladder_page import render_ladder
+
+        coming = (f"report/{stem}.html", f"diagnosis/{stem}.json")
+        links = links_of(Path(job.output), "diagnosis/{}.html", job.motor_id, coming)
+        yield f"diagnosis/{stem}.html", render_ladder(found, links=links).encode()
 
 
 def _recordings(

@@ -74,7 +74,8 @@ def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) 
 def plan_of(sheet: Datasheet, required: frozenset[str]) -> Plan:
     """What to record next of the motor of a datasheet, to have `required` and settle its doubts."""
     tests = frozenset(capture.test for capture in sheet.captures)
-    return _planned(Known(sheet.motor_id, sheet.constants, sheet.checks, tests), required)
+    known = Known(sheet.motor_id, sheet.constants, sheet.checks, tests, sheet.model)
+    return _planned(known, required)
 
 
 def _planned(known: Known, required: frozenset[str]) -> Plan:

@@ -36,7 +36,7 @@ from pipeline.io.maps.places import source_maps
 from pipeline.io.maps.source_map import SourceMap
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheets
-from pipeline.io.storage.limits import limits_file, required_constants
+from pipeline.io.storage.limits import limits_file, release_conditions
 from pipeline.io.storage.publish import output_folder
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.errors import MachineError, UsageError
@@ -224,7 +224,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     motors: dict[str, list[Entry]] = {}
     for entry in found.entries:
         motors.setdefault(entry.said["motor_id"], []).append(entry)
-    required = required_constants(limits)
+    required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
     model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)
     jobs = [
@@ -233,7 +233,9 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             entries=tuple(entries),
             input=settings.input,
             output=settings.output,
-            config_sha256=configuration_digest(settings, required, [e.source for e in entries]),
+            config_sha256=configuration_digest(
+                settings, required, [e.source for e in entries], model_gates=model_gates
+            ),
             required=required,
             release=settings.release,
             report=settings.report,
@@ -243,6 +245,8 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             constants=settings.constants,
             crosscheck=settings.crosscheck,
             model=model if settings.residual_test else None,
+            diagnose=settings.diagnose,
+            model_gates=model_gates,
             findings=tuple(f for f in found.findings if f.file in {e.path for e in entries}),
             limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )

@@ -142,9 +142,11 @@ def kind_of_reason(sheet: Datasheet, reason: str) -> str:
     model = sheet.model
     if not reason.startswith(MODEL_REASON) or model is None or model.worst is None:
         return reason
+    if model.missing:
+        names = " and ".join(name.replace("_", " ") for name in model.missing)
+        return f"{model.name} lacks {names}"
     order = f", {model.worst.order:g} a turn" if model.worst.order else ""
-    found = f"; found: {', '.join(model.missing)}" if model.missing else ""
-    return f"{model.name} misses {quantity_words(model.worst.signal)}{order}{found}"
+    return f"{model.name} misses {quantity_words(model.worst.signal)}{order}"
 
 
 def floors_of(reason: Reason, rows: Sequence[MotorRow]) -> str:

@@ -15,14 +15,15 @@ TONES = {
     "insufficient": "not_evaluated",
     "not_tested": "not_evaluated",
 }
+MOST_NAMED = 2
 OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual test; run again")
 
 
 @dataclass(frozen=True, slots=True)
 class ModelWords:
     """Verdict and residual in `short`, and each by itself; one sentence without a full stop; the
-    command that tells more (empty where there is none); `rows` of name and text; a number to
-    `sort` by.
+    command that tells more and the one that adds what was found (empty where there is none);
+    `rows` of name and text; a number to `sort` by.
     """
 
     short: str
@@ -31,6 +32,7 @@ class ModelWords:
     tone: str
     sentence: str
     command: str
+    add: str
     rows: tuple[tuple[str, str], ...]
     sort: str
     passed: bool
@@ -39,7 +41,7 @@ class ModelWords:
 def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER") -> ModelWords:
     """What the residual test of a motor came to; None is a datasheet of before there was one."""
     said = model or OLD
-    verdict = said.verdict.replace("_", " ")
+    verdict = " ".join((said.verdict.replace("_", " "), *_names(said)))
     floors = "" if said.residual is None else f"{number(said.residual)} floors"
     return ModelWords(
         short=", ".join(filter(None, (verdict, floors))),
@@ -48,10 +50,20 @@ def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER
         tone=TONES[said.verdict],
         sentence=sentence(said.headline()),
         command=said.command(motor_id, folder) if said.tested and not said.passed else "",
+        add=said.adding(folder),
         rows=tuple(_rows(said)),
         sort=repr(said.residual or 0.0),
         passed=said.passed,
     )
+
+
+def _names(said: ModelVerdict) -> tuple[str, ...]:
+    """The effects that are missing, two at most by name."""
+    names = [name.replace("_", " ") for name in said.missing]
+    if said.verdict != "missing" or not names:
+        return ()
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return (", ".join(names[:MOST_NAMED]) + more,)
 
 
 def _rows(said: ModelVerdict) -> list[tuple[str, str]]:
@@ -61,13 +73,20 @@ def _rows(said: ModelVerdict) -> list[tuple[str, str]]:
         ("largest residual", f"{number(said.residual)} noise floors"),
         ("error of captures held out", f"{number(said.held_out)} noise floors"),
     ]
+    if said.held_out_with is not None:
+        rows.append(("the same with what was found", f"{number(said.held_out_with)} noise floors"))
     if said.worst is not None:
         size = quantity(said.worst.size, said.worst.unit, 2)
         rows.append(("where", f"{said.worst.description}, {size} beyond the noise"))
         rows.append(("places over their floor", str(said.over)))
-    for effect, parameters in said.missing.items():
-        sizes = (f"{name} {number_text(*told)}" for name, told in parameters.items())
+    for effect, found in said.missing.items():
+        sizes = (f"{name} {number_text(*told)}" for name, told in found.parameters.items())
         rows.append((effect.replace("_", " "), "; ".join(sizes)))
+        if found.confused_with:
+            others = ", ".join(found.confused_with).replace("_", " ")
+            rows.append(("which could as well be", f"{others}; to tell: {found.experiment}"))
+    if said.unknown:
+        rows.append(("not explained", said.unknown))
     if said.note:
         rows.append(("cannot be shown", said.note))
     return rows

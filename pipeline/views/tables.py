@@ -9,7 +9,8 @@ from typing import Any
 import polars as pl
 
 from pipeline.records.datasheet import Datasheet
-from pipeline.records.estimate import Estimate
+from pipeline.records.estimate import Estimate, not_identifiable
+from pipeline.records.uncertainty import type_a
 
 CONSTANT_SCHEMA: dict[str, Any] = {
     "motor_id": pl.String,
@@ -66,13 +67,36 @@ def constant_rows(
 
 
 def constants_frame(sheet: Datasheet) -> pl.DataFrame:
-    """The constants of one datasheet, by name, with its status and version."""
+    """The constants of one datasheet, by name, with its status and version; then the parameters
+    of the effects that its model lacks, as EFFECT.PARAMETER.
+    """
     estimates = [estimate for _, estimate in sorted(sheet.constants.items())]
+    estimates += found_estimates(sheet)
     rows = constant_rows(sheet.motor_id, sheet.motor_type, sheet.lot, estimates)
     words = {"datasheet_status": sheet.status, "datasheet_version": sheet.version}
     return pl.DataFrame(rows, schema=CONSTANT_SCHEMA, orient="row").with_columns(
         pl.lit(word, pl.String).alias(name) for name, word in words.items()
     )
+
+
+def found_estimates(sheet: Datasheet) -> list[Estimate]:
+    """The parameters of the effects that were found missing, as estimates named
+    EFFECT.PARAMETER, by method `residual_test`.
+    """
+    found = []
+    for effect, one in () if sheet.model is None else sheet.model.missing.items():
+        for parameter, (value, u, unit) in one.parameters.items():
+            name = f"{effect}.{parameter}"
+            if value is None or u is None:
+                note = one.experiment or "these captures do not determine it"
+                found.append(not_identifiable(name, unit, "residual_test", note))
+            else:
+                budget = type_a(f"scatter:residual_test:{name}", u)
+                words = one.headline
+                found.append(
+                    Estimate(name, value, unit, "measured", "residual_test", budget, note=words)
+                )
+    return found
 
 
 def fleet_files(frames: Sequence[pl.DataFrame]) -> dict[str, bytes]:

@@ -20,7 +20,7 @@ from pipeline.records.limits import (
 )
 from pipeline.settings import named_file
 
-KEYS = ("about", "required", "rules", "golden", "constants")
+KEYS = ("about", "required", "model_gates", "rules", "golden", "constants")
 RULE_KEYS = ("alpha", "min_lots", "k", "order_share", "code_negligible", "code_limit")
 CONSTANT_KEYS = (
     "nominal",
@@ -45,7 +45,23 @@ def limits_file(name: str, config_dir: str | None = None) -> Path:
 
 def required_constants(path: Path) -> tuple[str, ...]:
     """The constants that a release must hold, measured; raises UsageError for a bad file."""
-    names = _document(path).get("required")
+    return _required(_document(path), path)
+
+
+def release_conditions(path: Path) -> tuple[tuple[str, ...], bool]:
+    """`required_constants`, and whether what the model leaves keeps a datasheet from its release.
+
+    Raises UsageError for a bad file.
+    """
+    document = _document(path)
+    said = str(document.get("model_gates", "yes")).lower()
+    if said not in WORDS:
+        raise UsageError(f"{path.name}: model_gates is {said!r}", "write yes or no")
+    return _required(document, path), WORDS[said]
+
+
+def _required(document: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+    names = document.get("required")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise UsageError(f"{path.name} needs `required:`, a list of constants", "add it")
     unknown = [name for name in names if name not in CONSTANTS]

@@ -16,7 +16,8 @@ from pipeline.criticism.diagnosis import TOO_LITTLE, diagnose
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.records.diagnosis import Unexcited
+from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.stages.campaigns import campaigns
 
 DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
@@ -33,8 +34,8 @@ def only(*tests: str) -> Campaign:
     return replace(shipped(), captures=shipped().of(*tests))
 
 
-def judged(campaign: Campaign, spec: ModelSpec) -> ModelVerdict:
-    return model_verdict(campaign, spec, Constants())
+def judged(campaign: Campaign, spec: ModelSpec, *, search: bool = False) -> ModelVerdict:
+    return model_verdict(campaign, spec, Constants(), search=search)[0]
 
 
 def test_released_with_what_diagnose_calls_missing() -> None:
@@ -50,12 +51,24 @@ def test_released_with_what_diagnose_calls_missing() -> None:
     assert 0.002 < found.worst.size < 0.02, "the amplitude of some 7 mN·m, as an rms"
 
 
-@pytest.mark.slow
-def test_what_is_missing_is_so_for_diagnose_too() -> None:
+def test_what_is_missing_is_named_with_its_size() -> None:
+    """The names, sizes and errors of `diagnose`, and the residual of the model as asked for."""
     campaign = only(*FEW)
-    found, told = judged(campaign, STANDARD), diagnose(campaign, STANDARD, Constants())
-    assert told.verdict == found.verdict
+    found, told = model_verdict(campaign, STANDARD, Constants())
+    assert told is not None
+    assert (found.verdict, tuple(found.missing)) == (told.verdict, told.missing)
+    assert list(found.missing) == ["cogging"]
+    one = told.ranking[0]
+    cogging = found.missing["cogging"]
+    assert (cogging.parameters, cogging.headline) == (one.parameters, one.headline)
+    assert cogging.headline.startswith("cogging torque of 7.2")
     assert found.held_out == pytest.approx(told.ladder[0].held_out, rel=1e-3)
+    assert found.held_out_with == told.ladder[-1].held_out
+    assert found.held_out_with < 1.5 < found.held_out
+    quick = judged(campaign, STANDARD)
+    assert (quick.verdict, quick.worst, quick.residual) == ("missing", found.worst, found.residual)
+    assert (quick.missing, quick.held_out_with) == ({}, None)
+    assert "with it, the error falls from " in found.headline()
 
 
 def test_nothing_left_is_said_as_diagnose_says_it() -> None:
@@ -89,8 +102,8 @@ def test_the_search_is_spared_only_where_its_end_is_sure(monkeypatch: pytest.Mon
     the ladder says, and names what it finds.
     """
     asked = []
-    whole = adequacy.ended
-    monkeypatch.setattr(adequacy, "ended", lambda *a: asked.append(a) or whole(*a))
+    whole = adequacy.searched
+    monkeypatch.setattr(adequacy, "searched", lambda *a: asked.append(a) or whole(*a))
     campaign = only(*FEW)
     assert judged(campaign, STANDARD).missing == {}
     assert asked == []
@@ -98,13 +111,17 @@ def test_the_search_is_spared_only_where_its_end_is_sure(monkeypatch: pytest.Mon
     found = judged(campaign, STANDARD)
     assert len(asked) == 1
     assert (found.verdict, list(found.missing)) == ("missing", ["cogging"])
-    assert found.missing["cogging"]
+    assert found.missing["cogging"].parameters
     assert found.worst is not None, "what the model itself leaves, not what is left with the effect"
 
 
 def test_the_record_comes_back_from_its_document() -> None:
     worst = Excess("a.csv", "torque_shaft_nm", 84, 250.0, 0.005, "N·m")
     found = ModelVerdict("missing", held_out=14.0, residual=250.0, worst=worst, over=9)
-    named = replace(found, missing={"windage": {"loss_nm": (0.1, 0.01, "N·m")}}, effects=("-x",))
+    windage = FoundEffect({"loss_nm": (0.1, 0.01, "N·m")}, "windage", ("stribeck",), "spin it fast")
+    unseen = (Unexcited("backlash", ("drive",), "reverse it", ("torque_shaft_nm",)),)
+    named = replace(
+        found, missing={"windage": windage}, effects=("-x",), held_out_with=0.6, unexcited=unseen
+    )
     assert ModelVerdict.of(named.document()) == named
     assert ModelVerdict.of(ModelVerdict("not_tested", note="off").document()).note == "off"

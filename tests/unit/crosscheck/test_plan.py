@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pipeline.crosscheck.plan import Aims, Known, Way, make_plan, settling_tests
 from pipeline.physics.glossary import CONSTANTS, TESTS
 from pipeline.records.datasheet import Check
+from pipeline.records.diagnosis import Unexcited
 from pipeline.records.estimate import Estimate, not_identifiable, not_there
+from pipeline.records.model_verdict import FoundEffect, ModelVerdict
 from pipeline.records.uncertainty import type_a, type_b
 
 RESISTANCE = Way(("r_phase_ohm",), ("resistance",), "drive DC steps")
@@ -42,6 +46,28 @@ def test_nothing_open_nothing_to_do() -> None:
     plan = make_plan(known(ALL_KNOWN, *TESTS), WAYS, CHECKS, Aims(REQUIRED))
     assert (plan.steps, plan.beyond) == ((), ())
     assert plan.text() == "m-1: nothing is missing and nothing is in doubt"
+
+
+def test_the_plan_follows_what_the_model_lacks() -> None:
+    """The command that adds it, what parts it from the likes, and tests for effects not shown."""
+    found = FoundEffect({}, "friction below 7 rad/s", ("presliding",), "reverse it slowly")
+    unseen = Unexcited("backlash", ("drive", "spin_down"), "reverse the torque")
+    model = ModelVerdict(
+        "missing", missing={"stribeck": found}, held_out=76.0, held_out_with=0.5, residual=80.0,
+        unexcited=(unseen,),
+    )  # fmt: skip
+    nothing_else = replace(known(ALL_KNOWN, *TESTS), model=model)
+    plan = make_plan(nothing_else, WAYS, CHECKS, Aims(REQUIRED))
+    assert [(step.test, [d.name for d in step.doubts]) for step in plan.steps] == [
+        ("drive", ["backlash"])
+    ]
+    first, second = plan.model
+    assert "lacks friction below 7 rad/s; with it, the error falls from 76 to 0.5" in first
+    assert first.endswith("`run input=FOLDER model.effects=[stribeck]` adds it")
+    assert second == "stribeck could as well be presliding: reverse it slowly"
+    assert plan.text().splitlines()[0] == f"m-1: {first}"
+    passed = replace(nothing_else, model=ModelVerdict("adequate", residual=1.0, held_out=0.5))
+    assert make_plan(passed, WAYS, CHECKS, Aims(REQUIRED)).model == ()
 
 
 def test_the_test_that_resolves_most_comes_first() -> None:

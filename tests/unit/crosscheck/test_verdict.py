@@ -15,7 +15,7 @@ from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import AWAITS_APPROVAL, left_to_a_person
 from pipeline.records.estimate import Estimate
-from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.records.uncertainty import type_a
 
 SOUND = ModelVerdict("adequate", held_out=0.5, residual=1.1)
@@ -44,7 +44,7 @@ def test_a_constant_that_no_motor_has_keeps_the_datasheet_back(
 ) -> None:
     """R from kelvin is whole, its copper coefficient is nine times copper's: provisional, named."""
     known = fitted(monkeypatch, 0.0344, 1e-4)
-    status, why = verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto", SOUND, "m")
+    status, why = verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto", None)
     assert status == "provisional"
     assert len(why) == 1
     assert why[0].startswith("impossible: temp_coeff_copper_1_k (came out as 0.0344 1/K")
@@ -55,14 +55,13 @@ def test_one_that_is_out_by_its_scatter_keeps_nothing_back(monkeypatch: pytest.M
     """A coefficient of -0.001 ± 0.002 is only not identifiable; the rest may be released."""
     known = fitted(monkeypatch, -0.001, 0.002)
     assert known.best("temp_coeff_copper_1_k") is None
-    assert verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto", SOUND, "m") == ("released", ())
+    assert verdict(known.chosen(), (), (), ("r_phase_ohm",), "auto", None) == ("released", ())
 
 
 WORST = Excess("drive_0.mcap", "vd_v", 0, 76.3, 0.9, "V")
 OVER = ModelVerdict("missing", held_out=31.0, residual=76.3, worst=WORST, over=3)
-BELOW = ModelVerdict(
-    "missing", held_out=1.0, residual=1.2, missing={"windage": {"loss_nm": (0.1, 0.01, "N·m")}}
-)
+FOUND = FoundEffect({"loss_nm": (0.1, 0.01, "N·m")}, "windage of 0.10 ± 0.02 N·m")
+BELOW = ModelVerdict("missing", held_out=1.0, residual=1.2, missing={"windage": FOUND})
 NOTHING = ModelVerdict("insufficient", note="record a torque map")
 OFF = ModelVerdict("not_tested", note="residual_test=false")
 
@@ -70,7 +69,7 @@ OFF = ModelVerdict("not_tested", note="residual_test=false")
 def released_with(model: ModelVerdict, release: str = "auto") -> tuple[str, tuple[str, ...]]:
     """The verdict on a datasheet that lacks nothing else."""
     sound = {"r_phase_ohm": Estimate("r_phase_ohm", 0.3, "ohm", "measured", "odd")}
-    return verdict(sound, (), (), ("r_phase_ohm",), release, model, "m")
+    return verdict(sound, (), (), ("r_phase_ohm",), release, model.reason("m"))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +79,10 @@ def released_with(model: ModelVerdict, release: str = "auto") -> tuple[str, tupl
             OVER,
             "misses vd_v of drive_0.mcap by 76 noise floors and 2 more; `diagnose input=FOLDER",
         ),
-        (BELOW, "lacks an effect that shows below the noise floors; found: windage; `diagnose"),
+        (
+            BELOW,
+            "lacks windage of 0.10 ± 0.02 N·m; `run input=FOLDER",
+        ),
         (NOTHING, "model: record a torque map"),
         (OFF, "was held against the captures: residual_test=false"),
     ],

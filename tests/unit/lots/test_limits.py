@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.estimation.registry import estimators
-from pipeline.io.storage.limits import read_limits, required_constants
+from pipeline.io.storage.limits import read_limits, release_conditions, required_constants
 from pipeline.lots.limits_lint import lint
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.errors import UsageError
@@ -149,3 +149,15 @@ def test_required_constants_of_the_default() -> None:
     path = configuration_folder() / "limits" / "default.yaml"
     assert "psi_pm_wb" in required_constants(path)
     assert set(required_constants(path)) <= {one.name for one in read_limits(path).constants}
+
+
+@pytest.mark.parametrize(("line", "gates"), [("", True), ("model_gates: no\n", False)])
+def test_a_file_says_whether_the_model_gates_a_release(
+    tmp_path: Path, line: str, gates: bool
+) -> None:
+    path = tmp_path / "own.yaml"
+    path.write_text(f"required: [ld_h]\n{line}")
+    assert release_conditions(path) == (("ld_h",), gates)
+    path.write_text("required: [ld_h]\nmodel_gates: perhaps\n")
+    with pytest.raises(UsageError, match="model_gates is 'perhaps'; write yes or no"):
+        release_conditions(path)

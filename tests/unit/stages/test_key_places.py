@@ -197,3 +197,6 @@ def test_of_a_limits_file_what_a_release_needs_changes_the_work(
         fewer = default.replace(f"  - {name}\n", "", 1)
         assert fewer != default
         assert key(fewer) != base, name
+    told = default.replace("model_gates: yes", "model_gates: no", 1)
+    assert key(told) != base
+    assert not job_of(RunSettings(), found, said).model_gates

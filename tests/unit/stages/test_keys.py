@@ -176,6 +176,7 @@ class Model:
     model: ModelSpec = SPEC
     start: tuple[Estimate, ...] = (ESTIMATE,)
     revoked: tuple[Revocation, ...] = (REVOKED,)
+    search: bool = True
 
     def parts(self) -> keys.Parts:
         own = {f.name: getattr(self, f.name) for f in fields(self)}

@@ -15,6 +15,7 @@ from pipeline.execution.work import Stamp
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate
 from pipeline.records.ledger import Revocation
@@ -28,6 +29,7 @@ FOUND = ModelVerdict(
     worst=Excess("a.csv", "vd_v", 0, 76.0, 0.1, "V"),
     over=1,
 )
+DIAGNOSIS = Diagnosis("m", "standard", "missing", (), (), (), None, (), ())
 KNOWN = Constants((Estimate("pole_pairs", 7, "1", "measured", "open_circuit"),))
 
 
@@ -41,9 +43,11 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[ModelSpec]:
     """The models that were held against captures, none of them recalled."""
     asked: list[ModelSpec] = []
 
-    def verdict(campaign: Campaign, model: ModelSpec, start: Constants) -> ModelVerdict:
+    def verdict(
+        campaign: Campaign, model: ModelSpec, start: Constants, *, search: bool
+    ) -> tuple[ModelVerdict, Diagnosis]:
         asked.append(model)
-        return FOUND
+        return (replace(FOUND, note="searched") if search else FOUND), DIAGNOSIS
 
     monkeypatch.setattr(adequacy, "model_verdict", verdict)
     return asked
@@ -62,7 +66,11 @@ def test_a_verdict_is_kept_while_nothing_that_it_hangs_on_changes(
         before = len(made)
         given = [of.motor_id, reading]
         memory = ModelMemory(of, Stamp("v", (reading,), "c" * 64, "0.1.0", "", given))
-        assert judged_model(CAMPAIGN, model, known, memory) == (FOUND, ())
+        found = judged_model(CAMPAIGN, model, known, memory, of.diagnose)
+        searched = of.diagnose != "false"
+        assert found.verdict == (replace(FOUND, note="searched") if searched else FOUND)
+        assert found.findings == ()
+        assert found.diagnosis == (DIAGNOSIS if of.diagnose == "true" else None)
         return len(made) - before
 
     assert (tested(), tested()) == (1, 0)
@@ -71,14 +79,17 @@ def test_a_verdict_is_kept_while_nothing_that_it_hangs_on_changes(
     assert tested(model=ModelSpec("standard", ("cogging",))) == 1
     assert (tested(), tested()) == (1, 0)
     assert (tested(doubted), tested(doubted)) == (1, 0)
+    whole, unsearched = replace(job, diagnose="true"), replace(job, diagnose="false")
+    assert (tested(), tested(whole), tested(whole)) == (1, 1, 1), "a diagnosis is not remembered"
+    assert (tested(), tested(unsearched), tested(unsearched), tested()) == (0, 1, 0, 1)
 
 
 def test_a_test_that_breaks_costs_itself_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*_: object) -> ModelVerdict:
+    def broken(*_: object, **__: object) -> ModelVerdict:
         raise ValueError("odd data")
 
     monkeypatch.setattr(adequacy, "model_verdict", broken)
-    found, (finding,) = judged_model(CAMPAIGN, ModelSpec(), KNOWN)
+    found, (finding,), _ = judged_model(CAMPAIGN, ModelSpec(), KNOWN)
     assert (found.verdict, found.passed) == ("not_tested", False)
     assert "odd data" in found.note
     assert (finding.code, finding.severity) == ("residual_test_failed", "warning")
@@ -87,7 +98,7 @@ def test_a_test_that_breaks_costs_itself_alone(monkeypatch: pytest.MonkeyPatch) 
 def test_a_model_that_there_is_not_is_no_fault_of_the_captures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def unknown(*_: object) -> ModelVerdict:
+    def unknown(*_: object, **__: object) -> ModelVerdict:
         raise UsageError("unknown model x", "known are ...")
 
     monkeypatch.setattr(adequacy, "model_verdict", unknown)
@@ -96,7 +107,7 @@ def test_a_model_that_there_is_not_is_no_fault_of_the_captures(
 
 
 def test_switched_off_is_not_tested(made: list[ModelSpec]) -> None:
-    found, findings = judged_model(CAMPAIGN, None, KNOWN)
+    found, findings, _ = judged_model(CAMPAIGN, None, KNOWN)
     assert (found.verdict, found.note, findings, made) == (
         "not_tested",
         "residual_test=false",

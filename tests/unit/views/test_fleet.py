@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import not_identifiable
-from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.report.console import summary
 from pipeline.report.fleet_page import render_fleet
 from pipeline.views.fleet import fleet_view, floors_of
@@ -107,3 +107,39 @@ def test_the_tidy_files_hold_every_constant_of_every_motor() -> None:
                 assert told[sheet.motor_id, name] == expected
     assert flat["datasheet_status"].unique().to_list() == ["provisional"]
     assert fleet_files([constants_frame(sheet) for sheet in sheets]) == files
+
+
+def test_the_tidy_files_hold_the_sizes_of_the_effects_that_were_found() -> None:
+    """One that the captures do not determine is there without a value, and is no constant."""
+    parameters = {"loss_nm": (0.1, 0.01, "N·m"), "knee_rad_s": (None, None, "rad/s")}
+    found = FoundEffect(parameters, "windage of 0.10 ± 0.02 N·m", (), "spin it fast")
+    sheet = replace(
+        make_datasheet("one"), model=replace(misses(76.0, "one"), missing={"windage": found})
+    )
+    rows = constants_frame(sheet).filter(pl.col("method") == "residual_test")
+    assert rows.select("constant", "value", "u", "unit", "status", "note").rows() == [
+        ("windage.loss_nm", 0.1, 0.01, "N·m", "measured", found.headline),
+        ("windage.knee_rad_s", None, None, "rad/s", "not_identifiable", found.experiment),
+    ]
+    assert not any("." in name for name in sheet.constants)
+
+
+def test_motors_that_lack_the_same_effect_have_one_reason() -> None:
+    """Whatever its size and wherever it shows most."""
+
+    def lacking(motor_id: str, size: str) -> Datasheet:
+        found = FoundEffect({}, f"cogging torque of {size}")
+        model = replace(
+            misses(76.0, motor_id), missing={"cogging": found}, held_out=15.0, held_out_with=0.6
+        )
+        sheet = replace(make_datasheet(motor_id), model=model)
+        return replace(sheet, why=(model.reason(motor_id) or "",))
+
+    view = fleet_view([lacking("a", "7 mN·m"), lacking("b", "9 mN·m")])
+    assert [(one.text, one.members) for one in view.reasons] == [
+        ("the standard model lacks cogging", ("a", "b"))
+    ]
+    assert [row.model.short for row in view.rows] == ["missing cogging, 76 floors"] * 2
+    text = summary([lacking("a", "7 mN·m")], (), "out", report=False, folder="in")
+    assert "with it, the error falls from 15 to 0.6 noise floors" in text
+    assert "`run input=in model.effects=[cogging]` adds what is missing" in text
