@@ -52,7 +52,31 @@ POLICY = AgreementPolicy()
 
 
 def disagreements(readings: Iterable[Reading]) -> tuple[Disagreement, ...]:
-    """Where captures disagree, a quantity each, by quantity; none where they are of one motor."""
+    """Where the captures of one motor disagree, a quantity each.
+
+    Parameters
+    ----------
+    readings
+        Single captures' values of all quantities, above zero.
+
+    Returns
+    -------
+    tuple of Disagreement
+        By quantity; empty where the captures are of one motor.
+
+    Notes
+    -----
+    With the covariance C of the readings x and their generalised mean m, χ² = (x − m)' C⁻¹ (x − m)
+    has n − 1 degrees of freedom. Where its p-value is below `AgreementPolicy.level`, the readings
+    are parted in two at the gap that leaves least χ² in both parts, again and again until each part
+    agrees in itself. Parts that are wider than the gap between them are a drift, not two motors.
+
+    References
+    ----------
+    A. C. Aitken, Proc. R. Soc. Edinb. 55, 1936, 42, doi:10.1017/S0370164600014346.
+    JCGM 100:2008 (GUM), 5.2.
+
+    """
     by_quantity: dict[str, list[Reading]] = {}
     for reading in readings:
         by_quantity.setdefault(reading.quantity, []).append(reading)
@@ -156,10 +180,23 @@ def _told(readings: Sequence[Reading], groups: list[list[Reading]]) -> Disagreem
 
 
 def parties(found: Sequence[Disagreement]) -> tuple[list[str], list[str]]:
-    """The captures of the usual motor and the odd ones, over all quantities, each sorted.
+    """The captures of the usual motor and the odd ones, over all quantities.
 
+    Parameters
+    ----------
+    found
+        Disagreements of one motor.
+
+    Returns
+    -------
+    usual, odd
+        Paths, each sorted, none in both.
+
+    Notes
+    -----
     Larger groups decide; a quantity whose groups are of one size goes by the captures that it
     shares with the others. With nothing to go by the odd ones are those that come later by name.
+
     """
     odd: set[str] = set()
     usual: set[str] = set()
@@ -211,8 +248,19 @@ def findings(found: Sequence[Disagreement]) -> tuple[Finding, ...]:
 def failing(name: str, concerned: Sequence[Disagreement]) -> Check:
     """The check whose constants come from captures that disagree: it has two motors to judge.
 
-    `value` is the ratio of the two groups' means that is farthest from 1, `limit` the largest
-    deviation from 1 that captures of one motor show (k = 3).
+    Parameters
+    ----------
+    name
+        Of the check.
+    concerned
+        Disagreements in quantities that the check rests on, one or more.
+
+    Returns
+    -------
+    Check
+        Failed. `value` is the ratio of two groups' means that is farthest from 1, `limit` the
+        largest deviation from 1 that captures of one motor show (k = 3).
+
     """
 
     def ratio(one: Disagreement) -> tuple[float, float]:

@@ -48,7 +48,28 @@ class Ratio(NamedTuple):
 
 
 def ratio_of(top: Estimate, bottom: Estimate) -> Ratio:
-    """The ratio of two estimates, correlations included, without what methods disagree by."""
+    """The ratio of two estimates, with what they share taken into account.
+
+    Parameters
+    ----------
+    top, bottom
+        Estimates of like quantities; `bottom` is not zero.
+
+    Returns
+    -------
+    Ratio
+        What methods disagree by is left out of its uncertainty, for that is what is to be judged.
+
+    Notes
+    -----
+    First order: u² = Σ_s (u_s,top/bottom − ratio u_s,bottom/bottom)² over the sources s of both
+    budgets, in which a gain that both share cancels.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), 5.2 (correlated input quantities).
+
+    """
     ratio = top.number / bottom.number
     upper, lower = (without_between(e.budget, METHODS) for e in (top, bottom))
     terms = [(1.0 / bottom.number, upper), (-ratio / bottom.number, lower)]
@@ -56,7 +77,32 @@ def ratio_of(top: Estimate, bottom: Estimate) -> Ratio:
 
 
 def judge_deviation(deviation: float, u: float, allowance: float) -> CheckStatus:
-    """The status of a deviation from what is expected; all three in one unit."""
+    """The status of a deviation from what is expected.
+
+    Parameters
+    ----------
+    deviation
+        Measured less expected [any unit].
+    u
+        Its standard uncertainty [same unit].
+    allowance
+        What the comparison itself cannot promise [same unit].
+
+    Returns
+    -------
+    status
+        `fail` beyond allowance + 3 u. Otherwise `not_evaluated` where 2 u exceeds `RESOLUTION`
+        times the allowance, `pass` up to allowance + 2 u and `marginal` above. Also `not_evaluated`
+        for numbers that are not finite.
+
+    Examples
+    --------
+    >>> [judge_deviation(d, 0.01, 0.02) for d in (0.03, 0.045, 0.06)]
+    ['pass', 'marginal', 'fail']
+    >>> judge_deviation(0.0, 0.06, 0.02)
+    'not_evaluated'
+
+    """
     if not (math.isfinite(deviation) and math.isfinite(u)):
         return "not_evaluated"
     if abs(deviation) > allowance + 3.0 * u:
@@ -96,8 +142,10 @@ def judge_ratio(
 
     Returns
     -------
-    `value` is the ratio, `limit` the largest deviation from 1 that passes. `suspect` is set on
-    anything but a pass; None where the ratio is so uncertain that it lands on many conventions.
+    Check
+        `value` is the ratio, `limit` the largest deviation from 1 that passes. `suspect` is set
+        where the check fails or is marginal; None where the ratio is so uncertain that it lands on
+        many conventions.
 
     """
     value, u, dof = ratio

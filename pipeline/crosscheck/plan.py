@@ -163,9 +163,32 @@ def make_plan(
 ) -> Plan:
     """Tests in the order in which they resolve most, each counted for what is left by then.
 
-    A greedy cover: the test with the largest weight of doubts comes first, its doubts are
-    taken off, and so on. Ties go to a test not yet recorded, then by name. `check_tests` are
-    the captures that each check rests on.
+    Parameters
+    ----------
+    known
+        Constants, checks and recorded tests of one motor.
+    ways
+        Estimators: what each gives, from which tests, with which constants.
+    check_tests
+        The tests that each check rests on, by its name.
+    aims
+        Constants that are required, and uncertainties that are wanted.
+
+    Returns
+    -------
+    Plan
+        Steps, and the doubts that no test settles.
+
+    Notes
+    -----
+    A greedy cover: the test with the largest weight of doubts comes first, its doubts are taken
+    off, and so on. Ties go to a test not yet recorded, then by name.
+
+    References
+    ----------
+    V. Chvátal, Math. Oper. Res. 4(3), 1979, 233 (how near to the best a greedy cover comes),
+    doi:10.1287/moor.4.3.233.
+
     """
     options = tuple(ways)
     doubts = [
@@ -226,10 +249,27 @@ def _step(test: str, doubts: list[Doubt], known: Known, ways: tuple[Way, ...]) -
 def settling_tests(constant: str, known: Known, ways: tuple[Way, ...]) -> frozenset[str]:
     """The tests that could give a constant, or give it better.
 
-    A way that has not been tried counts with all its tests. One that was tried and wants
-    constants that are missing counts with the tests for those; one that had all it wants
-    counts with its tests again, those not yet recorded where there are any. A way that only
-    computes counts with the tests of what it computes from.
+    Parameters
+    ----------
+    constant
+        Its name.
+    known
+        What is there of the motor.
+    ways
+        Estimators.
+
+    Returns
+    -------
+    frozenset of str
+        Tests; empty where no way leads to the constant.
+
+    Notes
+    -----
+    A way that has not been tried counts with all its tests. One that was tried and wants constants
+    that are missing counts with the tests for those; one that had all it wants counts with its
+    tests again, those not yet recorded where there are any. A way that only computes counts with
+    the tests of what it computes from.
+
     """
     return _settling(constant, known, ways, frozenset())
 

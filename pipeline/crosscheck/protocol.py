@@ -16,10 +16,21 @@ RuleFunction = Callable[[Constants, Campaign, Mapping[str, float]], Check]
 class Rule:
     """One check of `contract/outputs.md`: `check(constants, campaign, options)` is pure.
 
-    With too little to judge it returns a Check of status not_evaluated that says what is missing.
-    `tests`: the captures that the check rests on, the one to repeat first when it fails first.
-    `quantities`: those of `records.agreement` that it takes for one motor's; where captures
-    disagree on one of them the check fails before it is made.
+    Attributes
+    ----------
+    name
+        Of the check, as in the datasheet.
+    check
+        Of the motor's constants, its captures and the options; with too little to judge it returns
+        a Check of status `not_evaluated` that says what is missing.
+    options
+        Numbers of judgement by name, with their defaults; `conf/` can override each.
+    tests
+        Tests that the check rests on, the one to repeat first when it fails first.
+    quantities
+        Those of `records.agreement` that it takes for one motor's; where captures disagree on one
+        of them the check fails before it is made.
+
     """
 
     name: str

@@ -30,11 +30,26 @@ def check_all(
     options: Mapping[str, Mapping[str, float]],
     apart: Sequence[Disagreement] = (),
 ) -> tuple[Check, ...]:
-    """Every check of one motor, in the order of their names.
+    """Every check of one motor.
 
-    A check that rests on a quantity in `apart` fails with the files that are of another motor: no
-    convention is told of two motors. A rule that breaks on this data has judged nothing: its check
-    is not evaluated and says so.
+    Parameters
+    ----------
+    constants
+        All estimates of the motor.
+    campaign
+        Its captures.
+    options
+        Options by the name of the rule, beside or over the rule's own.
+    apart
+        Quantities in which the captures disagree.
+
+    Returns
+    -------
+    tuple of Check
+        In the order of their names. A check that rests on a quantity in `apart` fails with the
+        files that are of another motor: two motors have no convention. A rule that breaks on this
+        data has judged nothing: its check is not evaluated and says so.
+
     """
     checks = []
     for rule in rules():

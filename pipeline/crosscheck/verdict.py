@@ -16,13 +16,36 @@ def verdict(
     release: str,
     lacking: str | None,
 ) -> tuple[DatasheetStatus, tuple[str, ...]]:
-    """The status of `contract/outputs.md` and every reason that keeps it from `released`.
+    """Whether a datasheet is released, provisional or refused, and why.
 
-    `required` are the constants that the limits file wants measured; `release` is `auto` or
-    `manual` (then a person approves in the registry, and the file stays provisional). A constant
-    that came out where no motor is keeps any datasheet back, required or not: what is wrong with
-    its captures is in what else rests on them. So does what is `lacking` in the model: by more than
-    the noise of the captures, or because it was not held against them.
+    Parameters
+    ----------
+    constants
+        The chosen estimate of each constant by name.
+    checks
+        All cross-checks.
+    captures
+        What the datasheet rests on, with the integrity of each file.
+    required
+        Constants that the limits file wants measured.
+    release
+        `auto`, or `manual`: then a person approves in the registry, and the datasheet stays
+        provisional.
+    lacking
+        What the model of the motor lacks, in words: it misses its captures by more than their
+        noise, or was not held against them. None where it lacks nothing.
+
+    Returns
+    -------
+    status, reasons
+        `refused` where a check failed, with the failures alone; `provisional` with all that keeps
+        it back; or `released` without a reason.
+
+    Notes
+    -----
+    A constant that came out where no motor is keeps any datasheet back, required or not: what is
+    wrong with its captures is in what else rests on them. So does what is lacking in the model.
+
     """
     failed = [check for check in checks if check.status == "fail"]
     if failed:

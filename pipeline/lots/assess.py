@@ -80,9 +80,35 @@ def label(value: Value) -> str:
 
 
 def assess(values: Sequence[Value], golden: Sequence[Value], lots: Sequence[str]) -> Assessment:
-    """Everything that one constant's values tell; `lots` in order of time, `golden` repeats free.
+    """Everything that one constant's values say of two groups of lots.
 
-    The unit of the baseline is the lot: its mean is the mean of lot means.
+    Parameters
+    ----------
+    values
+        One value a motor, both sides.
+    golden
+        Values of motors that are measured again and again, for the biases of stations; independent
+        of each other.
+    lots
+        Names in order of time.
+
+    Returns
+    -------
+    Assessment
+        Its `contrast` is None without a motor on either side, and where the stations of the sides
+        are not linked.
+
+    Notes
+    -----
+    The unit of the baseline is the lot: its mean is the mean of lot means. The variance of the
+    difference is that of motors within lots over their numbers, or that of baseline lot means where
+    it is larger, plus the stations' biases and the shared gains; its degrees of freedom are
+    Welch-Satterthwaite's.
+
+    References
+    ----------
+    F. E. Satterthwaite, Biometrics Bulletin 2(6), 1946, 110, doi:10.2307/3002019.
+
     """
     correction = _corrections(values, golden)
     kept, unlinked, confounded = _linked(values, correction)

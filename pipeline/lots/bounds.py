@@ -39,10 +39,36 @@ def hold(
     sd: float | None,
     k: float,
 ) -> Held:
-    """Decides on every value; the guard band counts in the motor's own U where it does in U.
+    """Decides on every motor's value by the limits of a constant.
 
-    Nothing is limited where neither limit can be worked out, as without a baseline to take the
-    nominal from.
+    Parameters
+    ----------
+    limits
+        Of the constant, as in the limits file.
+    values
+        One a motor.
+    corrected
+        The same without their station's bias, by motor_id [unit].
+    baseline_mean
+        Mean of the baseline's lots [unit], the nominal where none is stated.
+    sd
+        Standard deviation of motors within a lot [unit], for limits that count in it.
+    k
+        Coverage factor of U = k u [1].
+
+    Returns
+    -------
+    Held
+        Without decisions where neither limit can be worked out, as without a nominal.
+
+    Notes
+    -----
+    The guard band counts in the motor's own U where the limits file counts it in U.
+
+    References
+    ----------
+    JCGM 106:2012, 8.3 (guard bands).
+
     """
     nominal = limits.nominal if limits.nominal is not None else baseline_mean
     typical_u = k * median(v.u for v in values) if values else None
@@ -82,7 +108,27 @@ def conformity(
     mean: float,
     sd: float | None,
 ) -> Conformity:
-    """The candidate's motors by decision, the worst first, and the rule's risks for such a lot."""
+    """The candidate's motors by decision, the worst first, and the rule's risks for such a lot.
+
+    Parameters
+    ----------
+    held
+        The limits and the decision on every motor.
+    candidate
+        Values of the candidate's motors.
+    corrected
+        Values without their station's bias, by motor_id [unit].
+    mean
+        Of the candidate's motors [unit].
+    sd
+        Standard deviation of the candidate's values [unit], that of measuring among it.
+
+    Returns
+    -------
+    Conformity
+        Without risks where a limit, `sd` or a motor is missing.
+
+    """
     found = [(held.decisions.get(v.motor_id, "not_evaluated"), v) for v in candidate]
     counts = tuple(
         Count(decision, number)

@@ -19,10 +19,38 @@ NONE = Capability(None, None, None, None, LEVEL)
 
 
 def capability(values: ArrayLike, lower: float, upper: float, level: float = LEVEL) -> Capability:
-    """Cp = (U − L)/6s, Cpk = min(U − mean, mean − L)/3s of values [n].
+    """Process capability of a lot's motors against their tolerance, with an interval.
 
-    Cpk ± z √(1/(9n) + Cpk²/(2(n − 1))) [1]. One limit may be infinite; then there is no Cp. All
-    are None for fewer than three motors, no scatter or no limit.
+    Parameters
+    ----------
+    values
+        One a motor [n, unit].
+    lower, upper
+        Limits of the tolerance [unit]; one may be infinite, then there is no Cp.
+    level
+        Coverage of the interval of Cpk [1].
+
+    Returns
+    -------
+    Capability
+        All None for fewer than three motors, no scatter or no limit.
+
+    Notes
+    -----
+    Cp = (U − L)/6s and Cpk = min(U − mean, mean − L)/3s.
+
+    Cpk ± z √(1/(9n) + Cpk²/(2(n − 1))), for Gaussian motors.
+
+    References
+    ----------
+    A. F. Bissell, Applied Statistics 39(3), 1990, 331, doi:10.2307/2347383.
+
+    Examples
+    --------
+    >>> found = capability([9.0, 10.0, 11.0], 4.0, 13.0)
+    >>> found.cp, found.cpk
+    (1.5, 1.0)
+
     """
     x = np.asarray(values, float)
     if x.size < 3 or not (math.isfinite(lower) or math.isfinite(upper)):

@@ -29,9 +29,42 @@ class Chart(NamedTuple):
 def ewma_chart(
     means: ArrayLike, centre: ArrayLike, sd: ArrayLike, weight: float = WEIGHT, width: float = WIDTH
 ) -> Chart:
-    """z_i = λ x_i + (1 − λ) z_{i−1} from the centre, for means [..., n] in order of time.
+    """Exponentially weighted moving average of lot means, with its control limits.
 
-    Limits: centre ± L sd √(λ/(2 − λ) (1 − (1 − λ)^{2i})), `sd` that of a lot mean [unit].
+    Parameters
+    ----------
+    means
+        Lot means in order of time [..., n, unit].
+    centre
+        Mean of the process [..., unit].
+    sd
+        Standard deviation of a lot mean [..., unit].
+    weight
+        λ, of the newest lot [1].
+    width
+        L, of the limits [standard deviations of the average].
+
+    Returns
+    -------
+    Chart
+        The average after each lot, its limits, and where it is outside.
+
+    Notes
+    -----
+    z_i = λ x_i + (1 − λ) z_{i−1} from the centre;
+    limits: centre ± L sd √(λ/(2 − λ) (1 − (1 − λ)^{2i})).
+
+    References
+    ----------
+    S. W. Roberts, Technometrics 1(3), 1959, 239, doi:10.1080/00401706.1959.10489860.
+    Lucas and Saccucci, Technometrics 32(1), 1990, 1, doi:10.1080/00401706.1990.10484583.
+
+    Examples
+    --------
+    >>> chart = ewma_chart([1.0, 1.0], 0.0, 1.0)
+    >>> np.round(chart.ewma, 6).tolist(), round(float(chart.high[0]), 6)
+    ([0.2, 0.36], 0.572)
+
     """
     x = np.asarray(means, float)
     middle = np.asarray(centre, float)

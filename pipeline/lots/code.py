@@ -63,7 +63,34 @@ def compare_versions(
     terms: Mapping[str, Term],
     notes: Sequence[str] = (),
 ) -> LotRegression:
-    """Every constant that either version gives, motor by motor, and every check that changed."""
+    """The same captures under two versions of the code: which constants and checks changed.
+
+    Parameters
+    ----------
+    pairs
+        Datasheets of one motor each, under the old and the new version.
+    groups
+        What the report says of either side.
+    limits
+        `code_negligible` and `code_limit`: changes [in units of the old u] up to which a constant
+        passes, and above which it fails.
+    terms
+        Unit and words of each constant.
+    notes
+        Remarks to pass on.
+
+    Returns
+    -------
+    LotRegression
+        Of mode `code`.
+
+    Notes
+    -----
+    A change is (new − old)/u_old. Only the method can differ, so no statistics enter. A constant
+    also fails where the new version no longer gives it, and is marginal where its u became
+    `U_RATIO` times larger or smaller.
+
+    """
     names = sorted({n for pair in pairs for m in pair for n in m.sheet.constants})
     constants = tuple(_constant(name, pairs, limits, terms) for name in names)
     constants = tuple(one for one in constants if one.motors or one.missing)

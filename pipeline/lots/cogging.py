@@ -33,7 +33,20 @@ def spectra_of(members: Iterable[Member], side: Side) -> list[tuple[Order, ...]]
 
 
 def order_levels(members: Sequence[Member]) -> tuple[OrderLevel, ...]:
-    """Amplitude of each order by side, over the motors tested, those that lack it counted as 0."""
+    """Amplitude of each of the largest orders, by side.
+
+    Parameters
+    ----------
+    members
+        Datasheets of both sides.
+
+    Returns
+    -------
+    tuple of OrderLevel
+        Mean and standard deviation over the motors tested [N·m], those that lack the order counted
+        as 0; at most `MOST_ORDERS` orders.
+
+    """
     levels = []
     sides: tuple[Side, ...] = ("baseline", "candidate")
     spectra = {side: spectra_of(members, side) for side in sides}
@@ -65,10 +78,24 @@ def _largest(spectra: Sequence[tuple[Order, ...]]) -> list[int]:
 
 
 def cogging_bands(members: Sequence[Member]) -> tuple[CoggingBand, ...]:
-    """Mean wave of each side over one turn ± one standard deviation between motors [N·m].
+    """Mean cogging wave of each side over one turn, and its spread between motors.
 
-    The encoder's zero is arbitrary: every motor is turned to where the crest of the leading order
-    lies at zero, and among the crests to the one that puts its next largest order in phase.
+    Parameters
+    ----------
+    members
+        Datasheets of both sides.
+
+    Returns
+    -------
+    tuple of CoggingBand
+        Mean ± one standard deviation [N·m] over [rad]; empty where no motor has an order.
+
+    Notes
+    -----
+    The encoder's zero is arbitrary: every motor is turned to where a crest of its leading order
+    lies at zero, and among the crests to the one that puts its next largest order nearest to its
+    own crest.
+
     """
     bands = []
     sides: tuple[Side, ...] = ("baseline", "candidate")

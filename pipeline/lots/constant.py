@@ -64,7 +64,25 @@ class Material:
 def result(
     made: Material, family: Family, limits: Limits, started: Mapping[str, str]
 ) -> ConstantResult:
-    """The record of one constant; `started` are the lots in order of time."""
+    """The record of one constant in a comparison of lots.
+
+    Parameters
+    ----------
+    made
+        Values, limits and what follows from them.
+    family
+        Its place among the constants tested.
+    limits
+        The limits file.
+    started
+        First start of each lot, in order of time.
+
+    Returns
+    -------
+    ConstantResult
+        With its verdict and the reason.
+
+    """
     found = made.found
     candidate = [v for v in found.values if v.side == "candidate"]
     lots = {lot: list(v) for side in (found.base, found.candidate) for lot, v in side.items()}
@@ -237,10 +255,23 @@ def _variance(made: Material, lots: Mapping[str, Sequence[float]]) -> tuple[Comp
 
 
 def gauge_of(repeats: Sequence[Value]) -> Gauge | None:
-    """The gauge study of motors measured again on two stations or more; None without one.
+    """The gauge study of motors that were measured again on two stations or more.
 
-    Motors measured twice or more on every one of the most widely used stations, as many readings
-    as the least repeated of them.
+    Parameters
+    ----------
+    repeats
+        Values from captures of their own, several a motor and station.
+
+    Returns
+    -------
+    Gauge or None
+        None where fewer than two motors were measured twice or more on the same two stations.
+
+    Notes
+    -----
+    Of the sets of stations, the one with most motors counts. Each motor and station gives as many
+    readings as the least repeated of them has, for the study is balanced.
+
     """
     cells: dict[str, dict[str, list[float]]] = {}
     for value in repeats:

@@ -14,10 +14,42 @@ from pipeline.records.lot_constant import Equivalence
 def equivalence(
     difference: float, se: float, dof: float, margin: float, alpha: float
 ) -> Equivalence:
-    """`equivalent` where the 1 − 2 alpha interval of the difference lies within ± margin [unit].
+    """Whether a difference is practically none: two one-sided t tests.
 
-    p is the larger of the two one-sided p values. `different`: the interval lies wholly beyond
-    one of the margins. Raises ValueError for a margin that is not positive.
+    Parameters
+    ----------
+    difference
+        Of the means [unit].
+    se
+        Its standard uncertainty [unit].
+    dof
+        Degrees of freedom.
+    margin
+        Difference that matters to nobody [unit], above zero.
+    alpha
+        Level of each test [1].
+
+    Returns
+    -------
+    Equivalence
+        `equivalent` where the 1 − 2 alpha interval of the difference lies within ± margin,
+        `different` where it lies wholly beyond one of the margins, else `undecided`; p is the
+        larger of the two one-sided p values.
+
+    Raises
+    ------
+    ValueError
+        The margin is not above zero.
+
+    References
+    ----------
+    D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15(6), 1987, 657, doi:10.1007/BF01068419.
+
+    Examples
+    --------
+    >>> [equivalence(d, 0.1, 20.0, 1.0, 0.05).status for d in (0.5, 0.9, 1.5)]
+    ['equivalent', 'undecided', 'different']
+
     """
     if margin <= 0.0:
         raise ValueError("a margin of sameness is positive")

@@ -72,7 +72,28 @@ class Components:
 
 
 def anova(values: Array) -> Table:
-    """The table of readings [P motors, O stations, n repeats]; raises ValueError for too few."""
+    """The analysis of variance of a crossed gauge study.
+
+    Parameters
+    ----------
+    values
+        Readings [P motors, O stations, n repeats, unit].
+
+    Returns
+    -------
+    Table
+        Mean squares of motors, stations, their interaction and the repeats.
+
+    Raises
+    ------
+    ValueError
+        There are fewer than two of any.
+
+    References
+    ----------
+    AIAG, Measurement Systems Analysis, 4th ed., 2010, ch. III B.
+
+    """
     p, o, n = values.shape
     if p < 2 or o < 2 or n < 2:
         raise ValueError("a crossed study needs two motors, two stations and two repeats")
@@ -94,9 +115,29 @@ def anova(values: Array) -> Table:
 
 
 def components(table: Table, pool_from: float = POOL_FROM) -> Components:
-    """Variances by expected mean squares; an interaction with p above `pool_from` is pooled [1].
+    """Variances of a crossed gauge study by expected mean squares.
 
-    σ²_rep = MSE; σ²_station = (MSO − MSI)/(P n); σ²_part = (MSP − MSI)/(O n); none below 0.
+    Parameters
+    ----------
+    table
+        Mean squares.
+    pool_from
+        P value of the interaction above which it is pooled with the repeats [1].
+
+    Returns
+    -------
+    Components
+        None below zero.
+
+    Notes
+    -----
+    σ²_rep = MSE, σ²_station = (MSO − MSI)/(P n), σ²_interaction = (MSI − MSE)/n and
+    σ²_part = (MSP − MSI)/(O n); pooled, MSI and MSE are both their mean by degrees of freedom.
+
+    References
+    ----------
+    AIAG, Measurement Systems Analysis, 4th ed., 2010, ch. III B.
+
     """
     pooled = table.interaction_p > pool_from
     return _components(
@@ -128,10 +169,36 @@ def _components(
 
 
 def study(values: Array, level: float = LEVEL) -> Gauge:
-    """Gauge R&R of readings [P, O, n], with the interval of its share of the study variation.
+    """Gauge repeatability and reproducibility, with the interval of its share of the spread.
 
-    The interval is the generalized one [2]: each mean square over its own chi-square draw, the
-    components and their ratio again for each of the draws, from a fixed seed.
+    Parameters
+    ----------
+    values
+        Readings [P motors, O stations, n repeats, unit].
+    level
+        Coverage of the interval [1].
+
+    Returns
+    -------
+    Gauge
+        `good` below 10 % of the study variation, `acceptable` up to 30 %.
+
+    Raises
+    ------
+    ValueError
+        There are fewer than two motors, stations or repeats.
+
+    Notes
+    -----
+    The interval is the generalized one: each mean square times its degrees of freedom over its own
+    chi-square draw, then the components and their ratio, `DRAWS` times from a fixed seed. In the
+    interval the interaction is never pooled.
+
+    References
+    ----------
+    Burdick, Borror and Montgomery, J. Quality Technology 35(4), 2003, 342,
+    doi:10.1080/00224065.2003.11980232.
+
     """
     table = anova(values)
     found = components(table)

@@ -44,10 +44,28 @@ class Tolerance:
         return self.upper - self.guard_band
 
     def decide(self, value: float) -> Decision:
-        """The four-way statement of [2]: how far the value [unit] is inside or outside.
+        """The four-way statement on a value.
 
-        `pass` within the acceptance limits, `conditional_pass` between them and the tolerance,
-        `conditional_fail` beyond the tolerance by no more than w, else `fail`.
+        Parameters
+        ----------
+        value
+            Measured [unit].
+
+        Returns
+        -------
+        Decision
+            `pass` within the acceptance limits, `conditional_pass` between them and the tolerance,
+            `conditional_fail` beyond the tolerance by no more than the guard band, else `fail`.
+
+        References
+        ----------
+        ILAC-G8:09/2019, 4.2 (non-binary statements with guard band).
+
+        Examples
+        --------
+        >>> [Tolerance(0.0, 10.0, 1.0).decide(x) for x in (5.0, 9.5, 10.5, 12.0)]
+        ['pass', 'conditional_pass', 'conditional_fail', 'fail']
+
         """
         inside = min(value - self.lower, self.upper - value)
         if inside >= 0.0:
@@ -64,12 +82,38 @@ class Risks:
 
 
 def risks(tolerance: Tolerance, mean: float, sd: float, u: float) -> Risks:
-    """Global consumer's and producer's risk of accepting within the acceptance limits [1].
+    """Global consumer's and producer's risk of accepting within the acceptance limits.
 
-    Motors are Gaussian with `mean` and `sd`, measurement errors with `u` [unit]:
-    R_C = ∫ outside T of φ(η) P(accept | η) dη, R_P = ∫ inside T of φ(η) (1 − P(accept | η)) dη,
-    each by Gauss-Legendre over the parts of the true value's range. Raises ValueError for
-    negative `sd` or `u`.
+    Parameters
+    ----------
+    tolerance
+        Limits and guard band [unit].
+    mean, sd
+        Of the motors' true values, Gaussian [unit].
+    u
+        Standard uncertainty of a measurement [unit].
+
+    Returns
+    -------
+    Risks
+        Shares of all motors [1].
+
+    Raises
+    ------
+    ValueError
+        `sd` or `u` is negative.
+
+    Notes
+    -----
+    R_C = ∫ outside T of φ(η) P(accept | η) dη
+
+    R_P = ∫ inside T of φ(η) (1 − P(accept | η)) dη, each by Gauss-Legendre rules of `NODES` points
+    over the pieces between the limits, within `REACH_SD` standard deviations.
+
+    References
+    ----------
+    JCGM 106:2012, 9.5.
+
     """
     if sd < 0.0 or u < 0.0:
         raise ValueError("standard deviations are not negative")

@@ -11,10 +11,26 @@ from pipeline.records.limits import ConstantLimits, Limits
 
 
 def lint(limits: Limits, terms: Mapping[str, Term]) -> tuple[str, ...]:
-    """Faults of a limits file, in its order; `terms` are the constants that datasheets know.
+    """Faults of a limits file, all at once.
 
-    A test limit tighter than the design's tolerance is one: it rejects motors that are as
+    Parameters
+    ----------
+    limits
+        The file, read.
+    terms
+        Constants that datasheets know, by name.
+
+    Returns
+    -------
+    tuple of str
+        One sentence each, the rules first and then the constants in the file's order; empty where
+        all is well.
+
+    Notes
+    -----
+    A test limit tighter than the design's tolerance is a fault: it rejects motors that are as
     designed. What is left of the tolerance after the guard band must not be empty.
+
     """
     found = list(_rules(limits))
     for name, count in Counter(limits.golden).items():

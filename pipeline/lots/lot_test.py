@@ -30,12 +30,48 @@ class Tested(NamedTuple):
 def lot_test(
     base_means: ArrayLike, new_mean: ArrayLike, u_more: ArrayLike = 0.0, new_lots: int = 1
 ) -> Tested:
-    """One lot, or the mean of M, against the scatter of L others: means [..., L], mean [...].
+    """One lot, or the mean of several, against the scatter of others.
 
-    t = (m_new − mean)/√(s²(1/M + 1/L) + u_more²) with s over the L means; L − 1 degrees of
-    freedom, by Welch-Satterthwaite more where `u_more` [..., infinite dof] counts: the link of
-    stations, or a new lot of fewer motors. Prediction of a new draw [1]. Raises ValueError for
-    fewer than two lots.
+    Parameters
+    ----------
+    base_means
+        Means of the L baseline lots [..., L, unit].
+    new_mean
+        Mean of the new lots' means [..., unit].
+    u_more
+        Further standard uncertainty of the difference [..., unit], of infinite degrees of freedom:
+        the link of stations, or a new lot of fewer motors.
+    new_lots
+        M, how many lots are new.
+
+    Returns
+    -------
+    Tested
+        t statistic, degrees of freedom and two-sided p value.
+
+    Raises
+    ------
+    ValueError
+        There are fewer than two baseline lots.
+
+    Notes
+    -----
+    t = (m_new − mean)/√(s² (1/M + 1/L) + u_more²), s over the L means: the prediction of a new
+    draw. L − 1 degrees of freedom, by Welch-Satterthwaite more where `u_more` counts.
+
+    References
+    ----------
+    D. C. Montgomery, Design and Analysis of Experiments, 8th ed., Wiley, 2013, 13.2 (random
+    effects).
+
+    Examples
+    --------
+    Lots at 9, 10, 11 (s = 1) and a new one at 14: t = 4/√(1 + 1/3), with 2 degrees of freedom.
+
+    >>> tested = lot_test([9.0, 10.0, 11.0], 14.0)
+    >>> round(float(tested.t), 4), float(tested.dof), round(float(tested.p_value), 3)
+    (3.4641, 2.0, 0.074)
+
     """
     means, new = np.asarray(base_means, float), np.asarray(new_mean, float)
     lots = means.shape[-1]
@@ -52,7 +88,28 @@ def lot_test(
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """P values [..., k] adjusted for their number, step down [2]; compare them with alpha."""
+    """P values adjusted for their number, step down; compare them with alpha.
+
+    Parameters
+    ----------
+    p_values
+        [..., k].
+
+    Returns
+    -------
+    array [..., k]
+        In the same order, at most 1.
+
+    References
+    ----------
+    S. Holm, Scand. J. Statist. 6(2), 1979, 65.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03]).tolist()
+    [0.03, 0.06, 0.06]
+
+    """
     p = np.asarray(p_values, float)
     count = p.shape[-1]
     order = np.argsort(p, axis=-1, kind="stable")
@@ -64,10 +121,28 @@ def holm(p_values: ArrayLike) -> Array:
 
 
 def power(shift: float, se: float, dof: float, alpha: float) -> float:
-    """Probability that a two-sided t test at `alpha` sees a shift whose estimate has `se`.
+    """Probability that a two-sided t test sees a shift.
 
-    P(T > c) + P(T < −c) of the noncentral t law, both as upper tails: `scipy.special.nctdtr` is
-    NaN far below the mean.
+    Parameters
+    ----------
+    shift
+        True shift [unit].
+    se
+        Standard error of its estimate [unit].
+    dof
+        Degrees of freedom of `se`.
+    alpha
+        Level of the test [1].
+
+    Returns
+    -------
+    float
+        [1]; without a standard error 1 for any shift, and alpha for none.
+
+    Notes
+    -----
+    P(T > c) + P(T < −c) of the noncentral t distribution.
+
     """
     from scipy.stats import nct
 
@@ -79,7 +154,25 @@ def power(shift: float, se: float, dof: float, alpha: float) -> float:
 
 
 def detectable(se: float, dof: float, alpha: float, wanted: float = 0.95) -> float:
-    """The shift that such a test sees with probability `wanted`, by bisection; 0 for se 0."""
+    """The shift that a two-sided t test sees with a given probability.
+
+    Parameters
+    ----------
+    se
+        Standard error of the shift's estimate [unit].
+    dof
+        Degrees of freedom of `se`.
+    alpha
+        Level of the test [1].
+    wanted
+        Probability [1].
+
+    Returns
+    -------
+    float
+        [unit], by bisection; 0 without a standard error.
+
+    """
     if se <= 0.0:
         return 0.0
     low, high = 0.0, 2.0 * se

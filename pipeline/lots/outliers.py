@@ -18,9 +18,28 @@ LEVEL = 0.01
 
 
 def robust_z(lots: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
-    """Distance of each motor from its lot's median in robust sd pooled over lots; by lot.
+    """Distance of each motor from its lot's median, in robust standard deviations.
 
-    Zero throughout where half of all motors equal their median.
+    Parameters
+    ----------
+    lots
+        Values by lot [unit].
+
+    Returns
+    -------
+    dict
+        Scores [1] by lot, in the same order; zero throughout where half of the motors equal their
+        median.
+
+    Notes
+    -----
+    s = 1.4826 median |x − median| over the motors of all lots of two or more, times √(n/(n −
+    lots)), for a median takes a degree of freedom from each lot.
+
+    References
+    ----------
+    Hampel, Ronchetti, Rousseeuw and Stahel, Robust Statistics, Wiley, 1986, 2.3.
+
     """
     centre = {lot: median(values) for lot, values in lots.items()}
     left = [abs(v - centre[lot]) for lot, values in lots.items() for v in values if len(values) > 1]
@@ -35,6 +54,25 @@ def robust_z(lots: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
 
 
 def critical_z(motors: int, lots: int, level: float = LEVEL) -> float:
-    """What |z| a healthy set of motors exceeds anywhere with probability `level` at most."""
+    """What |z| a healthy set of motors exceeds anywhere with a given probability at most.
+
+    Parameters
+    ----------
+    motors, lots
+        How many there are.
+    level
+        Probability that any motor exceeds it [1].
+
+    Returns
+    -------
+    float
+        [standard deviations], the quantile of Student's t at level/2 over the motors (Bonferroni).
+
+    Notes
+    -----
+    Degrees of freedom: `EFFICIENCY` (motors − lots), for the median absolute deviation knows as
+    much of a spread as that share of Gaussian motors.
+
+    """
     dof = max(EFFICIENCY * (motors - lots), 1.0)
     return float(stdtrit(dof, 1.0 - level / (2.0 * max(motors, 1))))

@@ -62,7 +62,25 @@ class Samples:
 def compare_lots(
     samples: Samples, limits: Limits, terms: Mapping[str, Term], notes: Sequence[str] = ()
 ) -> LotRegression:
-    """The whole comparison; `terms` gives each constant its unit and words."""
+    """Lots against lots: every constant of the limits file, what motors show, one verdict.
+
+    Parameters
+    ----------
+    samples
+        The datasheets of both sides, of repeats and of golden motors.
+    limits
+        The limits file.
+    terms
+        Unit and words of each constant.
+    notes
+        Remarks to pass on.
+
+    Returns
+    -------
+    LotRegression
+        Of mode `lots`.
+
+    """
     lots = lots_in_order(samples.members)
     order = [lot for lot, _ in lots]
     materials = [

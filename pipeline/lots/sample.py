@@ -72,7 +72,28 @@ class Value:
 
 
 def values_of(name: str, members: Iterable[Member]) -> tuple[list[Value], list[str]]:
-    """The values of a constant, and why a member that should have one has none."""
+    """The values of a constant at 25 degC, and why a datasheet that should have one has none.
+
+    Parameters
+    ----------
+    name
+        Of the constant.
+    members
+        Datasheets.
+
+    Returns
+    -------
+    values
+        One a datasheet that has it; a stated constant is none.
+    missing
+        `motor: reason`, one each of the others.
+
+    Notes
+    -----
+    Copper and magnets: x(25) = x(T)/(1 + α (T − 25)), α of the motor itself, or copper's 1/259.5 K
+    for a resistance. A magnet's constant without α counts within `SLACK_K` of 25 degC only.
+
+    """
     values, missing = [], []
     for member in members:
         estimate = member.sheet.constants.get(name)
@@ -146,7 +167,19 @@ def independent(values: Sequence[Value]) -> list[Value]:
 
 
 def lots_in_order(members: Iterable[Member]) -> list[tuple[str, str]]:
-    """(lot, its first start) in the order of time."""
+    """Lots in the order of their first start.
+
+    Parameters
+    ----------
+    members
+        Datasheets.
+
+    Returns
+    -------
+    list of (lot, start)
+        Start as in `Member.when`.
+
+    """
     first: dict[str, str] = {}
     for member in members:
         first[member.lot] = min(first.get(member.lot, member.when), member.when)

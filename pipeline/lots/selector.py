@@ -93,10 +93,26 @@ class Query:
 
 
 def parse_selector(text: str, versions: Sequence[Version]) -> Query:
-    """The query of a selector; `versions` are what a value without field is looked up in.
+    """The query of a selector.
 
-    Raises UsageError for an empty one, an unknown field, an open quote, a value that is no date,
-    revision or digest, and for a value without field that nothing bears.
+    Parameters
+    ----------
+    text
+        As described in the module, such as `lot:A,B,station:bench-1`.
+    versions
+        What a value without field is looked up in.
+
+    Returns
+    -------
+    Query
+        Alternatives by field.
+
+    Raises
+    ------
+    UsageError
+        The selector is empty or too long, a field unknown, a quote open, a value no date, revision
+        or digest; or nothing bears a value without field.
+
     """
     if not text.strip() or len(text) > MAX_CHARS:
         raise UsageError("the selector is empty or too long", _example())

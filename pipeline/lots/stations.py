@@ -68,9 +68,40 @@ class Correction:
 
 
 def station_correction(readings: Sequence[Reading], stations: Iterable[str]) -> Correction:
-    """Biases of `stations` from all readings, linked where a block was measured on both.
+    """Biases of stations from readings of the same lots and golden motors on several of them.
 
-    Each linked set of more than one station is solved on its own.
+    Parameters
+    ----------
+    readings
+        Values of a block (a lot or a golden motor) on a station, each with its standard deviation.
+    stations
+        Names of all stations that matter, read or not.
+
+    Returns
+    -------
+    Correction
+        Biases sum to zero within each linked set; stations of different sets cannot be compared.
+
+    Notes
+    -----
+    y = block + station + error by weighted least squares, the blocks eliminated. Where readings
+    scatter by more than they state, the covariance is multiplied by χ²/dof (Birge's ratio,
+    squared).
+
+    References
+    ----------
+    Searle, Casella and McCulloch, Variance Components, Wiley, 1992, ch. 4.
+    R. T. Birge, Phys. Rev. 40, 1932, 207, doi:10.1103/PhysRev.40.207.
+
+    Examples
+    --------
+    One motor reads 10 on A and 12 on B:
+
+    >>> readings = [Reading("motor 1", "A", 10.0, 1.0), Reading("motor 1", "B", 12.0, 1.0)]
+    >>> found = station_correction(readings, ["A", "B", "C"])
+    >>> round(found.of("A"), 9), round(found.of("B"), 9), found.linked(["A"], ["C"])
+    (-1.0, 1.0, False)
+
     """
     names = sorted({*stations, *(reading.station for reading in readings)})
     blocks: dict[str, set[str]] = {}

@@ -45,7 +45,21 @@ def order_name(order: int) -> str:
 
 
 def orders_shown(members: Iterable[Member], share: float) -> list[Shown]:
-    """Cogging orders of each motor's datasheet, from `share` of the typical leading one on."""
+    """Cogging orders of each motor's datasheet, the small ones left out.
+
+    Parameters
+    ----------
+    members
+        Datasheets; those that were not tested for cogging are left out.
+    share
+        Least amplitude, of the median over the motors of the leading order's [1].
+
+    Returns
+    -------
+    list of Shown
+        Sizes are amplitudes [N·m].
+
+    """
     spectra: list[tuple[Member, dict[int, float]]] = []
     for member in members:
         estimate = member.sheet.constants.get(SPECTRUM)
@@ -85,7 +99,22 @@ def checks_failed(members: Iterable[Member]) -> list[Shown]:
 def effects_shown(
     members: Iterable[Member], diagnoses: Mapping[str, DiagnosisSummary]
 ) -> list[Shown]:
-    """The effects that each diagnosed motor's model lacks; motors of too little data are out."""
+    """The effects that each diagnosed motor's model lacks.
+
+    Parameters
+    ----------
+    members
+        Datasheets.
+    diagnoses
+        By motor_id; a motor without one, or with too little data for one, is left out.
+
+    Returns
+    -------
+    list of Shown
+        An effect's size is its only parameter, None where it has several; orders of a wave over the
+        angle have their amplitude [N·m].
+
+    """
     found = []
     for member in members:
         diagnosis = diagnoses.get(member.sheet.motor_id)
@@ -120,7 +149,31 @@ def _orders(parameters: Mapping[str, tuple[float, str]]) -> dict[int, float]:
 
 
 def compare_traits(shown: Sequence[Shown], source: Source) -> tuple[EffectChange, ...]:
-    """Every trait that any motor shows, by name, with the verdict on its change."""
+    """Every trait that any motor shows, with the verdict on its change.
+
+    Parameters
+    ----------
+    shown
+        What each motor of either side shows.
+    source
+        Where that comes from.
+
+    Returns
+    -------
+    tuple of EffectChange
+        By name; empty where nothing is shown or a side has no motor.
+
+    Notes
+    -----
+    Fisher's exact test of the shares of motors, Holm over the traits. A trait is new, and fails,
+    where at least half of the candidate's motors show it, in no baseline lot half of them do, and
+    the adjusted p value is below `ALPHA`.
+
+    References
+    ----------
+    A. Agresti, Categorical Data Analysis, 3rd ed., Wiley, 2013, 3.5.
+
+    """
     names = sorted({name for one in shown for name in one.sizes})
     sides = {side: [one for one in shown if one.side == side] for side in ("baseline", "candidate")}
     if not names or not all(sides.values()):

@@ -19,7 +19,8 @@ from pipeline.records.lot_constant import Component
 class Nested:
     """Variances [unit²] between groups and within them, with degrees of freedom.
 
-    `between` is None for fewer than two groups, `within` where no group has two members.
+    `within` is None where no group has two members; `between` then too, and for fewer than two
+    groups.
     """
 
     between: float | None
@@ -29,7 +30,35 @@ class Nested:
 
 
 def nested(groups: Sequence[Sequence[float]]) -> Nested:
-    """σ²_within = MSW; σ²_between = (MSB − MSW)/n₀, n₀ = (N − Σn²/N)/(k − 1)."""
+    """Variances between and within groups of unequal numbers, by expected mean squares.
+
+    Parameters
+    ----------
+    groups
+        Values of each group [unit]; empty groups are left out.
+
+    Returns
+    -------
+    Nested
+        No variance below zero.
+
+    Notes
+    -----
+    σ²_within = MSW, σ²_between = (MSB − MSW)/n₀ with n₀ = (N − Σn²/N)/(k − 1).
+
+    References
+    ----------
+    Searle, Casella and McCulloch, Variance Components, Wiley, 1992, 3.6.
+
+    Examples
+    --------
+    MSW = 2 and MSB = 2 · 2 · 5² = 100, with two in each group:
+
+    >>> found = nested([[9.0, 11.0], [19.0, 21.0]])
+    >>> found.within, found.between
+    (2.0, 49.0)
+
+    """
     filled = [np.asarray(group, float) for group in groups if len(group)]
     sizes = np.array([group.size for group in filled], float)
     total, count = float(sizes.sum()), len(filled)
@@ -53,11 +82,29 @@ def parted(
     u_a: Sequence[float],
     biases: Sequence[float],
 ) -> tuple[Component, ...]:
-    """The four parts: of motors' values by lot, repeats of single motors, fits' u_a, biases.
+    """The spread of motors parted into lot, station, motor and capture.
 
-    What one motor's captures scatter by comes from repeated motors, or else from the fits; it is
-    taken off the spread of motors within their lot. The station's is the variance of the biases
-    of linked stations.
+    Parameters
+    ----------
+    lots
+        Motors' values by lot [unit].
+    repeats
+        Values of one motor each from captures of their own [unit].
+    u_a
+        Scatter that each fit states [unit], in place of repeats.
+    biases
+        Of linked stations [unit].
+
+    Returns
+    -------
+    tuple of Component
+        Standard deviations [unit] and shares of the sum of variances [1].
+
+    Notes
+    -----
+    The capture's variance comes from the repeats, or else is the mean square of `u_a`; it is taken
+    off the variance of motors within their lot. The station's is the variance of the biases.
+
     """
     among = nested(list(lots.values()))
     again = nested([group for group in repeats if len(group) > 1])
@@ -71,11 +118,12 @@ def parted(
     if motor is not None and capture is not None:
         motor = max(0.0, motor - capture)
     station = float(np.var(biases, ddof=1)) if len(biases) > 1 else None
+    needs = "needs two motors in a lot" * (among.within is None)
     origin = "from linked stations" if station is not None else "one station, or none linked"
     sized = (
-        ("lot", among.between, among.dof_between, "needs two lots" * (among.between is None)),
+        ("lot", among.between, among.dof_between, "needs two lots" if len(lots) < 2 else needs),
         ("station", station, max(len(biases) - 1, 0), origin),
-        ("motor", motor, among.dof_within, "needs two motors in a lot" * (motor is None)),
+        ("motor", motor, among.dof_within, needs),
         ("capture", capture, dof, note),
     )
     total = sum(variance for _, variance, _, _ in sized if variance is not None)

@@ -56,7 +56,34 @@ def judge(
     motor_p_holm: float | None,
     alpha: float,
 ) -> Judged:
-    """The verdict on one constant; see the module."""
+    """The verdict on one constant, by the three questions of the module.
+
+    Parameters
+    ----------
+    limits
+        Of the constant.
+    unit
+        Of the constant.
+    found
+        Its values and their contrast.
+    conformity
+        Decisions on the candidate's motors.
+    test
+        The lot-level test.
+    same
+        The test of equivalence.
+    motor_p_holm
+        P value of the motor-level test, adjusted for the number of constants; None where none was
+        made.
+    alpha
+        Level of the tests [1].
+
+    Returns
+    -------
+    Judged
+        The verdict, and its reason in one sentence.
+
+    """
     if not found.candidate or not found.base:
         side = "candidate" if not found.candidate else "baseline"
         return Judged("not_evaluated", f"no motor of the {side} has it")
@@ -112,10 +139,21 @@ def _not_failed(conformity: Conformity, test: LotTest, same: Equivalence, moved:
 def overall(
     constants: Sequence[ConstantResult], effects: Sequence[EffectChange]
 ) -> tuple[Verdict, tuple[str, ...]]:
-    """The verdict on the comparison and its reasons, the first that applies.
+    """The verdict on a comparison and its reasons.
 
-    Any constant or effect can fail it; only constants that decide can hold back a pass, and one
-    that neither side has is not part of the comparison.
+    Parameters
+    ----------
+    constants
+        Results of all constants.
+    effects
+        Changes of what motors show.
+
+    Returns
+    -------
+    verdict, reasons
+        Any constant or effect can fail it. Only constants that decide can hold back a pass, and one
+        that neither side has is not part of the comparison.
+
     """
     everything: tuple[ConstantResult | EffectChange, ...] = (*effects, *constants)
     failed = _reasons(everything, "fail")

@@ -17,9 +17,16 @@ NAME = "cogging_order_vs_slots"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """The leading order over LCM(slots, 2p): a whole number in a sound motor.
 
-    Multiples of the slots alone tell of unequal slots, of p or 2p of unequal magnets (Zhu and
-    Howe, IEEE Trans. Energy Conversion 15(4), 2000), once or twice a turn of unbalance: marginal.
-    Any other order is not made by these slots and poles.
+    Notes
+    -----
+    Other multiples of the slots are marginal: unequal slots or teeth. So are multiples of p or 2p,
+    unequal magnets, and once or twice a turn, unbalance. Any other order is not made by these slots
+    and poles, and fails.
+
+    References
+    ----------
+    Zhu and Howe, IEEE Trans. Energy Convers. 15(4), 2000, 407, doi:10.1109/60.900501.
+
     """
     order, pairs = constants.best("cogging_order"), constants.best("pole_pairs")
     slots = campaign.nameplate("slots")

@@ -16,8 +16,12 @@ NAME = "kt_vs_ke"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """Kt from the dynamometer over 1.5 p psi from the open-circuit spin.
 
-    Energy conservation makes them one number in the amplitude-invariant frame; the allowance
-    covers torque lost in iron, which the back-EMF does not see.
+    Notes
+    -----
+    Power that leaves the electrical side, 1.5 e_q i_q = 1.5 p ω ψ i_q, arrives as T ω, so that
+    T/i_q = 1.5 p ψ in the amplitude-invariant frame. The option `allowance` [1] covers torque lost
+    in iron, which the back-EMF does not see.
+
     """
     measured, promised = constants.best("kt_peak_nm_a"), constants.best("kt_from_ke_nm_a")
     if measured is None or promised is None or measured.method == promised.method:

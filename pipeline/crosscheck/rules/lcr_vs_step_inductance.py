@@ -16,8 +16,11 @@ NAME = "lcr_vs_step_inductance"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """The LCR meter's Ld and Lq over the steps'; the axis that deviates most is reported.
 
-    The allowance covers eddy currents in magnets and laminations, which the meter's frequency
-    excites more than a step.
+    Notes
+    -----
+    The option `allowance` [1] covers eddy currents in magnets and laminations, which the meter's
+    frequency excites more than a step. "Most" is |ratio − 1| − 2 u.
+
     """
     ratios = []
     for name in ("ld_h", "lq_h"):

@@ -25,11 +25,19 @@ BINS, LEAST_ROWS = 400, 40
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """Electrical power after losses over mechanical power, over the dynamometer's test.
 
-    The block means of 1.5 (vd id + vq iq) are regressed on shaft power, i² (copper), |i|
-    (inverter drop), |omega| and omega² (friction, iron): the coefficient of shaft power is 1 in any
-    machine, whatever it loses, and lands on a convention's number where one is wrong. i_q omega
-    is the instrument for shaft power, so that a shaft that rings does not pull it to zero
-    (Durbin, Rev. Inst. Int. Stat. 22, 1954).
+    Notes
+    -----
+    Block means of 1.5 (v_d i_d + v_q i_q) are regressed on shaft power, i² (copper), |i| (inverter
+    drop), |ω| and ω² (friction, iron): the coefficient of shaft power is 1 in any machine, whatever
+    it loses, and lands on a convention's number where one is wrong. i_q ω is the instrument for
+    shaft power, so that a shaft that rings does not pull it to zero. Its uncertainty is that of the
+    regression and of the gains of current, voltage and torque; the option `allowance` [1] is added.
+
+    References
+    ----------
+    J. Durbin, Rev. Int. Stat. Inst. 22, 1954, 23 (instrumental variables), doi:10.2307/1401917.
+    Newey and West, Econometrica 55(3), 1987, 703 (correlated blocks), doi:10.2307/1913610.
+
     """
     r_phase = constants.best("r_phase_ohm")
     captures = [c for c in campaign.of("torque_map") if c.has(*COLUMNS) and any(map(c.has, SPEEDS))]
@@ -39,7 +47,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
     if blocks.shape[0] < LEAST_ROWS:
         return not_evaluated(NAME, "needs longer plateaus in the torque_map")
     ratio, u_fit = _slope(blocks)
-    u = float(np.hypot(u_fit, np.linalg.norm(_gains(captures))))
+    u = float(np.hypot(u_fit, abs(ratio) * np.linalg.norm(_gains(captures))))
     pairs = constants.best("pole_pairs")
     return judge_ratio(
         NAME,

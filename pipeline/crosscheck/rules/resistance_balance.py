@@ -16,8 +16,11 @@ NAME = "resistance_balance"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """Largest less smallest phase resistance over their mean, near zero.
 
-    Two per cent is what leads and turn counts of a sound winding stay within; more is a bad
-    joint, a missing turn or a contact.
+    Notes
+    -----
+    The option `allowance` [1], two per cent, is what leads and turn counts of a sound winding stay
+    within; more is a bad joint, a missing turn or a contact.
+
     """
     imbalance = constants.best("resistance_imbalance")
     if imbalance is None:

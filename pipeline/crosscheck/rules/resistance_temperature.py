@@ -17,7 +17,14 @@ NAME = "resistance_temperature"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """The coefficient found in the heat run over copper's at 25 degC (1/259.5 per kelvin).
 
-    The allowance covers a sensor that reads one spot of a winding with gradients.
+    Notes
+    -----
+    The option `allowance` [1] covers a sensor that reads one spot of a winding with gradients.
+
+    References
+    ----------
+    IEEE Std 112-2017, 5.4 (R of copper is proportional to 234.5 + T).
+
     """
     alpha = constants.best("temp_coeff_copper_1_k")
     if alpha is None or alpha.status == "assumed":

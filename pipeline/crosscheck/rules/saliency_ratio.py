@@ -17,9 +17,13 @@ NAME = "saliency_ratio"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """Lq/Ld between 1 and `largest`, less than 1 only where the reluctance torque agrees.
 
-    The magnet lies in the d axis's path, so Ld <= Lq in all but flux-intensifying machines; in
-    those the torque map's reluctance term 1.5 p (Ld - Lq) is positive. Ld > Lq with a negative
-    reluctance term means that the axes were exchanged.
+    Notes
+    -----
+    The magnet lies in the d axis's path, so Ld ≤ Lq in all but flux-intensifying machines; in those
+    the torque map's reluctance term 1.5 p (Ld − Lq) is positive. Ld > Lq with a negative reluctance
+    term means that the axes were exchanged. A ratio within 2 u or a hundredth of 1 passes. The
+    option `largest` [1] is a ratio that no machine has.
+
     """
     ld, lq = constants.best("ld_h"), constants.best("lq_h")
     if ld is None or lq is None:

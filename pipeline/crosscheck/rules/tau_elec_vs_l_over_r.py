@@ -23,10 +23,14 @@ Array = NDArray[np.float64]
 
 
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
-    """The smallest current step on each rotor position, its time constant over L/R.
+    """The time constant of the smallest current step on each rotor position, over L/R.
 
-    No gain enters, so this sees what L and R cannot say of themselves: an open delta, a lossy core,
-    resistance between the motor and where the voltage was measured.
+    Notes
+    -----
+    The mean of the ratios is judged; the option `allowance` [1] is added to its uncertainty. No
+    gain enters the time constant, so this sees what L and R cannot say of themselves: an open
+    delta, a lossy core, resistance between the motor and where the voltage was measured.
+
     """
     ld, lq = constants.best("ld_h"), constants.best("lq_h")
     r_phase = constants.best("r_phase_ohm")
@@ -66,16 +70,32 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 
 def step_time_constant_s(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] | None:
-    """L/R [s] of a trace [n] and its standard error, by the integral form of L di/dt = v - R i.
+    """L/R of a trace of current steps, by the integral form of L di/dt = v − R i.
 
-    i = c + (1/L) ∫v dt - (R/L) ∫i dt between edges, with one c an edge, is linear in c, 1/L and
-    R/L, and no gain is in R/L. The voltage is the measured one: a supply that sags makes the
-    current settle sooner than L/R, by its own resistance, and a constant in place of v would take
-    that for the motor's. After the last edge v is -R_source i, which alone parts nothing: the
-    steps are taken together. What both channels read before the first edge is taken off, offsets
-    among it. An edge is where the voltage moves by more than half of its largest move between
-    samples. None where no step spans three time constants, or the current moves by less than 20
-    times what the line leaves over.
+    Parameters
+    ----------
+    t_s
+        Sampling instants [n, s].
+    v_v
+        Measured voltage of the pair [n, V]. A supply that sags makes the current settle sooner than
+        L/R, by its own resistance; a constant in place of v would take that for the motor's.
+    i_a
+        Current of the pair [n, A].
+
+    Returns
+    -------
+    (tau, u) or None
+        [s] and its standard error [s]; None where no step spans three time constants, or the
+        current moves by less than 20 times what the fit leaves over.
+
+    Notes
+    -----
+    i = c + (1/L) ∫v dt − (R/L) ∫i dt between edges, with one c an edge, is linear in c, 1/L and
+    R/L, and no gain is in R/L. After the last edge v is −R_source i, which alone does not separate
+    the two: the steps are taken together. What both channels read before the first edge is taken
+    off, offsets among it. An edge is where the voltage moves by more than half of its largest move
+    between samples.
+
     """
     moves = np.abs(np.diff(v_v))
     edges = np.flatnonzero(moves > 0.5 * moves.max(initial=0.0)) + 1

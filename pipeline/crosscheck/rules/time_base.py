@@ -41,9 +41,13 @@ class Pace(NamedTuple):
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """The integral of the recorded speed over the recorded angle, of every turning capture.
 
+    Notes
+    -----
     An angle knows no clock. A drive or dynamometer divides it by its own one to get a speed; over
     the recorder's time that speed gives the angle back if both clocks agree. The worst capture
-    counts: J goes with the square of its time.
+    counts, for inertia goes with the square of the time. Options: `allowance` [1], a share that a
+    speed's own scale may be off by; `turns` [1], the least travel.
+
     """
     del constants
     paces = [p for c in campaign.of(*TESTS) if (p := pace(c, options["turns"])) is not None]
@@ -67,10 +71,29 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 
 def pace(capture: Capture, turns: float) -> Pace | None:
-    """How fast a capture's clock runs beside that of its speed; None where it turns too little.
+    """How fast a capture's clock runs beside that of its speed.
 
-    Increments of blocks obey ∫ω dt = r Δθ − τ Δω, with τ the lag of the speed, by least squares.
-    Both clocks' own uncertainty is in u. Reference: GUM H.3 (a straight line's uncertainty).
+    Parameters
+    ----------
+    capture
+        With the angle, a speed of its own, and time.
+    turns
+        Least travel, forth and back added up [turns].
+
+    Returns
+    -------
+    Pace or None
+        None where a column is missing, or the capture is too short or turns too little.
+
+    Notes
+    -----
+    Increments over blocks obey ∫ω dt = r Δθ − τ Δω, with τ the lag of the speed, by least squares.
+    Both clocks' own uncertainty is in u.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), H.3 (uncertainty of a straight line).
+
     """
     if not capture.has(*COLUMNS):
         return None

@@ -20,9 +20,16 @@ NAME = "torque_equation"
 def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]) -> Check:
     """Torque per q ampere at the strongest d current: dynamometer over psi, Ld, Lq.
 
-    (Kt + k_r i_d) / (1.5 p [psi + (Ld - Lq) i_d]) with Kt and k_r fitted to the torque map and
-    psi, Ld, Lq from back-EMF and steps: both terms of the torque equation at once, where the
-    reluctance term weighs most. The allowance covers the map's own saturation.
+    Notes
+    -----
+    (Kt + k_r i_d)/(1.5 p [ψ + (L_d − L_q) i_d]), with Kt and k_r fitted to the torque map and ψ,
+    L_d, L_q from back-EMF and steps: both terms of the torque equation at once, where the
+    reluctance term weighs most. The option `allowance` [1] covers the map's own saturation.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (tests of permanent magnet machines).
+
     """
     names = ("kt_peak_nm_a", "kt_reluctance_nm_a2", "kt_from_ke_nm_a", "ld_h", "lq_h")
     known = {name: constants.best(name) for name in (*names, "pole_pairs")}

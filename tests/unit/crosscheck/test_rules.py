@@ -261,6 +261,15 @@ def test_line_voltage_taken_for_phase_unbalances_the_power() -> None:
     assert "1.7321" in (check.suspect or "")
 
 
+def test_gains_widen_the_power_in_proportion_to_the_ratio() -> None:
+    """Current, voltage and torque are known to 1 % each, of whatever the ratio is."""
+    check = judge("power_balance", constants(), torque_map(gain=math.sqrt(3.0)))
+    assert check.limit is not None
+    assert check.limit - 0.02 == pytest.approx(
+        2.0 * math.sqrt(3.0) * 0.01 * math.sqrt(3.0), rel=0.05
+    )
+
+
 def test_where_the_angle_is_there_the_angle_counts_in_the_power() -> None:
     """The bench's own speed is a tenth high; a gate lets it pass because the angle is used."""
     capture = torque_map().captures[0]

@@ -153,6 +153,10 @@ def test_without_repeats_the_fits_say_what_a_capture_scatters() -> None:
     nothing = parted({"a": [1.0, 3.0]}, [], [], [])
     assert nothing[3].sd is None
     assert nothing[2].sd == pytest.approx(math.sqrt(2.0))
+    assert nothing[0].note == "needs two lots"
+    single = parted({"a": [1.0], "b": [3.0]}, [], [], [])
+    assert single[0].sd is None
+    assert single[0].note == single[2].note == "needs two motors in a lot"
     still = parted({"a": [1.0, 1.0], "b": [1.0, 1.0]}, [], [], [])
     assert [part.share for part in still] == [None, None, None, None]
 
