@@ -108,6 +108,17 @@ def _as_json(command: Command, outcome: Outcome) -> Outcome:
 
 
 def _show(outcome: Outcome) -> int:
+    """Prints an outcome and what its command goes on with; the exit code of all of it."""
+    _print_outcome(outcome)
+    code = outcome.exit_code
+    while outcome.then is not None:
+        outcome = _continued(outcome.then)
+        _print_outcome(outcome)
+        code = first_that_applies(code, outcome.exit_code)
+    return code
+
+
+def _print_outcome(outcome: Outcome) -> None:
     for line in outcome.errors:
         _print(line, sys.stderr)
     if outcome.text:
@@ -119,20 +130,16 @@ def _show(outcome: Outcome) -> int:
     if outcome.timings:
         rows = [f"  {name:<12} {seconds:8.3f} s" for name, seconds in outcome.timings]
         _print("\n".join(["timings", *rows]), sys.stdout)
-    if outcome.then is None:
-        return outcome.exit_code
-    return _show(_continued(outcome.exit_code, outcome.then))
 
 
-def _continued(code: int, then: Callable[[], tuple[int, tuple[str, ...]]]) -> Outcome:
+def _continued(then: Callable[[], Outcome]) -> Outcome:
     """What a command that stays comes to; an interrupt is how a user ends it, no failure."""
     try:
-        further, lines = then()
+        return then()
     except PipelineError as error:
-        further, lines = error.exit_code, (f"error: {error}",)
+        return Outcome(error.exit_code, errors=(f"error: {error}",))
     except KeyboardInterrupt:
-        further, lines = 0, ()
-    return Outcome(first_that_applies(code, further), errors=lines)
+        return Outcome()
 
 
 def _print(text: str, stream: TextIO) -> None:

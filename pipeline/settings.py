@@ -111,6 +111,12 @@ class RunSettings(ReadingSettings):
     )
     tls_cert: str | None = key(None, "certificate of this client", result=False, place=True)
     tls_key: str | None = key(None, "key of that certificate", result=False, place=True)
+    watch: bool = key(
+        False, "stay, and run again whenever captures have arrived in input", result=False
+    )
+    settle_s: float = key(
+        1.0, "with watch=true: how long nothing in input may change before a run", result=False
+    )
     cache: bool = key(True, "remember in output/.cache what need not be done again", result=False)
     recordings: bool = key(True, "write a Rerun recording a capture", result=False)
     report: bool = key(True, "write the HTML report", result=False)

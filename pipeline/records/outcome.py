@@ -17,14 +17,14 @@ class Outcome:
     `next` the command that a user would sensibly give now, both printed after the text.
 
     `then` is what a command goes on with once that is printed, such as a window or a server that
-    stays; it returns lines for standard error and a further exit code.
+    stays; it returns what that came to, which may go on in turn.
     """
 
     exit_code: int = 0
     text: str = ""
     errors: tuple[str, ...] = ()
     timings: tuple[tuple[str, float], ...] = ()
-    then: Callable[[], tuple[int, tuple[str, ...]]] | None = None
+    then: Callable[[], Outcome] | None = None
     result: Any = None
     wrote: str = ""
     next: str = ""

@@ -85,15 +85,15 @@ def _served(settings: ReviewSettings, chosen: Opened) -> Outcome:
         text = "\n".join([text, *_decided(Path(settings.output), chosen.all)])
         kept = stack.pop_all()
 
-    def then() -> tuple[int, tuple[str, ...]]:
+    def then() -> Outcome:
         with kept:
             if server is not None:
                 server.serve_forever()
-                return 0, ()
+                return Outcome()
             code = window([*map(str, chosen.files), *catalogues], free_port())
         if code != 0:
-            return 5, (f"error: the viewer ended with code {code}; {NO_SCREEN}",)
-        return 0, ()
+            return Outcome(5, errors=(f"error: the viewer ended with code {code}; {NO_SCREEN}",))
+        return Outcome()
 
     return Outcome(text=text, then=then)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -73,14 +73,24 @@ def main(settings: RunSettings) -> Outcome:
 
         known_effects(settings.model.effects)
     policy_changes(settings.policy)
+    if settings.watch and settings.json:
+        raise UsageError("watch=true prints a line a motor, no JSON", "leave json=true out")
+    if settings.settle_s < 0.0:
+        raise UsageError(f"settle_s={settings.settle_s} is negative", "1 is usual")
     if settings.workers < 0:
         raise UsageError(f"workers={settings.workers} is negative", "0 is one a core")
     registry = _registry(settings)
     cluster = Cluster(settings.scheduler, settings.tls_ca, settings.tls_cert, settings.tls_key)
     pool = open_pool(settings.executor, cluster)
     output = output_folder(settings.output)
-    workers = WorkerPool(pool, settings.workers or core_count(), output / PROGRESS)
-    with workers:
+    with ExitStack() as stack:
+        workers = WorkerPool(pool, settings.workers or core_count(), output / PROGRESS)
+        stack.enter_context(workers)
+        if settings.watch:
+            from pipeline.stages.watch import Watch
+
+            perform = partial(_run, settings, registry, workers)
+            return Watch(settings, perform, stack.pop_all()).begin()
         outcome = _run(settings, registry, workers)
     if not settings.json:
         return outcome
@@ -94,7 +104,13 @@ def process_motor(job: MotorJob) -> MotorResult:
     return motor.process_motor(job)
 
 
-def _run(settings: RunSettings, registry: Registry | None, workers: WorkerPool) -> Outcome:
+def _run(
+    settings: RunSettings,
+    registry: Registry | None,
+    workers: WorkerPool,
+    surveyed: Callable[[], None] = lambda: None,
+) -> Outcome:
+    """One run; `surveyed` is called when every file was looked at, before anything is written."""
     watch = Stopwatch()
     folder, output = Path(settings.input), Path(settings.output)
     limits = limits_file(settings.limits, settings.config_dir)
@@ -103,6 +119,7 @@ def _run(settings: RunSettings, registry: Registry | None, workers: WorkerPool) 
     with waiting("looking at the files of " + settings.input), watch.stage("survey"):
         ask = partial(_answers, settings, sources, workers, cache)
         found = survey(folder, sources, ask, recover=settings.recover)
+        surveyed()
     plain = _jobs(settings, found, limits)
     batch = _batch_key(settings, plain, found, registry)
     if (cached := _cached_outcome(settings, registry, cache, batch)) is not None:

@@ -22,7 +22,16 @@ TOP = {
 """Files at the top of the repository, and the pages that they become."""
 GROUPS: Mapping[str, Sequence[str]] = {
     "Tutorials": ("notebooks/*", "tutorial-effect"),
-    "How to": ("source-maps", "recorder-forms", "review", "registry", "export", "lots", "fleet"),
+    "How to": (
+        "source-maps",
+        "recorder-forms",
+        "review",
+        "registry",
+        "export",
+        "lots",
+        "fleet",
+        "watch",
+    ),
     "Explanation": ("architecture", "criticism", "uncertainty", "simulator", "real-recordings"),
     "Reference": ("api", "glossary", "source-map-keys", "policy", "gallery"),
     "Project": ("contributing", "changelog", "decisions/index"),

@@ -1,0 +1,80 @@
+"""How long `run watch=true` takes from the last byte of a campaign to the page of its motor.
+
+`python -m tests.bench.watch [--count 120] [--every-s 30]` simulates a station that drops one
+campaign of a new motor at a time, and prints the median, the 99th percentile and the longest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+SETTLE_S = 0.5
+LONGEST_S = 600.0
+
+
+def campaign(number: int, folder: Path) -> str:
+    """Writes the captures of one simulated motor to `folder`; its name."""
+    motor = f"S-{number:04d}"
+    words = f"simulate output={folder / motor} seed={number + 1} motor_id={motor}"
+    subprocess.run([sys.executable, "-m", "pipeline", *words.split()], check=True, stdout=-3)
+    return motor
+
+
+def latency_s(source: Path, folder: Path, page: Path) -> float:
+    """Seconds from the last byte of a dropped campaign until the page of its motor is there."""
+    shutil.copytree(source, folder / source.name)
+    begun = time.monotonic()
+    while not page.is_file():
+        if time.monotonic() - begun > LONGEST_S:
+            raise TimeoutError(f"no {page} after {LONGEST_S:g} s")
+        time.sleep(0.02)
+    return time.monotonic() - begun
+
+
+def measured(count: int, every_s: float, options: list[str]) -> list[float]:
+    """The latency of each of `count` campaigns, a new one every `every_s` seconds [s]."""
+    with tempfile.TemporaryDirectory() as name:
+        bench, folder, output = (Path(name, part) for part in ("bench", "in", "out"))
+        folder.mkdir()
+        words = f"run watch=true settle_s={SETTLE_S} input={folder} output={output}".split()
+        watching = subprocess.Popen([sys.executable, "-m", "pipeline", *words, *options])
+        try:
+            found = []
+            for number in range(count):
+                motor, begun = campaign(number, bench), time.monotonic()
+                page = output / "report" / f"{motor}.html"
+                found.append(latency_s(bench / motor, folder, page))
+                shutil.rmtree(bench / motor)
+                time.sleep(max(0.0, every_s - (time.monotonic() - begun)))
+        finally:
+            watching.send_signal(signal.SIGTERM)
+            watching.wait(LONGEST_S)
+    return found
+
+
+def main() -> None:
+    """Measures and prints."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=120)
+    parser.add_argument("--every-s", type=float, default=30.0)
+    parser.add_argument("options", nargs="*", help="keys of run, such as residual_test=false")
+    given = parser.parse_args()
+    found = measured(given.count, given.every_s, given.options)
+    median, high = np.percentile(found, [50.0, 99.0])
+    sys.stdout.write(
+        f"{len(found)} campaigns, page after: median {median:.1f} s, 99 % {high:.1f} s, "
+        f"longest {max(found):.1f} s (the first, with the start of the workers, {found[0]:.1f} s)\n"
+    )
+
+
+if __name__ == "__main__":
+    main()

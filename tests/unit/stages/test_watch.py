@@ -1,0 +1,145 @@
+"""A watched folder: what is taken up, when, and what is shown of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from pipeline.io.ingest.arrivals import Arrivals, snapshot
+from pipeline.records.errors import MachineError, UsageError
+from pipeline.records.outcome import Outcome
+from pipeline.settings import RunSettings
+from pipeline.stages import run, watch
+from pipeline.stages.watch import Watch
+
+
+def test_a_folder_is_due_once_it_rests_and_not_again() -> None:
+    arrivals, first = Arrivals(2.0), frozenset({("a.csv", 1, 1, 1)})
+    grown = frozenset({("a.csv", 2, 2, 1)})
+    assert [arrivals.due(first, t) for t in (0.0, 1.9, 2.0)] == [False, False, True]
+    assert not arrivals.due(grown, 2.25), "it grows"
+    assert not arrivals.due(grown, 4.0)
+    assert arrivals.due(grown, 4.25)
+    arrivals.taken = grown
+    assert not arrivals.due(grown, 100.0)
+    assert not arrivals.due(first, 100.0), "it changed just now"
+    assert arrivals.due(first, 102.0)
+
+
+@pytest.mark.parametrize("change", ["bigger", "same size", "replaced", "new", "gone", "sidecar"])
+def test_each_change_of_a_folder_is_seen(tmp_path: Path, change: str) -> None:
+    file = tmp_path / "sub" / "a.csv"
+    file.parent.mkdir()
+    file.write_text("1,2\n")
+    os.utime(file, ns=(10**18, 10**18))
+    before = snapshot(tmp_path)
+    if change == "bigger":
+        file.write_text("1,2\n3,4\n")
+    elif change == "same size":
+        file.write_text("1,3\n")
+    elif change == "replaced":
+        other = tmp_path / ".a.csv"
+        other.write_text("1,4\n")
+        os.utime(other, ns=(10**18, 10**18))
+        other.replace(file)
+    elif change == "gone":
+        file.unlink()
+    else:
+        (file.parent / ("b.csv" if change == "new" else "a.csv.meta.yaml")).write_text("")
+    assert snapshot(tmp_path) != before
+
+
+def test_hidden_files_are_none_of_the_folder(tmp_path: Path) -> None:
+    """As a run leaves them out: copying programs write under a hidden name first."""
+    before = snapshot(tmp_path)
+    (tmp_path / ".a.csv.Xy12").write_text("half")
+    (tmp_path / ".cache").mkdir()
+    (tmp_path / ".cache" / "a").write_text("")
+    assert snapshot(tmp_path) == before
+
+
+def test_a_folder_that_is_gone_is_one_error(tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match="is gone"):
+        snapshot(tmp_path / "none")
+
+
+@pytest.fixture
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RunSettings:
+    monkeypatch.setattr(watch, "LOOK_EVERY_S", 0.01)
+    monkeypatch.setattr(watch, "RETRY_S", 0.01)
+    monkeypatch.setattr(watch, "terminate_as_interrupt", lambda: None)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.csv").write_text("1")
+    return RunSettings(
+        input=str(tmp_path / "in"), output=str(tmp_path / "out"), watch=True, settle_s=0.02
+    )
+
+
+def following(outcome: Outcome) -> Outcome:
+    assert outcome.then is not None
+    return outcome.then()
+
+
+def test_a_pass_begins_again_where_files_came_while_it_looked(settings: RunSettings) -> None:
+    """Expected: the pass in which a file came writes nothing, and the next one sees both."""
+    written: list[int] = []
+
+    def perform(surveyed: Callable[[], None]) -> Outcome:
+        files = sorted(Path(settings.input).iterdir())
+        if not written and len(files) == 1:
+            (Path(settings.input) / "b.csv").write_text("half a fi")
+        surveyed()
+        written.append(len(files))
+        return Outcome(3, errors=("refused: a.csv",))
+
+    first = following(Watch(settings, perform, ExitStack()).begin())
+    assert (written, first.errors) == ([], ())
+    second = following(first)
+    assert written == [2]
+    assert second.errors == ("refused: a.csv",)
+    assert second.exit_code == 0, "what a pass came to is told, and the watch goes on"
+    (Path(settings.input) / "c.csv").write_text("")
+    third = following(second)
+    assert written == [2, 3]
+    assert third.errors == (), "it was told before"
+
+
+def test_a_full_disk_is_told_and_tried_again(settings: RunSettings) -> None:
+    passes: list[int] = []
+
+    def perform(surveyed: Callable[[], None]) -> Outcome:
+        surveyed()
+        passes.append(1)
+        if len(passes) == 1:
+            raise MachineError("the disk is full", "make room")
+        return Outcome()
+
+    first = following(Watch(settings, perform, ExitStack()).begin())
+    assert first.errors[0].startswith("error: the disk is full") and first.exit_code == 0
+    following(first)
+    assert len(passes) == 2
+
+
+def test_the_end_closes_the_workers(settings: RunSettings) -> None:
+    closed: list[bool] = []
+    workers = ExitStack()
+    workers.callback(lambda: closed.append(True))
+
+    def perform(surveyed: Callable[[], None]) -> Outcome:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        following(Watch(settings, perform, workers).begin())
+    assert closed == [True]
+
+
+@pytest.mark.parametrize("wrong", [{"settle_s": -1.0}, {"json": True}])
+def test_settings_that_no_watch_can_keep(settings: RunSettings, wrong: dict[str, object]) -> None:
+    for name, value in wrong.items():
+        setattr(settings, name, value)
+    with pytest.raises(UsageError, match=next(iter(wrong))):
+        run.main(settings)
