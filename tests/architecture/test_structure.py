@@ -13,7 +13,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "pipeline"
-LINES = 450
+LINES = 400
+"""Most lines of a file, those of its docstrings aside."""
 SLOW = ("pandera", "rerun", "altair", "numba", "scipy.stats", "scipy.optimize", "polars", "mcap")
 ENTRY_POINT = "__main__.py"
 EVERYTHING = {"Exception", "BaseException"}
@@ -103,8 +104,19 @@ def test_an_import_upwards_is_seen(tmp_path: Path) -> None:
 
 
 def test_no_file_is_long() -> None:
-    lengths = {path.name: len(path.read_text().splitlines()) for path in SOURCES}
+    lengths = {path.name: _lines_without_docstrings(path) for path in SOURCES}
     assert {name: length for name, length in lengths.items() if length >= LINES} == {}
+
+
+def _lines_without_docstrings(path: Path) -> int:
+    text = path.read_text()
+    prose = 0
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
+            node
+        ):
+            prose += (node.body[0].end_lineno or 0) - node.body[0].lineno + 1
+    return len(text.splitlines()) - prose
 
 
 def test_no_drawer_for_everything() -> None:
