@@ -13,9 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.diagnosis import base_fit, searched
-from pipeline.criticism.effect import Array
-from pipeline.criticism.regression.goodness import HeldOut, leave_out, remainder
-from pipeline.criticism.regression.linear_system import own_columns
+from pipeline.criticism.regression.goodness import leave_out, remainder
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.selection.drift import wandering
 from pipeline.criticism.selection.requested_model import Begun
@@ -81,8 +80,8 @@ def _stated(model: ModelSpec, found: ModelVerdict) -> ModelVerdict:
 
 
 def _surely_missing(begun: Begun) -> bool:
-    large = remainder(begun.around, begun.segments, begun.around.residual, large=True)
-    return bool(large) and wandering(begun.segments, begun.fitted, large) is None
+    large = remainder(begun.system, large=True)
+    return bool(large) and wandering(begun.system.fit, large) is None
 
 
 def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
@@ -112,31 +111,25 @@ def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
 
 def _residuals(begun: Begun) -> ModelVerdict:
     """What a fit leaves; the verdict is the caller's."""
-    around, held = begun.around, _held_out(begun)
-    left = remainder(around, begun.segments, around.residual)
+    system = begun.system
+    left = remainder(system)
     worst = None
     if left:
         first = max(left, key=lambda one: one.chi2_per_n)
-        names = {(s.capture, c): reported_signal(s, c) for s in begun.segments for c in s.channels}
+        names = {(s.capture, c): reported_signal(s, c) for s in system.segments for c in s.channels}
         signal = names[first.capture, first.signal]
         floors = math.sqrt(first.chi2_per_n)
         worst = Excess(first.capture, signal, first.order, floors, first.size, unit_of(signal))
     return ModelVerdict(
         "adequate",
-        held_out=held.total,
-        residual=_largest(begun, around.residual),
+        held_out=leave_out(system).total,
+        residual=_largest(system),
         worst=worst,
         over=len(left),
     )
 
 
-def _held_out(begun: Begun) -> HeldOut:
-    own = len(own_columns(begun.fitted.model))
-    return leave_out(begun.around, own, begun.segments)
-
-
-def _largest(begun: Begun, residual: Array) -> float:
+def _largest(system: LinearSystem) -> float:
     """The largest root of χ²/n of any group."""
-    around = begun.around
-    spreads = around.spreads(residual / around.soft)[around.counts > 0]
+    spreads = system.spreads(system.residual / system.soft)[system.counts > 0]
     return math.sqrt(float(np.max(spreads, initial=0.0)))

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.identifiability import combinations_told, parameters_told
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.mains_hum import told_hum
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
@@ -54,35 +53,31 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     if not found:
         return _nothing(campaign, model, names, _IDLE)
     begun = fit_of(found, asked)
-    found = begun.segments
-    fitted, _ = trimmed(found, begun.fitted, begun.around, names)
-    around = system(found, fitted)
-    held = leave_out(around, len(own_columns(fitted.model)), found)
-    simulated = simulate(found, fitted, around, held)
-    residual = np.where(np.isfinite(held.residual), held.residual, around.residual)
-    maps = all_maps(found, around, residual, fitted)
-    parameters = parameters_told(fitted, around, held)
-    without = model_of(model.bare(), machine)
-    bare = _bare(found, fitted, without, parameters, (around, held))
+    system = linear_system(trimmed(begun.system, names).fit)
+    held = leave_out(system)
+    simulated = simulate(system, held)
+    maps = all_maps(system, held.or_fit(system))
+    parameters = parameters_told(system, held)
+    bare = _bare(model_of(model.bare(), machine), parameters, system, held)
     return Comparison(
         campaign.motor_id,
         model.name,
         names,
         parameters,
-        (*_errors(found, around, held), *run_errors(simulated)),
+        (*_errors(system, held), *run_errors(simulated)),
         held.total if bare is None else bare.whole,
         tuple(_where(maps)),
         (
-            *unused(campaign, found),
-            *at_ambient(found, fitted.model),
+            *unused(campaign, system.segments),
+            *at_ambient(system.segments, system.fit.model),
             *told_hum(begun.hum),
             *held.notes,
         ),
         maps,
         () if bare is None else bare.moved,
         None if bare is None else bare.total,
-        tuple(traces(found, fitted, simulated)),
-        combinations_told(found, fitted, around, held),
+        tuple(traces(system.fit, simulated)),
+        combinations_told(system, held),
         () if bare is None else bare.errors,
     )
 
@@ -105,11 +100,7 @@ class _Bare:
 
 
 def _bare(
-    found: Sequence[Segment],
-    fitted: Fitted,
-    without: Model,
-    after: dict[str, ModelParameter],
-    whole: tuple[System, HeldOut],
+    without: Model, after: dict[str, ModelParameter], whole: LinearSystem, whole_held: HeldOut
 ) -> _Bare | None:
     """The model without the effects that were asked for; None where none were.
 
@@ -117,17 +108,15 @@ def _bare(
     errors compare.
     """
     names = {effect.name for effect in without.effects}
-    if names == {effect.name for effect in fitted.model.effects}:
+    if names == {effect.name for effect in whole.fit.model.effects}:
         return None
-    gone = [e.name for e in fitted.model.effects if e.name not in names]
-    values = {k: v for k, v in fitted.values.items() if k.split(".")[0] not in gone}
-    begun = replace(fitted, model=without, values=values, tolerance=())
-    plain, _ = gauss_newton(found, begun)
-    around = system(found, plain)
-    held = leave_out(around, len(own_columns(without)), found)
-    moved = _moves(parameters_told(plain, around, held), after)
-    less, full = in_common((around, whole[0]), (held, whole[1]))
-    errors = tuple(_errors(found, around, held))
+    gone = [e.name for e in whole.fit.model.effects if e.name not in names]
+    begun = replace(whole.fit.without(*gone), model=without, tolerance=())
+    system = linear_system(gauss_newton(begun).fit)
+    held = leave_out(system)
+    moved = _moves(parameters_told(system, held), after)
+    less, full = in_common((system, whole), (held, whole_held))
+    errors = tuple(_errors(system, held))
     return _Bare(less.total, full.total, moved, errors)
 
 
@@ -143,19 +132,20 @@ def _moves(
     )
 
 
-def _errors(found: Sequence[Segment], around: System, held: HeldOut) -> Iterator[SignalError]:
+def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
     """Errors of every capture's equations in plain windows."""
-    for place, (number, channel, order) in enumerate(around.labels):
-        mine = around.group == place
+    for place, (number, channel, order) in enumerate(system.labels):
+        mine = system.group == place
         if order != 0 or not mine.any():
             continue
         out = bool(np.isfinite(held.residual[mine]).all())
-        residual = held.residual[mine] if out else around.residual[mine]
-        unit, soft = around.unit[mine], around.soft[mine]
-        signal = reported_signal(found[number], channel)
+        residual = held.residual[mine] if out else system.residual[mine]
+        unit, soft = system.unit[mine], system.soft[mine]
+        segment = system.segments[number]
+        signal = reported_signal(segment, channel)
         yield SignalError(
             signal,
-            found[number].capture,
+            segment.capture,
             "held_out" if out else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
             math.sqrt(float(((unit * soft) ** 2).mean())),

@@ -24,11 +24,11 @@ from pipeline.criticism.regression.goodness import (
     over_floor,
 )
 from pipeline.criticism.regression.identifiability import combinations_told
-from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import told_hum
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.search import End, ended
+from pipeline.criticism.search import End, Ladder, ended
 from pipeline.criticism.selection.alternatives import experiment_for, remedies, rivals_of
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
 from pipeline.criticism.selection.requested_model import Begun, fit_of
@@ -85,31 +85,32 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> Begun | 
 
 def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagnosis, Begun]:
     """The diagnosis from a model fitted, and the fit that its first step stands on."""
-    library, machine = effects(model.effects_path), begun.fitted.model.machine
+    library, machine = effects(model.effects_path), begun.system.fit.machine
     name = f"{file_stem(campaign.motor_id)}_unknown"
     end = ended(campaign, model, machine, begun, library, name)
-    ladder, found, last = end.ladder, end.ladder.begun.segments, end.ladder.rungs[-1]
-    offered = candidates(library, last.fitted)
-    ranking = _ranking(ladder.rungs, ladder.held, offered, library, found, ladder.cut)
-    unseen = unexcited(campaign, library, last, offered)
+    ladder, last = end.ladder, end.ladder.rungs[-1].system
+    found = last.segments
+    offered = candidates(library, last.fit.model)
+    ranking = _ranking(ladder, offered, library)
+    unseen = unexcited(campaign, library, ladder.rungs[-1], offered)
     verdict = _verdict_of(end, unseen)
-    together = combinations_told(found, last.fitted, last.around, ladder.held[-1])
+    together = combinations_told(last, ladder.held[-1])
     stateless = verdict == "unknown" and end.sketch is None
     told = Diagnosis(
         campaign.motor_id,
         model.name,
         verdict,
-        last.added,
+        ladder.rungs[-1].added,
         ranking,
-        _records(found, ladder.rungs, ladder.held),
+        _records(ladder.rungs, ladder.held),
         end.sketch if verdict == "unknown" else None,
-        _as_told(found, last.around, end.left),
+        _as_told(last, end.left),
         (
             *unused(campaign, found),
-            *at_ambient(found, last.fitted.model),
+            *at_ambient(found, last.fit.model),
             *told_hum(ladder.begun.hum),
             *end.notes,
-            *_together(together, last.added),
+            *_together(together, ladder.rungs[-1].added),
             *(note for note in ladder.cut.values() if note),
             *((_STATELESS,) if stateless else ()),
             *ladder.held[0].notes,
@@ -117,19 +118,16 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
         unseen,
         model.effects,
         together,
-        policy_digest(last.fitted.policy),
+        policy_digest(last.policy),
     )
     return told, ladder.begun
 
 
-def _records(
-    found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
-) -> tuple[LadderRung, ...]:
+def _records(rungs: Sequence[Rung], held: Sequence[HeldOut]) -> tuple[LadderRung, ...]:
     """The steps for people, each with the signature of what came with it."""
-    told = [rung_record(found, rung, one) for rung, one in zip(rungs, held, strict=True)]
+    told = [rung_record(rung, one) for rung, one in zip(rungs, held, strict=True)]
     signatures = [
-        signature(found, (rungs[n - 1], rungs[n]), (told[n - 1], told[n]))
-        for n in range(1, len(told))
+        signature((rungs[n - 1], rungs[n]), (told[n - 1], told[n])) for n in range(1, len(told))
     ]
     return tuple(
         replace(one, signature=shown) for one, shown in zip(told, [None, *signatures], strict=True)
@@ -146,16 +144,16 @@ def _together(known: Sequence[KnownCombination], added: Sequence[str]) -> tuple[
     )
 
 
-def _as_told(
-    found: Sequence[Segment], around: System, left: Sequence[Remainder]
-) -> tuple[Remainder, ...]:
+def _as_told(system: LinearSystem, left: Sequence[Remainder]) -> tuple[Remainder, ...]:
     """All that is over its floor, first what is `left`, then what is too small to matter, with
     signals as outputs name them.
     """
     names = {
-        (s.capture, channel): reported_signal(s, channel) for s in found for channel in s.channels
+        (s.capture, channel): reported_signal(s, channel)
+        for s in system.segments
+        for channel in s.channels
     }
-    small = [one for one in over_floor(around, found, around.residual) if one not in left]
+    small = [one for one in over_floor(system) if one not in left]
     told = (*left, *(replace(one, matters=False) for one in small))
     return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
 
@@ -198,67 +196,54 @@ def _verdict_of(end: End, unseen: Sequence[Unexcited]) -> Verdict:
 
 
 def _ranking(
-    rungs: Sequence[Rung],
-    held: Sequence[HeldOut],
-    offered: Sequence[Candidate],
-    library: dict[str, Effect],
-    captured: Sequence[Segment],
-    cut: Mapping[str, str],
+    ladder: Ladder, offered: Sequence[Candidate], library: Mapping[str, Effect]
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last step."""
-    last = rungs[-1]
-    found = []
-    for name in last.added:
-        effect = next(e for e in last.fitted.model.effects if e.name == name)
-        over = _passed_over(rungs, name, last.added)
-        confused = rivals_of(name, last.fitted, last.around, offered, captured, over)
-        dof = effect.dof(last.fitted.model.machine)
-        loss = _loss(captured, last, effect, dof)
-        told = _parameters(last, effect, held[-1])
-        found.append(
-            RankedEffect(
-                name,
-                loss - dof * math.log(last.around.size),
-                _drop(rungs, held, name),
-                _p_value(loss, dof),
-                confused,
-                f"{effect.words}; {effect.signature}",
-                experiment_for(effect, confused, library),
-                told,
-                separations(
-                    effect,
-                    confused,
-                    last.fitted,
-                    last.around,
-                    offered,
-                    captured,
-                    remedies(effect, confused, library),
-                ),
-                headline=headline(effect, told),
-            )
-        )
+    last = ladder.rungs[-1]
+    found = [_found(ladder, last.fit.effect(name), offered, library) for name in last.added]
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
-    reasons = {name: _AGAINST if note else _GUESS for name, note in cut.items()}
+    reasons = {name: _AGAINST if note else _GUESS for name, note in ladder.cut.items()}
     others = [replace(r, shortfall=reasons.get(r.effect, r.shortfall)) for r in others]
     return tuple(found + sorted(others, key=lambda r: (-r.score, r.effect)))
 
 
-def _loss(found: Sequence[Segment], last: Rung, effect: Effect, dof: int) -> float:
+def _found(
+    ladder: Ladder, effect: Effect, offered: Sequence[Candidate], library: Mapping[str, Effect]
+) -> RankedEffect:
+    """An effect that the ladder found: its evidence, its alternatives and what would part them."""
+    rungs, wide = ladder.rungs, ladder.rungs[-1].system
+    over = _passed_over(rungs, effect.name, rungs[-1].added)
+    confused = rivals_of(effect.name, wide, offered, over)
+    dof = effect.dof(wide.fit.machine)
+    loss = _loss(wide, effect, dof)
+    told = _parameters(rungs[-1], effect, ladder.held[-1])
+    return RankedEffect(
+        effect.name,
+        loss - dof * math.log(wide.size),
+        _drop(rungs, ladder.held, effect.name),
+        _p_value(loss, dof),
+        confused,
+        f"{effect.words}; {effect.signature}",
+        experiment_for(effect, confused, library),
+        told,
+        separations(effect, wide, offered, remedies(effect, confused, library)),
+        headline=headline(effect, told),
+    )
+
+
+def _loss(last: LinearSystem, effect: Effect, dof: int) -> float:
     """Rise of deviance without a found effect: to first order, or of a refit where that says that
     the effect is not worth its parameters. Along a bent valley the tangent knows little.
     """
-    loss = loss_without(last.around, last.fitted, (effect.name,))
-    if loss > dof * math.log(last.around.size):
+    loss = loss_without(last, (effect.name,))
+    if loss > dof * math.log(last.size):
         return loss
-    own = f"{effect.name}."
-    values = {k: v for k, v in last.fitted.values.items() if not k.startswith(own)}
-    less = replace(last.fitted, model=last.fitted.model.without(effect.name), values=values)
-    return max(loss, gauss_newton(found, less)[1].misfit - last.around.misfit)
+    return max(loss, gauss_newton(last.fit.without(effect.name)).misfit - last.misfit)
 
 
 def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tuple[Candidate, ...]:
     """Candidates that promised as much as an effect on the step before it was added."""
-    policy = rungs[0].fitted.policy.selection
+    policy = rungs[0].fit.policy.selection
     before = [rung for rung in rungs if name not in rung.added][-1]
     falls = {score.candidate.effect.name: score.fall for score in before.scores}
     short = max(policy.tie, policy.passed_over_share * falls.get(name, 0.0))

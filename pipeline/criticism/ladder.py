@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.regression.goodness import HeldOut, signal_errors
 from pipeline.criticism.regression.identifiability import parameters_told
 from pipeline.criticism.selection.stepwise import Rung
@@ -21,30 +19,30 @@ from pipeline.criticism.validation.error_maps import (
 from pipeline.records.diagnosis import LadderRung, RungError, ToldParameter
 
 
-def rung_record(found: Sequence[Segment], rung: Rung, held: HeldOut) -> LadderRung:
+def rung_record(rung: Rung, held: HeldOut) -> LadderRung:
     """One step for people: held-out errors and maps; angle maps are those of the fit."""
-    residual = np.where(np.isfinite(held.residual), held.residual, rung.around.residual)
-    policy = rung.fitted.policy.validation
-    errors = window_errors(found, rung.around, residual)
+    residual = held.or_fit(rung.system)
+    policy = rung.fit.policy.validation
+    errors = window_errors(rung.system, residual)
     flat = (speed_current_map(one, policy) for one in errors)
     return LadderRung(
         rung.added,
         held.total,
-        signal_errors(found, rung.around, residual),
+        signal_errors(rung.system, residual),
         {
             one.signal: RungError(_rms(one.error), _rms(one.sigma), unit_of(one.signal))
             for one in errors
         },
         parameters_of(rung, held),
-        (*(one for one in flat if one is not None), *angle_maps(found, rung.fitted)),
+        (*(one for one in flat if one is not None), *angle_maps(rung.fit)),
         histograms(errors, policy),
     )
 
 
 def parameters_of(rung: Rung, held: HeldOut) -> dict[str, ToldParameter]:
     """Value, standard uncertainty and unit of every effect's parameters on a step."""
-    told = parameters_told(rung.fitted, rung.around, held)
-    own = rung.fitted.model.parameters()
+    told = parameters_told(rung.system, held)
+    own = rung.fit.model.parameters()
     return {name: (told[name].value, told[name].u, told[name].unit) for name in own}
 
 

@@ -15,7 +15,6 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
-from pipeline.criticism.regression.linear_system import own_columns
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.drift import wandering
 from pipeline.criticism.selection.order_scan import orders_left
@@ -57,8 +56,8 @@ class Ladder:
         instrument's wander as well as the machine: it is told where some state of the machine
         predicts it.
         """
-        around = self.rungs[-1].around
-        large = remainder(around, self.begun.segments, around.residual, large=True)
+        system = self.rungs[-1].system
+        large = remainder(system, large=True)
         return tuple(one for one in self.left if one in large)
 
 
@@ -114,7 +113,7 @@ def _by_orders(climb: Callable[..., Ladder], name: str) -> tuple[Ladder, Unknown
     that are no whole numbers join where the sketch with them takes more.
     """
     ladder = climb()
-    unlooked = orders_left(ladder.begun.segments, ladder.rungs[-1].around)
+    unlooked = orders_left(ladder.rungs[-1].system)
     whole = tuple(order for order in unlooked if isinstance(order, int))
     if whole:
         ladder = climb(*whole)
@@ -132,19 +131,19 @@ def _calmed(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
     large = ladder.large()
     if ladder.explains(large):
         return None
-    calm = wandering(ladder.begun.segments, ladder.rungs[-1].fitted, large)
+    calm = wandering(ladder.rungs[-1].fit, large)
     if calm is None:
         return None
-    return climbed(Begun(calm, *gauss_newton(calm, ladder.begun.fitted), ladder.begun.hum), library)
+    start = replace(ladder.begun.system.fit, segments=calm)
+    return climbed(Begun(gauss_newton(start), ladder.begun.hum), library)
 
 
 def climbed(start: Begun, library: Mapping[str, Effect]) -> Ladder:
     """The ladder from a model fitted, as far as it is trusted."""
-    found = start.segments
-    rungs = search(found, start.fitted, library)
-    alone = [leave_out(r.around, len(own_columns(r.fitted.model)), found) for r in rungs]
-    kept, left = trusted(found, rungs, in_common([r.around for r in rungs], alone))
-    held = in_common([r.around for r in kept], alone[: len(kept)])
+    rungs = search(start.system.fit, library)
+    alone = [leave_out(rung.system) for rung in rungs]
+    kept, left = trusted(rungs, in_common([r.system for r in rungs], alone))
+    held = in_common([r.system for r in kept], alone[: len(kept)])
     cut = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
     return Ladder(start, kept, list(held), left, cut)
 
@@ -159,11 +158,11 @@ def _sketched(
     """
     if ladder.explains(left):
         return None, 0.0
-    last, found = ladder.rungs[-1], ladder.begun.segments
+    last = ladder.rungs[-1].system
     worst = sorted(left, key=lambda one: -one.chi2_per_n)
     signals = list(dict.fromkeys(one.signal for one in worst))
     other = [one for one in signals if (one in SHAFT) != (signals[0] in SHAFT)]
-    sketch, gain = unknown_structure(found, last.fitted, signals, last.around, name, in_parts)
+    sketch, gain = unknown_structure(last, signals, name, in_parts)
     if sketch is None and other:
-        return unknown_structure(found, last.fitted, other, last.around, name, in_parts)
+        return unknown_structure(last, other, name, in_parts)
     return sketch, gain

@@ -81,7 +81,7 @@ def moteus() -> str:
         segment = models[0][0].segment("steady")
         panel = Panel(f"{motor}: slope of each level", "d current [A]", "d flux [mWb]", below=True)
         levels = segment.blocks
-        speed = segment.recorded[SPEED] * models[0][0].fitted.model.machine.pole_pairs
+        speed = segment.recorded[SPEED] * models[0][0].model.machine.pole_pairs
         for made, colour, name in models:
             _, told = made.curves("steady")
             current, flux = _slopes(segment.recorded["id_a"], speed, told[0], levels)

@@ -11,8 +11,9 @@ import numpy as np
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.named_models import model_of
+from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.goodness import leave_out, signal_errors
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import measured, residual
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.pruning import trimmed
@@ -29,14 +30,20 @@ REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
 class Fit:
     """One model of one motor: its segments, values, and rms of each signal held out."""
 
-    segments: tuple[Segment, ...]
-    fitted: Fitted
-    around: System
+    system: LinearSystem
     held_out: Mapping[str, float]
 
     @property
+    def segments(self) -> tuple[Segment, ...]:
+        return self.system.segments
+
+    @property
+    def model(self) -> Model:
+        return self.system.fit.model
+
+    @property
     def values(self) -> Mapping[str, float]:
-        return self.fitted.values
+        return self.system.fit.values
 
     def segment(self, kind: str) -> Segment:
         return next(s for s in self.segments if s.kind == kind)
@@ -44,8 +51,8 @@ class Fit:
     def curves(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
         """Measured and modelled signals [C, n] of a segment."""
         segment = self.segment(kind)
-        seen = measured(segment, segment.recorded, self.fitted.model, self.values)
-        return seen, seen - residual(segment, self.fitted.model, self.values)
+        seen = measured(segment, segment.recorded, self.model, self.values)
+        return seen, seen - residual(segment, self.model, self.values)
 
 
 def campaign(folder: str, motor: str | None = None) -> Campaign:
@@ -61,8 +68,5 @@ def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bo
         parts = tuple(replace(s, offsets=None) for s in parts)
     model = model_of(ModelSpec("ideal", effects), machine)
     begun = fit_of(parts, model)
-    parts = begun.segments
-    fitted, around = trimmed(parts, begun.fitted, begun.around, effects)
-    held = leave_out(around, len(own_columns(fitted.model)), parts)
-    left = np.where(np.isfinite(held.residual), held.residual, around.residual)
-    return Fit(parts, fitted, around, signal_errors(parts, around, left))
+    system = trimmed(begun.system, effects)
+    return Fit(system, signal_errors(system, leave_out(system).or_fit(system)))

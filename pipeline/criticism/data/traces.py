@@ -287,8 +287,8 @@ def _parabolas(signal: Array, width: int) -> Array:
     start, end = signal[:width], signal[-width:]
     middle = np.convolve(signal, weights[0][::-1], mode="valid")
     first, last = basis @ (weights @ start), basis @ (weights @ end)
-    fitted: Array = np.concatenate([first[:half], middle, last[half + 1 :]])
-    return fitted
+    fit: Array = np.concatenate([first[:half], middle, last[half + 1 :]])
+    return fit
 
 
 def with_travel(found: dict[str, Array], noise: Mapping[str, float]) -> Array:

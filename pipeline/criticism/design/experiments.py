@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, chndtr
 
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.planned_tests import PLANNED, planned, planned_words
 from pipeline.criticism.effect import Array, Effect
 from pipeline.criticism.policy.design import Design
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
-from pipeline.criticism.regression.linearise import Column, linearise
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.noise_floors import noise_floor
-from pipeline.criticism.selection.score_test import Candidate
+from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.records.diagnosis import Separation
 
 _GAIN_WORDS = {
@@ -51,32 +50,29 @@ class Plan:
 
 def separations(
     effect: Effect,
-    against: Sequence[str],
-    fitted: Fitted,
-    wide: System,
+    wide: LinearSystem,
     offered: Sequence[Candidate],
-    segments: Sequence[Segment],
     remedies: Mapping[str, str],
 ) -> tuple[Separation, ...]:
-    """What would part an effect of the model from each alternative in `against`, the best first.
+    """What would part an effect of the model from each alternative in `remedies`, the best first.
 
     Power is that of a test at the 1 % level, from the captures at hand and the experiment
     together. If no experiment that can be predicted helps, the one in `remedies`, which the effects
     themselves declare, is reported without a power.
     """
-    policy = fitted.policy.design
+    policy = wide.policy.design
     told: list[Separation] = []
-    for other in against:
-        columns = _nearest(effect, other, fitted, wide, offered)
+    for other, remedy in remedies.items():
+        columns = _nearest(effect, other, wide, offered)
         if columns is None:
             continue
-        now, places = _now(effect, columns, fitted, wide)
-        freedom = effect.dof(fitted.model.machine)
+        now, places = _now(effect, columns, wide)
+        freedom = effect.dof(wide.fit.machine)
         base = _power(_noncentrality(now), freedom, policy)
         ranked = sorted(
             (
                 (_power(_noncentrality(now + plan.normal), freedom, policy), plan.words)
-                for plan in _plans(effect, places, fitted, wide, segments)
+                for plan in _plans(effect, places, wide)
             ),
             key=lambda one: (-one[0], one[1]),
         )
@@ -84,8 +80,8 @@ def separations(
             : policy.most_experiments
         ]
         told += [Separation(other, words, power) for power, words in better]
-        if not better and other in remedies:
-            told.append(Separation(other, remedies[other], None))
+        if not better:
+            told.append(Separation(other, remedy, None))
     return tuple(told)
 
 
@@ -96,40 +92,37 @@ def _power(noncentrality: float, freedom: int, policy: Design) -> float:
 
 
 def _nearest(
-    effect: Effect, other: str, fitted: Fitted, wide: System, offered: Sequence[Candidate]
+    effect: Effect, other: str, wide: LinearSystem, offered: Sequence[Candidate]
 ) -> NDArray[np.int64] | None:
     """Places of the alternative's columns, of its trial shapes the one that is hardest to part."""
-    first, best, least = len(own_columns(fitted.model)), None, np.inf
-    for candidate in offered:
-        places = np.arange(first, first + len(candidate.columns))
-        first += len(candidate.columns)
+    best, least = None, np.inf
+    for candidate, places in placed(wide, offered):
         if candidate.effect.name == other:
-            left = _noncentrality(_now(effect, places, fitted, wide)[0])
+            left = _noncentrality(_now(effect, places, wide)[0])
             if left < least:
                 best, least = places, left
     return best
 
 
-def _amplitudes(effect: Effect, columns: Sequence[Column], fitted: Fitted) -> Array:
+def _amplitudes(effect: Effect, wide: LinearSystem) -> Array:
     """The effect's fitted amplitudes [P], zero at every other column and at shapes."""
     names = {
-        f"{effect.name}.{p.name}": fitted.values[f"{effect.name}.{p.name}"]
-        for p in effect.parameters_of(fitted.model.machine)
+        f"{effect.name}.{p.name}": wide.fit.values[f"{effect.name}.{p.name}"]
+        for p in effect.parameters_of(wide.fit.machine)
         if p.amplitude
     }
-    return np.array([names.get(column.name, 0.0) for column in columns])
+    return np.array([names.get(column.name, 0.0) for column in wide.columns])
 
 
 def _now(
-    effect: Effect, rival: NDArray[np.int64], fitted: Fitted, wide: System
+    effect: Effect, rival: NDArray[np.int64], wide: LinearSystem
 ) -> tuple[Array, NDArray[np.int64]]:
     """Normal matrix of [d, the model's other columns, the alternative's], and their places."""
-    own = len(own_columns(fitted.model))
     mine = f"{effect.name}."
-    others = np.array([n for n in range(own) if not wide.columns[n].name.startswith(mine)])
+    others = np.array([n for n in wide.own if not wide.columns[n].name.startswith(mine)])
     places = np.concatenate([others, rival]).astype(np.int64)
     weight = wide.weights(wide.spreads(wide.residual))
-    matrix = _stacked(wide.matrix, _amplitudes(effect, wide.columns, fitted), places)
+    matrix = _stacked(wide.matrix, _amplitudes(effect, wide), places)
     normal = (matrix * weight[:, None]).T @ matrix
     return normal + np.diag(np.concatenate([[0.0], wide.penalty[places]])), places
 
@@ -148,40 +141,34 @@ def _noncentrality(normal: Array) -> float:
     return float(normal[0, 0]) * share if share > 1e-9 else 0.0
 
 
-def _plans(
-    effect: Effect,
-    places: NDArray[np.int64],
-    fitted: Fitted,
-    wide: System,
-    segments: Sequence[Segment],
-) -> Iterator[Plan]:
+def _plans(effect: Effect, places: NDArray[np.int64], wide: LinearSystem) -> Iterator[Plan]:
     """Every experiment whose outcome can be predicted: repeats, tests not done, calibrations."""
-    policy = fitted.policy.design
-    amplitudes = _amplitudes(effect, wide.columns, fitted)
+    policy, amplitudes = wide.policy.design, _amplitudes(effect, wide)
     weight = wide.weights(wide.spreads(wide.residual))
-    test = np.array([wide.tests[number] for number, _, _ in wide.labels])[wide.group]
-    for name in sorted(set(wide.tests)):
+    tests = [segment.test for segment in wide.segments]
+    test = np.array(tests)[wide.segment]
+    for name in sorted(set(tests)):
         rows = test == name
         matrix = _stacked(wide.matrix[rows], amplitudes, places)
         once = (matrix * weight[rows, None]).T @ matrix
         yield Plan(f"{name} recorded {policy.repeats} times", (policy.repeats - 1) * once)
     for name in PLANNED:
-        if name not in wide.tests:
-            rows_of = _planned_rows(name, fitted, wide.columns, segments)
+        if name not in tests:
+            rows_of = _planned_rows(name, wide)
             if rows_of is not None:
                 matrix = _stacked(rows_of, amplitudes, places)
                 yield Plan(planned_words(name, policy), matrix.T @ matrix)
-    yield from _calibrations(places, fitted, wide)
+    yield from _calibrations(places, wide)
 
 
-def _calibrations(places: NDArray[np.int64], fitted: Fitted, wide: System) -> Iterator[Plan]:
-    policy = fitted.policy.design
+def _calibrations(places: NDArray[np.int64], wide: LinearSystem) -> Iterator[Plan]:
+    policy = wide.policy.design
     for place, column in enumerate(places):
         name = wide.columns[column].name
         if name in _GAIN_WORDS:
             size, words = 1.0, _GAIN_WORDS[name]
         elif name in _KNOWN_WORDS:
-            size, words = abs(fitted.values[name]), _KNOWN_WORDS[name]
+            size, words = abs(wide.fit.values[name]), _KNOWN_WORDS[name]
         else:
             continue
         normal = np.zeros((places.size + 1, places.size + 1))
@@ -189,14 +176,12 @@ def _calibrations(places: NDArray[np.int64], fitted: Fitted, wide: System) -> It
         yield Plan(words.format(100.0 * policy.calibrated_u), normal)
 
 
-def _planned_rows(
-    test: str, fitted: Fitted, columns: Sequence[Column], segments: Sequence[Segment]
-) -> Array | None:
+def _planned_rows(test: str, wide: LinearSystem) -> Array | None:
     """Columns [R, P] over the noise of a test that was not done."""
     made = []
-    for number, segment in enumerate(planned(test, fitted, segments)):
-        model, values = fitted.model, fitted.values
+    model, values = wide.fit.model, wide.fit.values
+    for number, segment in enumerate(planned(test, wide.fit)):
         sigma = noise_floor(segment, model, values, _SEED + number)
-        rows = linearise(segment, model, values, columns, sigma, np.zeros(sigma.size), values)
+        rows = linearise(segment, model, values, wide.columns, sigma, np.zeros(sigma.size), values)
         made.append(rows.columns)
     return np.concatenate(made) if made else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment, electrical_orders, slow_orders
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.design import Design
-from pipeline.criticism.regression.linear_system import Fitted
+from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.projection import projection, window_starts
 
@@ -36,19 +36,19 @@ def planned_words(test: str, policy: Design) -> str:
     return PLANNED[test].format(" and ".join(speeds))
 
 
-def planned(test: str, fitted: Fitted, segments: Sequence[Segment]) -> tuple[Segment, ...]:
+def planned(test: str, fit: Fit) -> tuple[Segment, ...]:
     """The segments [n each] of one of `PLANNED`, without noise, at 25 °C.
 
     Sensors are as noisy as in the captures at hand, or as usual where they were not used there.
     """
-    noise = _noise(fitted, segments)
+    noise = _noise(fit)
     makers = {"torque_map": _torque_map, "spin_down": _spin_down, "cogging": _cogging}
-    return tuple(_obeying(s, fitted) for s in makers[test](fitted, noise))
+    return tuple(_obeying(s, fit) for s in makers[test](fit, noise))
 
 
-def _obeying(segment: Segment, fitted: Fitted) -> Segment:
+def _obeying(segment: Segment, fit: Fit) -> Segment:
     """The segment with its channels as the model predicts them."""
-    left = residual(segment, fitted.model, fitted.values)
+    left = residual(segment, fit.model, fit.values)
     recorded = dict(segment.recorded)
     for place, channel in enumerate(segment.channels):
         if channel in recorded:
@@ -56,20 +56,20 @@ def _obeying(segment: Segment, fitted: Fitted) -> Segment:
     return replace(segment, recorded=recorded)
 
 
-def _noise(fitted: Fitted, segments: Sequence[Segment]) -> Mapping[str, float]:
-    scales = fitted.model.machine.scales
-    policy = fitted.policy.design
+def _noise(fit: Fit) -> Mapping[str, float]:
+    scales = fit.model.machine.scales
+    policy = fit.policy.design
     found = {n: getattr(policy, field) * scales[scale] for n, (field, scale) in _NOISE.items()}
     found["theta_mech_rad"] = policy.noise_angle_rad
-    for segment in segments:
+    for segment in fit.segments:
         for name in (*_NOISE, "theta_mech_rad"):
             if segment.noise.get(name, 0.0) > 0.0:
                 found[name] = segment.noise[name]
     return found
 
 
-def _torque_map(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
-    machine, policy = fitted.model.machine, fitted.policy.design
+def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
+    machine, policy = fit.model.machine, fit.policy.design
     period = machine.scales["period_s"]
     levels = [(d, q) for d in policy.map_id for q in policy.map_iq]
     i_d, i_q = (np.repeat([pair[k] for pair in levels], policy.map_samples) for k in (0, 1))
@@ -130,9 +130,9 @@ def _shaft(
     )
 
 
-def _spin_down(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
+def _spin_down(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
     """A coast from full speed under the model's own friction, b ω + T_c."""
-    scales, values, policy = fitted.model.machine.scales, fitted.values, fitted.policy.design
+    scales, values, policy = fit.model.machine.scales, fit.values, fit.policy.design
     top, b = scales["speed_rad_s"], max(values["b_nm_s_rad"], 1e-9)
     dry = max(values.get("coulomb_friction.torque_nm", 0.0), 0.0)
     tau = values["j_kgm2"] / b
@@ -155,8 +155,8 @@ def _spin_down(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
     ]
 
 
-def _cogging(fitted: Fitted, noise: Mapping[str, float]) -> list[Segment]:
-    orders, policy = slow_orders(fitted.model.machine), fitted.policy.design
+def _cogging(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
+    orders, policy = slow_orders(fit.model.machine), fit.policy.design
     n = policy.samples_an_order * max(orders)
     period = 2 * math.pi / policy.slow_rad_s / n
     theta = policy.slow_rad_s * period * np.arange(n + 3, dtype=float)

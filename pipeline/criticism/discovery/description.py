@@ -37,7 +37,7 @@ def told(
     carrier = _leading(pursuit, found)
     curve = _curve(pursuit, found, smooth, carrier)
     shape = _shape(pursuit, curve, found, carrier, others)
-    size = pursuit.around.around.model.machine.scales["current_a"]
+    size = pursuit.system.fit.model.machine.scales["current_a"]
     return UnknownStructure(
         signal=_signal(port, carrier, signals),
         variables=_columns(port, found),
@@ -86,7 +86,7 @@ def _visited(pursuit: Pursuit) -> tuple[float, float]:
     basis = pursuit.port.basis
     if basis is None or not basis.nodes.size:
         return 0.0, 2 * np.pi
-    hats = pursuit.around.matrix[:, pursuit.own : pursuit.own + basis.nodes.size]
+    hats = pursuit.system.matrix[:, pursuit.own : pursuit.own + basis.nodes.size]
     seen = np.abs(hats).max(axis=0)
     live = np.flatnonzero(seen > pursuit.policy.visited_share * seen.max())
     return float(basis.nodes[live[0]]), float(basis.nodes[live[-1]])
@@ -121,7 +121,7 @@ def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
     """The smooth curves of a port [K, k] as coefficients of its hats, one block a carrier."""
     fine, few = pursuit.port.basis, smooth.basis
     if fine is None or few is None or not fine.nodes.size:
-        return np.eye(pursuit.around.matrix.shape[1] - pursuit.own)
+        return np.eye(pursuit.system.matrix.shape[1] - pursuit.own)
     block = np.zeros((len(fine.names), len(few.names)))
     for n in range(len(few.names)):
         weights = np.zeros(len(few.names))
@@ -137,7 +137,7 @@ def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:
 
 def _map_curve(pursuit: Pursuit, found: Expression) -> tuple[CurvePoint, ...]:
     """Flux linkage along the axis whose own current bends it most, the other current zero."""
-    size = pursuit.around.around.model.machine.scales["current_a"]
+    size = pursuit.system.fit.model.machine.scales["current_a"]
     at = np.linspace(-1.0, 1.0, _POINTS)
     best: tuple[float, Array, Array] | None = None
     for axis in (0, 1):

@@ -23,7 +23,7 @@ from pipeline.criticism.discovery.dictionary import CENTRED, POWER, SHAPES, WAVE
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.discovery import Discovery
-from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.regression.linear_system import LinearSystem
 
 _RIDGE = 1e-9
 """Share of a curve's own information that is added to it: two curves of one shape do not run away,
@@ -92,27 +92,27 @@ class Pursuit:
     `weight` [R] the weights of rows under the port's best fit.
     """
 
-    def __init__(self, around: System, own: int, port: Port, weight: Array) -> None:
-        self.around, self.own, self.port = around, own, port
+    def __init__(self, system: LinearSystem, own: int, port: Port, weight: Array) -> None:
+        self.system, self.own, self.port = system, own, port
         self.weight = weight
-        self.policy = around.policy.discovery
-        self.price = math.log(around.size)
-        hats = around.matrix[:, own:]
-        mine, pull = around.matrix[:, :own], around.pull[:own]
+        self.policy = system.policy.discovery
+        self.price = math.log(system.size)
+        hats = system.matrix[:, own:]
+        mine, pull = system.matrix[:, :own], system.pull[:own]
         root = weight[:, None]
-        normal = mine.T @ (root * mine) + np.diag(around.penalty[:own])
+        normal = mine.T @ (root * mine) + np.diag(system.penalty[:own])
         inverse = np.linalg.pinv(_balanced(normal), hermitian=True)
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         inverse = inverse / np.outer(scale, scale)
         cross = mine.T @ (root * hats)
-        slope = mine.T @ (weight * around.residual) + pull
+        slope = mine.T @ (weight * system.residual) + pull
         self.gram = hats.T @ (root * hats) - cross.T @ inverse @ cross
-        self.moment = -(hats.T @ (weight * around.residual) - cross.T @ inverse @ slope)
+        self.moment = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
 
     def hats_of(self, term: Term) -> Array:
         """A term as coefficients [K] of the port's hats and waves."""
         basis = self.port.basis
-        found = np.zeros(self.around.matrix.shape[1] - self.own)
+        found = np.zeros(self.system.matrix.shape[1] - self.own)
         if basis is None or term.kind == POWER:
             found[term.monomial] = 1.0
             return found
@@ -143,29 +143,29 @@ class Pursuit:
 
     def curves(self, terms: Sequence[Term]) -> Array:
         """Coefficients [K, k] of terms."""
-        width = self.around.matrix.shape[1] - self.own
+        width = self.system.matrix.shape[1] - self.own
         return np.column_stack([np.empty((width, 0)), *(self.hats_of(t) for t in terms)])
 
-    def fitted(self, curves: Array) -> tuple[Array, Array, Array, float]:
+    def fit(self, curves: Array) -> tuple[Array, Array, Array, float]:
         """Own step, amplitudes, residual [R] and deviance with curves [K, k] beside own columns."""
-        around, own = self.around, self.own
-        matrix = np.column_stack([around.matrix[:, :own], around.matrix[:, own:] @ curves])
-        penalty = np.concatenate([around.penalty[:own], np.zeros(curves.shape[1])])
-        pull = np.concatenate([around.pull[:own], np.zeros(curves.shape[1])])
+        system, own = self.system, self.own
+        matrix = np.column_stack([system.matrix[:, :own], system.matrix[:, own:] @ curves])
+        penalty = np.concatenate([system.penalty[:own], np.zeros(curves.shape[1])])
+        pull = np.concatenate([system.pull[:own], np.zeros(curves.shape[1])])
         weight, before = self.weight, np.inf
-        step, left, now = np.zeros(matrix.shape[1]), around.residual, np.inf
+        step, left, now = np.zeros(matrix.shape[1]), system.residual, np.inf
         places = np.arange(own)
         for _ in range(self.policy.most_rounds):
             weighted = matrix * weight[:, None]
             normal = weighted.T @ matrix + np.diag(penalty)
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
             inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-11, hermitian=True)
-            step = -(inverse @ ((weighted.T @ around.residual + pull) / scale)) / scale
-            left = around.residual + matrix @ step
-            spreads = around.spreads(left)
-            now = around.misfit_of(spreads) + float(around.prior_costs(places, step[:own]).sum())
-            weight = around.weights(spreads)
-            if abs(before - now) < around.policy.fit.settled:
+            step = -(inverse @ ((weighted.T @ system.residual + pull) / scale)) / scale
+            left = system.residual + matrix @ step
+            spreads = system.spreads(left)
+            now = system.misfit_of(spreads) + float(system.prior_costs(places, step[:own]).sum())
+            weight = system.weights(spreads)
+            if abs(before - now) < system.policy.fit.settled:
                 break
             before = now
         return step[:own], step[own:], left, now
@@ -182,7 +182,7 @@ def expression(pursuit: Pursuit) -> Expression:
     policy = pursuit.policy
     chosen: list[Group] = []
     none = pursuit.curves([])
-    best = pursuit.fitted(none)
+    best = pursuit.fit(none)
     start = cost = best[3]
     offered = list(_dictionary(pursuit.port, policy))
     for _ in range(policy.most_groups):
@@ -195,7 +195,7 @@ def expression(pursuit: Pursuit) -> Expression:
         if not tried:
             break
         now = tried[0][0]
-        if cost - now < max(pursuit.around.policy.selection.tie, policy.least_gain * (start - now)):
+        if cost - now < max(pursuit.system.policy.selection.tie, policy.least_gain * (start - now)):
             break
         chosen, cost = tried[0][1], now
     return _finished(pursuit, chosen, start)
@@ -221,7 +221,7 @@ def _judged(pursuit: Pursuit, groups: Sequence[Group]) -> tuple[float, list[Grou
     refined = _refined(pursuit, groups)
     terms = [t for group in refined for t in group]
     free = sum(1 + len(t.free) for t in terms)
-    misfit = pursuit.fitted(pursuit.curves(terms))[3]
+    misfit = pursuit.fit(pursuit.curves(terms))[3]
     return misfit + free * pursuit.price, refined
 
 
@@ -305,12 +305,12 @@ def _shapes(variable: Variable, carrier: int, policy: Discovery) -> Iterator[Gro
 
 def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expression:
     terms = tuple(t for group in chosen for t in group)
-    own, amplitudes, left, misfit = pursuit.fitted(pursuit.curves(terms))
+    own, amplitudes, left, misfit = pursuit.fit(pursuit.curves(terms))
     directions = tuple((n, name) for n, t in enumerate(terms) for name in ("amplitude", *t.free))
     columns = [
         _hat_direction(pursuit, terms[n], float(amplitudes[n]), name) for n, name in directions
     ]
-    width = pursuit.around.matrix.shape[1] - pursuit.own
+    width = pursuit.system.matrix.shape[1] - pursuit.own
     slopes = np.column_stack([np.empty((width, 0)), *columns])
     covariance = _inverse(slopes.T @ pursuit.gram @ slopes)
     return Expression(terms, amplitudes, directions, covariance, start - misfit, left, own)
@@ -341,8 +341,8 @@ def curve_about(
     expression is wrong. `coarse` [K, k] are smooth curves in hats. The model's own constants stay
     where the expression put them, since else a curve and a constant of one shape cannot be parted.
     """
-    hats = pursuit.around.matrix[:, pursuit.own :] @ coarse
-    weight = pursuit.around.weights(pursuit.around.spreads(found.left))
+    hats = pursuit.system.matrix[:, pursuit.own :] @ coarse
+    weight = pursuit.system.weights(pursuit.system.spreads(found.left))
     live = np.any(hats != 0.0, axis=0)
     normal = hats[:, live].T @ (weight[:, None] * hats[:, live])
     covariance = _inverse(normal)

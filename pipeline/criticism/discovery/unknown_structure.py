@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.discovery.description import told
 from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.policy import Policy
-from pipeline.criticism.regression.gauss_newton import clipped
 from pipeline.criticism.regression.goodness import told_groups
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.records.diagnosis import UnknownStructure
 
@@ -42,10 +40,8 @@ class Found:
 
 
 def unknown_structure(
-    segments: Sequence[Segment],
-    fitted: Fitted,
+    system: LinearSystem,
     signals: Sequence[str],
-    before: System | None = None,
     name: str = "unknown",
     in_parts: bool = False,
 ) -> tuple[UnknownStructure | None, float]:
@@ -57,40 +53,30 @@ def unknown_structure(
     it. The result is None if the best takes less than a tenth of what is over the floor:
     instruments that wander follow no state of the machine. Also returns the misfit (−2 log
     likelihood) that the port removes.
-    `before`: a system around the same fit, whose columns are used again. `name`: of the effect.
+    `name`: of the effect.
     `in_parts`: captures that miss the floor are held out a twelfth at a time, for a heat run that
     has no second. A wander of an instrument would then pass for a state of the machine.
     """
-    found, wide = _ranked(segments, fitted, _hooks(signals), before, in_parts)
+    fit = system.fit
+    found, wide = _ranked(system, _hooks(signals), in_parts)
     if not found:
         return None, 0.0
-    policy = fitted.policy.discovery
-    best = _simplest(found, fitted.policy)
+    policy = fit.policy.discovery
+    best = _simplest(found, fit.policy)
     others = tuple(
         (one.port.columns, one.held / best.held)
         for one in found
         if one is not best and one.held > (1.0 - policy.near_share) * best.held
     )
-    port = refined(best.port, fitted.model.machine, policy)
-    near = _moved(fitted, wide, best.step)
-    fine = system(segments, near, effect_columns(port.effect, near.model), wide)
-    own = len(own_columns(fitted.model))
+    port = refined(best.port, fit.model.machine, policy)
+    own = wide.own.size
+    # a drag over an inertia is a product: the expression is sought around the inertia found
+    near = fit.moved(wide.columns[:own], best.step[:own])
+    fine = linear_system(near, effect_columns(port.effect, near.model), wide)
     weight = fine.weights(fine.spreads(best.left))
     pursuit = Pursuit(fine, own, port, weight)
     sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
-
-
-def _moved(fitted: Fitted, wide: System, step: Array) -> Fitted:
-    """The fit with the model's own constants where the best port puts them.
-
-    A drag over an inertia is a product: the expression is sought around the inertia found.
-    """
-    own = wide.columns[: len(own_columns(fitted.model))]
-    values = dict(fitted.values)
-    for column, change in zip(own, step, strict=False):
-        values[column.name] += float(change)
-    return replace(fitted, values=clipped(fitted.model, values))
 
 
 def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
@@ -105,25 +91,22 @@ def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
 
 
 def _ranked(
-    segments: Sequence[Segment],
-    fitted: Fitted,
-    hooks: Sequence[str],
-    before: System | None,
-    in_parts: bool,
-) -> tuple[list[Found], System]:
+    before: LinearSystem, hooks: Sequence[str], in_parts: bool
+) -> tuple[list[Found], LinearSystem]:
     """Every port that is worth its price and helps where it was not fitted, the best first."""
-    offered = ports(fitted.model.machine, fitted.policy.discovery, hooks)
-    columns = [effect_columns(port.effect, fitted.model) for port in offered]
-    wide = system(segments, fitted, [c for some in columns for c in some], before)
-    own = np.arange(len(own_columns(fitted.model)))
+    fit = before.fit
+    offered = ports(fit.model.machine, fit.policy.discovery, hooks)
+    columns = [effect_columns(port.effect, fit.model) for port in offered]
+    wide = linear_system(fit, [c for some in columns for c in some], before)
+    own = wide.own
     none = wide.grams(own).best()
     left, base = wide.after(own, none.step), none.misfit
-    missed = _missed(wide, segments) if in_parts else None
+    missed = _missed(wide) if in_parts else None
     units = _units(wide, own, left, missed)
     reference = _held_out(wide, own, left, np.zeros(own.size), units)
     excess = float(wide.counts @ np.log(np.maximum(wide.spreads(left), 1.0)))
     price = math.log(wide.size)
-    least = max(fitted.policy.selection.tie, fitted.policy.selection.least_share * excess)
+    least = max(fit.policy.selection.tie, fit.policy.selection.least_share * excess)
     found = []
     first = own.size
     for place, (port, mine) in enumerate(zip(offered, columns, strict=True)):
@@ -133,27 +116,27 @@ def _ranked(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        end = wide.grams(chosen).best(*fitted.policy.selection.thorough)
+        end = wide.grams(chosen).best(*fit.policy.selection.thorough)
         after = wide.after(chosen, end.step)
         gain = base - end.misfit - live.size * price
         if gain <= 0.0:
             continue
-        ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fitted)])
+        ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fit)])
         held = reference - _held_out(wide, chosen, after, ridge, units)
         if held > least:
             found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
-def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fitted: Fitted) -> Array:
+def _ridge(columns: Sequence[Column], live: NDArray[np.int64], fit: Fit) -> Array:
     """Inverse prior variance [k] of a port's coefficients: the machine's own scale."""
-    machine = fitted.model.machine
+    machine = fit.model.machine
     scales = []
     for n in live:
         effect = columns[n].effect
         parameter = None if effect is None else effect.parameters_of(machine)[0]
         scales.append(1.0 if parameter is None else machine.scale(parameter))
-    return (fitted.policy.discovery.prior_size * np.array(scales)) ** -2.0
+    return (fit.policy.discovery.prior_size * np.array(scales)) ** -2.0
 
 
 def _simplest(found: Sequence[Found], policy: Policy) -> Found:
@@ -170,14 +153,14 @@ def _simplest(found: Sequence[Found], policy: Policy) -> Found:
     return min((one for one in simple if one.held >= level), key=lambda one: one.place)
 
 
-def _missed(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
+def _missed(system: LinearSystem) -> NDArray[np.int64]:
     """Numbers of the segments in which a fit leaves something that is told."""
-    told = np.flatnonzero(told_groups(around, segments))
-    return np.unique([around.labels[place][0] for place in told])
+    told = np.flatnonzero(told_groups(system))
+    return np.unique([system.labels[place][0] for place in told])
 
 
 def _units(
-    around: System, own: NDArray[np.int64], left: Array, missed: NDArray[np.int64] | None
+    system: LinearSystem, own: NDArray[np.int64], left: Array, missed: NDArray[np.int64] | None
 ) -> NDArray[np.int64]:
     """For every row [R] the number of what is held out together: a capture, or a part of one of the
     segments in `missed`; -1 for rows that are always in the fit.
@@ -185,27 +168,27 @@ def _units(
     Always in the fit is what alone carries a constant. With parts it is also every other capture,
     which has nothing to predict, and the first and last part: no curve is known beyond its ends.
     """
-    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    segment = system.segment
     units = segment.astype(np.int64)
     if missed is not None:
-        last = np.zeros(len(around.tests), dtype=np.int64)
-        np.maximum.at(last, segment, around.window)
-        part = around.policy.discovery.parts * around.window // (last[segment] + 1)
-        inner = np.isin(segment, missed) & (part > 0) & (part < around.policy.discovery.parts - 1)
-        units = np.where(inner, around.policy.discovery.parts * segment + part, -1)
-    carried = np.isin(units, _carrying(around, own, left, units))
+        last = np.zeros(len(system.segments), dtype=np.int64)
+        np.maximum.at(last, segment, system.window)
+        part = system.policy.discovery.parts * system.window // (last[segment] + 1)
+        inner = np.isin(segment, missed) & (part > 0) & (part < system.policy.discovery.parts - 1)
+        units = np.where(inner, system.policy.discovery.parts * segment + part, -1)
+    carried = np.isin(units, _carrying(system, own, left, units))
     return np.where(carried, -1, units)
 
 
 def _carrying(
-    around: System, own: NDArray[np.int64], left: Array, units: NDArray[np.int64]
+    system: LinearSystem, own: NDArray[np.int64], left: Array, units: NDArray[np.int64]
 ) -> list[int]:
     """Units without which some constant of the model is lost."""
-    policy = around.policy.goodness
-    weight = around.weights(around.spreads(left))
-    live = own[np.any(around.matrix[:, own] != 0.0, axis=0)]
-    matrix = around.matrix[:, live]
-    normal = (matrix * weight[:, None]).T @ matrix + np.diag(around.penalty[live])
+    policy = system.policy.goodness
+    weight = system.weights(system.spreads(left))
+    live = own[np.any(system.matrix[:, own] != 0.0, axis=0)]
+    matrix = system.matrix[:, live]
+    normal = (matrix * weight[:, None]).T @ matrix + np.diag(system.penalty[live])
     scale = np.sqrt(np.diag(normal))
     spread = np.diag(np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True))
     carrying = []
@@ -221,20 +204,20 @@ def _carrying(
     return carrying
 
 
-def _calm(around: System, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
+def _calm(system: LinearSystem, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
     """Step [k] of least misfit; by `ridge`, a curve and a constant of one shape do not run away."""
-    weight = around.weights(around.spreads(left))
-    matrix = around.matrix[:, places]
+    weight = system.weights(system.spreads(left))
+    matrix = system.matrix[:, places]
     weighted = matrix * weight[:, None]
-    normal = weighted.T @ matrix + np.diag(around.penalty[places] + ridge)
+    normal = weighted.T @ matrix + np.diag(system.penalty[places] + ridge)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    slope = (weighted.T @ around.residual + around.pull[places]) / scale
+    slope = (weighted.T @ system.residual + system.pull[places]) / scale
     step: Array = -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
     return step
 
 
 def _held_out(
-    around: System,
+    system: LinearSystem,
     places: NDArray[np.int64],
     left: Array,
     ridge: Array,
@@ -245,12 +228,12 @@ def _held_out(
     `left` [R] is the residual at their best fit, and gives the weights; rows of unit -1 keep it. A
     coefficient that no other unit tells of stays at zero, by `ridge`.
     """
-    weight = around.weights(around.spreads(left))
-    matrix = around.matrix[:, places]
+    weight = system.weights(system.spreads(left))
+    matrix = system.matrix[:, places]
     weighted = matrix * weight[:, None]
-    penalty = np.diag(around.penalty[places] + ridge)
+    penalty = np.diag(system.penalty[places] + ridge)
     normal = weighted.T @ matrix + penalty
-    slope = weighted.T @ around.residual + around.pull[places]
+    slope = weighted.T @ system.residual + system.pull[places]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     predicted = left.copy()
     for number in np.unique(units[units >= 0]).tolist():
@@ -258,7 +241,7 @@ def _held_out(
         if not np.any(matrix[mine]):
             continue
         less = (normal - weighted[mine].T @ matrix[mine]) / np.outer(scale, scale)
-        right = (slope - weighted[mine].T @ around.residual[mine]) / scale
+        right = (slope - weighted[mine].T @ system.residual[mine]) / scale
         step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
-        predicted[mine] = around.residual[mine] + matrix[mine] @ step
-    return around.misfit_of(around.spreads(predicted))
+        predicted[mine] = system.residual[mine] + matrix[mine] @ step
+    return system.misfit_of(system.spreads(predicted))

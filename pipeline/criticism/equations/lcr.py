@@ -35,8 +35,8 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
         return None
     noise = {}
     for name in names[1:]:
-        fitted = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
-        scatter = math.sqrt(float(((found[name] - fitted) ** 2).sum()) / (angle.size - 3))
+        fit = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
+        scatter = math.sqrt(float(((found[name] - fit) ** 2).sum()) / (angle.size - 3))
         least = _LEAST_METER_NOISE * float(np.abs(found[name]).max())
         noise[name] = max(scatter, resolution(found[name]) / math.sqrt(12), least)
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.policy.discovery import Discovery
-from pipeline.criticism.policy.regression import Fit, Goodness, MainsHum, NoiseFloors
+from pipeline.criticism.policy.regression import GaussNewton, Goodness, MainsHum, NoiseFloors
 from pipeline.criticism.policy.selection import OrderScan, Selection
 from pipeline.criticism.policy.validation import Validation
 from pipeline.records.policy import Overrides, overrides, section, with_overrides
@@ -20,7 +20,7 @@ class Policy:
 
     selection: Selection = section(Selection)
     order_scan: OrderScan = section(OrderScan)
-    fit: Fit = section(Fit)
+    fit: GaussNewton = section(GaussNewton)
     noise_floors: NoiseFloors = section(NoiseFloors)
     goodness: Goodness = section(Goodness)
     mains_hum: MainsHum = section(MainsHum)

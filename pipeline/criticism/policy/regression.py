@@ -8,7 +8,7 @@ from pipeline.records.policy import calibrated, chosen, derived
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fit:
+class GaussNewton:
     """How a fit goes on and where it ends."""
 
     most_rounds: int = chosen(

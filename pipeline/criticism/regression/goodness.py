@@ -14,7 +14,7 @@ from scipy.special import chdtri, ndtr
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.regression import Goodness
-from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem
 from pipeline.criticism.residuals.channels import (
     channel_of,
     channel_scale,
@@ -47,23 +47,27 @@ class HeldOut:
             return ()
         return ("no capture can be predicted from the others: errors are those of the fit",)
 
+    def or_fit(self, system: LinearSystem) -> Array:
+        """The residual [R], that of the fit where a capture is always in it."""
+        return np.where(np.isfinite(self.residual), self.residual, system.residual)
 
-def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> HeldOut:
+
+def leave_out(system: LinearSystem) -> HeldOut:
     """Predicts every capture from all the others, by one weighted step from the full fit.
 
-    Of `segments` that are parted in blocks, every block is predicted from all else. This is to
+    Of segments that are parted in blocks, every block is predicted from all else. This is to
     first order: noise floors, weights and shapes stay those of the full fit.
     """
-    policy = around.policy.goodness
-    places = np.flatnonzero(np.any(around.matrix[:, :own] != 0.0, axis=0))
-    weight = around.weights(around.spreads(around.residual))
-    matrix = around.matrix[:, places]
-    unit = _units(around, segments)
+    policy, own = system.policy.goodness, system.own.size
+    places = np.flatnonzero(np.any(system.matrix[:, :own] != 0.0, axis=0))
+    weight = system.weights(system.spreads(system.residual))
+    matrix = system.matrix[:, places]
+    unit = _units(system)
     weighted = matrix * weight[:, None]
-    normal = weighted.T @ matrix + np.diag(around.penalty[places])
-    slope = weighted.T @ around.residual + around.pull[places]
+    normal = weighted.T @ matrix + np.diag(system.penalty[places])
+    slope = weighted.T @ system.residual + system.pull[places]
     spread = np.diag(np.linalg.pinv(_unit(normal), hermitian=True))
-    left = np.full(around.size, np.nan)
+    left = np.full(system.size, np.nan)
     steps: dict[int, Array] = {}
     for number in sorted(set(unit.tolist())):
         mine = unit == number
@@ -77,17 +81,17 @@ def leave_out(around: System, own: int, segments: Sequence[Segment] = ()) -> Hel
             or _lost(less, normal, policy)
         ):
             continue
-        step = -(inverse @ ((slope - weighted[mine].T @ around.residual[mine]) / scale)) / scale
-        left[mine] = around.residual[mine] + matrix[mine] @ step
+        step = -(inverse @ ((slope - weighted[mine].T @ system.residual[mine]) / scale)) / scale
+        left[mine] = system.residual[mine] + matrix[mine] @ step
         steps[number] = np.zeros(own)
         steps[number][places] = step
     predicted = np.isfinite(left)
-    told = np.where(predicted, left, around.residual) / around.soft
+    told = np.where(predicted, left, system.residual) / system.soft
     told = told[predicted] if predicted.any() else told
     return HeldOut(left, math.sqrt(float((told**2).mean())), steps)
 
 
-def in_common(fits: Sequence[System], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
+def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
     """The same rows held out of several fits to the same captures, so that their errors compare.
 
     A parameter that one capture alone carries keeps that capture in the fit. If it counted in one
@@ -96,32 +100,32 @@ def in_common(fits: Sequence[System], held: Sequence[HeldOut]) -> tuple[HeldOut,
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
     told = shared if shared.any() else np.ones(shared.size, dtype=bool)
     made = []
-    for around, one in zip(fits, held, strict=True):
+    for system, one in zip(fits, held, strict=True):
         residual = np.where(shared, one.residual, np.nan)
-        errors = (np.where(shared, one.residual, around.residual) / around.soft)[told]
+        errors = (np.where(shared, one.residual, system.residual) / system.soft)[told]
         made.append(replace(one, residual=residual, total=math.sqrt(float((errors**2).mean()))))
     return tuple(made)
 
 
-def predicted_spreads(around: System, held: HeldOut) -> Array:
+def predicted_spreads(system: LinearSystem, held: HeldOut) -> Array:
     """χ²/n [G] of every group as `held` out; captures that are always in the fit as fitted."""
-    return around.spreads(np.where(np.isfinite(held.residual), held.residual, around.residual))
+    return system.spreads(held.or_fit(system))
 
 
-def _units(around: System, segments: Sequence[Segment]) -> NDArray[np.int64]:
+def _units(system: LinearSystem) -> NDArray[np.int64]:
     """Number of what is held out together, of every row [R]: a capture or a block of one.
 
     Segments of one capture that are parted alike are held out together.
     """
-    segment = np.array([number for number, _, _ in around.labels])[around.group]
+    segment = system.segment
     units = segment.astype(np.int64)
-    names = [s.capture for s in segments]
+    names = [s.capture for s in system.segments]
     first = len(names)
-    for number, one in enumerate(segments):
+    for number, one in enumerate(system.segments):
         if one.blocks is not None:
             mine = segment == number
             units[mine] = first + names.index(one.capture) * _MOST_BLOCKS
-            units[mine] += one.blocks[around.window[mine]]
+            units[mine] += one.blocks[system.window[mine]]
     return units
 
 
@@ -136,83 +140,75 @@ def _lost(less: Array, normal: Array, policy: Goodness) -> bool:
     return bool((np.diag(less) < policy.lost_share * np.diag(normal)).any())
 
 
-def signal_errors(segments: Sequence[Segment], around: System, residual: Array) -> dict[str, float]:
+def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
     """Rms error [unit of the signal] of each signal's window means."""
     found: dict[str, float] = {}
     plain = (
-        reported_signal(segments[number], channel) if order == 0 else ""
-        for number, channel, order in around.labels
+        reported_signal(system.segments[number], channel) if order == 0 else ""
+        for number, channel, order in system.labels
     )
     names = np.array(list(plain))
-    of_row = names[around.group]
+    of_row = names[system.group]
     for name in sorted({n for n in names.tolist() if n}):
         mine = (of_row == name) & np.isfinite(residual)
         if mine.any():
-            found[name] = math.sqrt(float(((residual[mine] * around.unit[mine]) ** 2).mean()))
+            found[name] = math.sqrt(float(((residual[mine] * system.unit[mine]) ** 2).mean()))
     return found
 
 
-def remainder(
-    around: System, segments: Sequence[Segment], residual: Array, large: bool = False
-) -> tuple[Remainder, ...]:
+def remainder(system: LinearSystem, large: bool = False) -> tuple[Remainder, ...]:
     """Groups that are over their floor significantly and by a size that matters, the worst first.
 
     With `large`, the size must matter to the machine as a whole. A floor from the recording itself
     is good to a factor of 2 in variance, and nobody acts on an error below 5e-4 of the machine's
     voltage or torque.
     """
-    return tuple(one for one in over_floor(around, segments, residual, large) if one.matters)
+    return tuple(one for one in over_floor(system, large) if one.matters)
 
 
-def over_floor(
-    around: System, segments: Sequence[Segment], residual: Array, large: bool = False
-) -> tuple[Remainder, ...]:
+def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ...]:
     """Groups that are over their floor significantly, at any size, the worst first.
 
     They say where a held-out error over the floor comes from when `remainder` is empty.
     """
     found = []
-    for place, chi2_per_n, size, matters in _over(around, segments, residual, around.soft, large):
-        number, channel, order = around.labels[place]
-        capture = segments[number].capture
+    for place, chi2_per_n, size, matters in _over(system, system.soft, large):
+        number, channel, order = system.labels[place]
+        capture = system.segments[number].capture
         found.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
     return tuple(
         sorted(found, key=lambda r: (not r.matters, -r.chi2_per_n, r.capture, r.signal, r.order))
     )
 
 
-def told_groups(around: System, segments: Sequence[Segment]) -> NDArray[np.bool_]:
+def told_groups(system: LinearSystem) -> NDArray[np.bool_]:
     """Groups [G] that a fit leaves over their floor, judged as `remainder` does, but with the
     tolerance of form of the effects found in that floor.
     """
-    told = np.zeros(len(around.labels), dtype=bool)
-    as_whitened = np.ones(around.size)
-    over = _over(around, segments, around.residual, as_whitened)
+    told = np.zeros(len(system.labels), dtype=bool)
+    as_whitened = np.ones(system.size)
+    over = _over(system, as_whitened)
     told[[place for place, _, _, matters in over if matters]] = True
     return told
 
 
 def _over(
-    around: System,
-    segments: Sequence[Segment],
-    residual: Array,
-    soft: Array,
-    large: bool = False,
+    system: LinearSystem, soft: Array, large: bool = False
 ) -> Iterator[tuple[int, float, float, bool]]:
     """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is
     `soft` [R] of the scale that rows are divided by.
     """
-    policy = around.policy.goodness
-    spreads, counts = around.spreads(residual / soft), around.counts
-    for place, (number, channel, _) in enumerate(around.labels):
+    policy, residual = system.policy.goodness, system.residual
+    spreads, counts = system.spreads(residual / soft), system.counts
+    for place, (number, channel, _) in enumerate(system.labels):
         n, q = counts[place], spreads[place]
         if n == 0 or q <= max(1.0 + policy.over, _highest_by_chance(n, policy.chance)):
             continue
-        mine = around.group == place
-        unit = float(((around.unit * soft)[mine] ** 2).mean())
-        more = float(((residual[mine] * around.unit[mine]) ** 2).mean()) - unit
+        mine = system.group == place
+        unit = float(((system.unit * soft)[mine] ** 2).mean())
+        more = float(((residual[mine] * system.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
-        matters = size > material_size(segments[number], channel, around, large)
+        matters = size > material_size(system.segments[number], channel, system.fit, large)
         yield place, float(q), size, matters
 
 
@@ -225,14 +221,13 @@ def _highest_by_chance(n: float, sigmas: float) -> float:
     return float(chdtri(n, ndtr(-sigmas))) / n
 
 
-def material_size(segment: Segment, channel: str, around: System, large: bool = False) -> float:
+def material_size(segment: Segment, channel: str, fit: Fit, large: bool = False) -> float:
     """Error [unit of the signal] below which nobody would act, or that is `large` for the machine.
 
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
     """
-    one, fitted = channel_of(segment, channel), around.around
-    policy = around.policy.goodness
-    scale = channel_scale(segment, channel, fitted.model.machine, fitted.values)
+    one, policy = channel_of(segment, channel), fit.policy.goodness
+    scale = channel_scale(segment, channel, fit.model.machine, fit.values)
     size = (policy.material if one.scale else policy.material_bench) * scale
     if one.scale and one.beside and not large:
         size = min(size, policy.material_reading * largest_reading(segment, one.beside))

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.criticism.data.machine_scale import base_scales
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
 from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
-from pipeline.criticism.policy.regression import Fit
+from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from pipeline.numerics.identifiability import (
     REACH,
@@ -69,38 +68,39 @@ class Known:
         return np.array([self.u_of(one) for one in np.eye(self.rest.size)])
 
 
-def known(around: System, held: HeldOut, own: int) -> Known:
-    """What a system and its priors say of a fit's first `own` columns.
+def known(system: LinearSystem, held: HeldOut) -> Known:
+    """What a system and its priors say of a fit's own columns.
 
     Nothing that only keeps steps short, or where the fit began, is in it. The columns are those of
     the fit itself: one that stayed from a near fit would tell apart what nothing tells apart.
     """
-    return known_by(around, held, own, _sizes(around.around, around.columns[:own]))
+    return known_by(system, held, _sizes(system.fit, system.columns[: system.own.size]))
 
 
-def known_by(around: System, held: HeldOut, own: int, sizes: Array) -> Known:
+def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
     """The same with the parameters' `sizes` [own] given."""
-    weight = around.weights(around.spreads(around.residual))
-    matrix, penalty = around.matrix[:, :own], around.penalty[:own]
+    own = system.own.size
+    weight = system.weights(system.spreads(system.residual))
+    matrix, penalty = system.matrix[:, :own], system.penalty[:own]
     rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(penalty))])
     found = identify(rows, sizes)
-    slope = matrix.T @ (weight * around.residual) + around.pull[:own]
+    slope = matrix.T @ (weight * system.residual) + system.pull[:own]
     steps = np.array(list(held.steps.values())).reshape(-1, own)
     return Known(found, steps, -found.root @ (found.root.T @ slope))
 
 
-def surely_there(around: System, held: HeldOut, least: float) -> set[str]:
+def surely_there(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
     """Names of the parameters that are `least` standard uncertainties from zero, as they are or
     over a constant that no motor is without.
 
     A coast tells that there is windage though it tells no more than windage over inertia.
     """
-    own = len(around.columns)
-    fit = known(around, held, own)
-    values = np.array([around.around.values[c.name] for c in around.columns])
-    below = [n for n, c in enumerate(around.columns) if c.name in POSITIVE and values[n] > 0.0]
+    own = system.own.size
+    fit = known(system, held)
+    values = np.array([system.fit.values[c.name] for c in system.columns])
+    below = [n for n, c in enumerate(system.columns) if c.name in POSITIVE and values[n] > 0.0]
     sure = set()
-    for n, column in enumerate(around.columns):
+    for n, column in enumerate(system.columns):
         over = {j: fit.u_of(_over(values, n, j), bent=True) for j in below if j != n}
         told = [(values[n] / values[j], u) for j, u in over.items()]
         told.append((values[n], fit.u_of(np.eye(own)[n])))
@@ -117,7 +117,7 @@ def _over(values: Array, one: int, other: int) -> Array:
     return gradient
 
 
-def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, ModelParameter]:
+def parameters_told(system: LinearSystem, held: HeldOut) -> dict[str, ModelParameter]:
     """Every physical parameter of a fit by name; without a value where it is not determined.
 
     Determined is what is known better than to its own size. A constant that no motor is without
@@ -125,21 +125,22 @@ def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, 
     must be narrower than sizes that are seen on real benches. A number that was chosen of a few, or
     told by a closer look, is determined where an amplitude of its effect is.
     """
-    model, own = fitted.model, own_columns(fitted.model)
-    fit = known(around, held, len(own))
-    u = dict(zip((c.name for c in own), fit.u.tolist(), strict=True))
-    told = within(_beyond(fit.u, around.penalty[: len(own)], fitted.policy.fit), fit.found.sizes)
+    fit, model, own = system.fit, system.fit.model, system.columns[: system.own.size]
+    sure_of = known(system, held)
+    u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
+    beyond = _beyond(sure_of.u, system.penalty[: len(own)], fit.policy.fit)
+    told = within(beyond, sure_of.found.sizes)
     sized = dict(zip(u, told.tolist(), strict=True))
     limits = limits_of(model)
     made = {}
     for c in BASE:
         if c.name in PHYSICAL:
-            value = fitted.values[c.name]
+            value = fit.values[c.name]
             bound = _at(value, limits.get(c.name))
             sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
             made[c.name] = _told(value, u[c.name], c.unit, sized[c.name] and sure, bound)
     for name, (effect, p) in model.parameters().items():
-        value = fitted.values[name]
+        value = fit.values[name]
         beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
         sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
         bound = not p.choice and _at(value, limits[name])
@@ -147,7 +148,7 @@ def parameters_told(fitted: Fitted, around: System, held: HeldOut) -> dict[str, 
     return made
 
 
-def _beyond(u: Array, penalty: Array, policy: Fit) -> Array:
+def _beyond(u: Array, penalty: Array, policy: GaussNewton) -> Array:
     """Standard uncertainties [P] without the priors of inverse variance `penalty` [P], infinite
     where nothing else tells: what handbooks say is not measured.
     """
@@ -168,34 +169,32 @@ def _at(value: float, limits: tuple[float, float] | None) -> bool:
     )
 
 
-def combinations_told(
-    segments: Sequence[Segment], fitted: Fitted, around: System, held: HeldOut
-) -> tuple[KnownCombination, ...]:
+def combinations_told(system: LinearSystem, held: HeldOut) -> tuple[KnownCombination, ...]:
     """What the captures tell of parameters that they do not determine one by one.
 
     A matrix speaks of where the fit stands. So the directions without information are walked: what
     is reported must be all there is to know far from here as well.
     """
-    policy = fitted.policy.fit
-    names = [c.name for c in around.columns[: len(own_columns(fitted.model))]]
-    fit = known(around, held, len(names))
-    found = fit.found
-    values = np.array([fitted.values[name] for name in names])
-    physical = {**dict.fromkeys(PHYSICAL), **fitted.model.parameters()}
-    heard = np.any(around.matrix[:, : len(names)] != 0.0, axis=0)
+    fit, policy = system.fit, system.policy.fit
+    names = [c.name for c in system.columns[: system.own.size]]
+    sure_of = known(system, held)
+    found = sure_of.found
+    values = np.array([fit.values[name] for name in names])
+    physical = {**dict.fromkeys(PHYSICAL), **fit.model.parameters()}
+    heard = np.any(system.matrix[:, : len(names)] != 0.0, axis=0)
     open_ = np.isinf(found.u) | ~found.determined
     places = [n for n, name in enumerate(names) if name in physical and heard[n] and open_[n]]
-    positive = [names.index(name) for name in POSITIVE if fitted.values[name] > 0.0]
+    positive = [names.index(name) for name in POSITIVE if fit.values[name] > 0.0]
     made = known_combinations(found, values, places, positive)
     moving = np.zeros(len(names), dtype=bool)
     for moved, there in walked(found, values, made, math.log(policy.walk_factor)) if made else ():
-        at = replace(fitted, values=fitted.values | dict(zip(names, there.tolist(), strict=True)))
-        misfit = system(segments, at, before=around, chord=True).misfit
-        if not abs(misfit - around.misfit) < policy.walk_rise:
+        at = replace(fit, values=fit.values | dict(zip(names, there.tolist(), strict=True)))
+        misfit = linear_system(at, before=system, chord=True).misfit
+        if not abs(misfit - system.misfit) < policy.walk_rise:
             moving |= moved
-    wide = [(one, fit.u_of(one.gradient, bent=one.product)) for one in made]
+    wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in made]
     return tuple(
-        _combined(one, u, names, fitted.model)
+        _combined(one, u, names, fit.model)
         for one, u in wide
         if not moving[[place for place, _ in one.weights]].any()
         if within(np.array(u), np.array(one.size))
@@ -232,13 +231,13 @@ def _fraction(factors: Sequence[str], weights: Mapping[str, float], times: str) 
     return f"{top}/{bottom}" if below else top
 
 
-def _sizes(fitted: Fitted, columns: Sequence[Column]) -> Array:
+def _sizes(fit: Fit, columns: Sequence[Column]) -> Array:
     """Magnitude [P] at which every parameter matters, in its own unit.
 
     Of a constant that no motor is without, its value, of a nuisance its prior, of the others their
     value or a size seen on real benches, the larger; waves of one unit are of one size.
     """
-    model, values = fitted.model, fitted.values
+    model, values = fit.model, fit.values
     orders, priors = base_scales(model.machine), model.priors()
     known = {name: abs(values[name]) or orders[name] for name in POSITIVE}
     known["b_nm_s_rad"] = max(abs(values["b_nm_s_rad"]), orders["b_nm_s_rad"])

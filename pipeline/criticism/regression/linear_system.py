@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Effect, Values
+from pipeline.criticism.effect import Array, Effect, Machine, Parameter, Values
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
+from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.linearise import (
     Column,
     Rows,
@@ -36,14 +37,15 @@ ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
-    """A model with the values that fit best.
+class Fit:
+    """Segments, a model of them, and the values that fit best.
 
     `sigma` is each segment's noise floor by group, computed at the values `near`. Reading errors
     are computed there too: those of a coasting shaft go with 1/J, and a fit could win by making J
     small. `tolerance` is what the forms of effects found may be wrong by; empty: nothing.
     """
 
+    segments: tuple[Segment, ...]
     model: Model
     values: dict[str, float]
     sigma: tuple[Array, ...]
@@ -55,9 +57,46 @@ class Fitted:
         """What the fit goes by."""
         return self.model.policy
 
+    @property
+    def machine(self) -> Machine:
+        """The machine of the model."""
+        return self.model.machine
+
+    def effect(self, name: str) -> Effect:
+        """An effect of the model by its name."""
+        return next(effect for effect in self.model.effects if effect.name == name)
+
+    def size(self, effect: Effect, parameter: Parameter) -> float:
+        """Magnitude [unit of the parameter] of one parameter of an effect."""
+        return abs(self.values[f"{effect.name}.{parameter.name}"])
+
+    def without(self, *names: str) -> Fit:
+        """The model less some effects; every other value stays."""
+        gone = tuple(f"{name}." for name in names)
+        values = {name: v for name, v in self.values.items() if not name.startswith(gone)}
+        return replace(self, model=self.model.without(*names), values=values)
+
+    def at(self, values: Values) -> Fit:
+        """The same with other values where they are given, moved inside their bounds."""
+        inside = {**self.values, **values}
+        for name, (low, high) in limits_of(self.model).items():
+            inside[name] = min(max(inside[name], low), high)
+        return replace(self, values=inside)
+
+    def moved(self, columns: Sequence[Column], step: Array) -> Fit:
+        """The same after a step along columns, each as far as its bounds."""
+        moves = zip(columns, step.tolist(), strict=True)
+        return self.at({c.name: self.values[c.name] + change for c, change in moves})
+
+    @property
+    def floors(self) -> Iterator[tuple[Array, Array]]:
+        """Noise floor and tolerance of form [groups] of every segment."""
+        none = (np.zeros(sigma.size) for sigma in self.sigma)
+        return zip(self.sigma, self.tolerance or none, strict=True)
+
 
 @dataclass(frozen=True, slots=True)
-class System:
+class LinearSystem:
     """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
 
     `group` [R] numbers the groups of (segment, channel, order), `labels` names them. `unit` [R] is
@@ -66,8 +105,9 @@ class System:
     tolerance of form was added. Rows of a group that misses its noise floor, χ²/n = q > 1, count
     1/q: the likelihood of a group whose scatter is at least the floor but otherwise unknown. So an
     equation that lacks an effect does not move constants that sound equations know. `penalty` [P]
-    is the inverse prior variance of nuisances, `pull` [P] the penalty's slope, `tests` each
-    segment's test, `made_at` the values at which each column was computed.
+    is the inverse prior variance of nuisances, `pull` [P] the penalty's slope. Columns of the
+    model's own parameters come first, `own_count` of them; `made_at` holds the values at which each
+    column was computed.
     """
 
     columns: tuple[Column, ...]
@@ -81,19 +121,34 @@ class System:
     labels: tuple[tuple[int, str, int], ...]
     penalty: Array
     pull: Array
-    around: Fitted
-    tests: tuple[str, ...]
+    fit: Fit
+    own_count: int
     made_at: Mapping[ColumnKey, Values]
 
     @property
     def policy(self) -> Policy:
         """What the fit goes by."""
-        return self.around.policy
+        return self.fit.policy
 
     @property
     def size(self) -> int:
         """Weak samples."""
         return int(self.residual.size)
+
+    @property
+    def own(self) -> NDArray[np.int64]:
+        """Places of the columns of the model's own parameters."""
+        return np.arange(self.own_count)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """What the fit is of."""
+        return self.fit.segments
+
+    @property
+    def segment(self) -> NDArray[np.int64]:
+        """Number [R] of the segment that every weak sample is of."""
+        return np.array([number for number, _, _ in self.labels])[self.group]
 
     @property
     def counts(self) -> Array:
@@ -171,9 +226,9 @@ class System:
             self.policy.fit,
         )
 
-    def along(self, places: Sequence[int]) -> System:
+    def along(self, places: NDArray[np.int64]) -> LinearSystem:
         """The same system with some of its columns."""
-        columns = tuple(self.columns[n] for n in places)
+        columns = tuple(self.columns[n] for n in places.tolist())
         penalty, pull = self.penalty[places], self.pull[places]
         matrix = self.matrix[:, places]
         return replace(self, columns=columns, matrix=matrix, penalty=penalty, pull=pull)
@@ -197,13 +252,13 @@ def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[A
     return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
 
 
-def floors_grown(segments: Sequence[Segment], fitted: Fitted) -> tuple[Array, ...]:
+def floors_grown(fit: Fit) -> tuple[Array, ...]:
     """Noise floor of every segment at a fit's values, over the one that the fit was made with; the
     same noise is added in both.
     """
-    what = fitted.model, fitted.values
-    each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fitted.sigma)]
-    return on_each(_floor_grown, segments, each)
+    what = fit.model, fit.values
+    each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fit.sigma)]
+    return on_each(_floor_grown, fit.segments, each)
 
 
 def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, seed: int) -> Array:
@@ -213,37 +268,33 @@ def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, s
     return noise_floor(segment, model, values, seed) / sigma
 
 
-def tolerances(
-    segments: Sequence[Segment], fitted: Fitted, added: Sequence[Effect]
-) -> tuple[Array, ...]:
+def tolerances(fit: Fit, added: Sequence[Effect]) -> tuple[Array, ...]:
     """What the forms of the effects found may be wrong by, of every segment."""
-    what = fitted.model, fitted.values, tuple(added)
-    return on_each(form_tolerance, segments, [what] * len(segments))
+    what = fit.model, fit.values, tuple(added)
+    return on_each(form_tolerance, fit.segments, [what] * len(fit.segments))
 
 
-def system(
-    segments: Sequence[Segment],
-    fitted: Fitted,
+def linear_system(
+    fit: Fit,
     candidates: Sequence[Column] = (),
-    before: System | None = None,
+    before: LinearSystem | None = None,
     chord: bool = False,
-) -> System:
+) -> LinearSystem:
     """Linearises every segment around a fit, along its own columns and those of candidates.
 
     Columns that hold at this fit too (`_holds`) stay as they were in `before`, a system around a
     near fit; with `chord` all that it has stay.
     """
-    model, values = fitted.model, fitted.values
-    columns = [*own_columns(model), *candidates]
-    known = _kept(before, fitted, columns, chord)
+    model, values = fit.model, fit.values
+    own = own_columns(model)
+    columns = [*own, *candidates]
+    known = _kept(before, fit, columns, chord)
     new = [column for column in columns if column.key not in known]
-    none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
-    floor = zip(fitted.sigma, fitted.tolerance or none, strict=True)
-    each = [(model, values, new, *both, fitted.near) for both in floor]
-    rows = on_each(linearise, segments, each)
+    each = [(model, values, new, *both, fit.near) for both in fit.floors]
+    rows = on_each(linearise, fit.segments, each)
     group, labels = _numbered(rows)
     penalty, pull = _priors(model, columns, values)
-    made = System(
+    made = LinearSystem(
         columns=tuple(columns),
         residual=np.concatenate([r.residual for r in rows]),
         matrix=_placed(columns, new, np.concatenate([r.columns for r in rows])),
@@ -255,11 +306,11 @@ def system(
         labels=labels,
         penalty=penalty,
         pull=pull,
-        around=fitted,
-        tests=tuple(segment.test for segment in segments),
+        fit=fit,
+        own_count=len(own),
         made_at={column.key: values for column in new},
     )
-    return made if before is None or not known else _with_known(made, before, known, segments)
+    return made if before is None or not known else _with_known(made, before, known)
 
 
 def _numbered(
@@ -285,21 +336,20 @@ def _placed(columns: Sequence[Column], new: Sequence[Column], made: Array) -> Ar
 
 
 def _with_known(
-    now: System,
-    before: System,
+    now: LinearSystem,
+    before: LinearSystem,
     known: Mapping[ColumnKey, Array],
-    segments: Sequence[Segment],
-) -> System:
+) -> LinearSystem:
     """The system with the `known` columns of the one `before` put where its matrix is still open:
     over the noise of now, and those of a free shaft by its inertia of now.
     """
+    segments = now.segments
     free = np.array([of_acceleration(segments[n], channel) for n, channel, _ in now.labels])
-    inertia = before.around.values["j_kgm2"] / now.around.values["j_kgm2"]
+    inertia = before.fit.values["j_kgm2"] / now.fit.values["j_kgm2"]
     lighter = np.where(free, inertia, 1.0)[now.group]
     places = [n for n, column in enumerate(now.columns) if column.key in known]
     kept = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
-    segment = np.array([number for number, _, _ in now.labels])[now.group]
-    counts = np.bincount(segment, minlength=len(segments)).tolist()
+    counts = np.bincount(now.segment, minlength=len(segments)).tolist()
     now.matrix[:, places] = _over(
         segments, kept, (before.whiten, now.whiten), counts, now.policy.noise_floors
     )
@@ -328,7 +378,7 @@ def _over(
 
 
 def _kept(
-    before: System | None, fitted: Fitted, columns: Sequence[Column], chord: bool
+    before: LinearSystem | None, fit: Fit, columns: Sequence[Column], chord: bool
 ) -> dict[ColumnKey, Array]:
     """Those of the columns that an earlier system has and that hold at a new fit too.
 
@@ -339,15 +389,15 @@ def _kept(
     """
     if before is None:
         return {}
-    known = before.around.model.effects
-    found = [e for e in fitted.model.effects if e not in known]
-    if any(p.starts for e in found for p in e.parameters_of(fitted.model.machine)):
+    known = before.fit.model.effects
+    found = [e for e in fit.model.effects if e not in known]
+    if any(p.starts for e in found for p in e.parameters_of(fit.model.machine)):
         return {}
     turned = any(e.angle is not None for e in found)
 
     def stays(column: Column) -> bool:
         of_angle = column.effect is not None and column.effect.angle is not None
-        return not (turned and of_angle) and _holds(column, before.made_at[column.key], fitted)
+        return not (turned and of_angle) and _holds(column, before.made_at[column.key], fit)
 
     places = {column.key: place for place, column in enumerate(before.columns)}
     there = [column for column in columns if column.key in places]
@@ -355,13 +405,13 @@ def _kept(
     return {key: before.matrix[:, places[key]] for key in kept}
 
 
-def _holds(column: Column, made_at: Values, fitted: Fitted) -> bool:
+def _holds(column: Column, made_at: Values, fit: Fit) -> bool:
     """Whether a column is near what it would be at a fit.
 
     It goes with the constants; that of J with J, since a coasting shaft goes by 1/J; those of
     sensors and shapes with other effects' parameters, by their typical sizes if these are larger.
     """
-    model, now, far = fitted.model, fitted.values, fitted.policy.fit.stale_share
+    model, now, far = fit.model, fit.values, fit.policy.fit.stale_share
     if any(abs(now[n] - made_at[n]) > far * abs(made_at[n]) for n in _STEADY):
         return False
     if column.name == "j_kgm2":

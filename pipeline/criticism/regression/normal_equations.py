@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
-from pipeline.criticism.policy.regression import Fit
+from pipeline.criticism.policy.regression import GaussNewton
 
 _TIE = 1e-11
 """Share of the largest information below which a direction has none, far above the rounding of
@@ -48,7 +48,7 @@ class Grams:
     penalty: Array
     pull: Array
     elsewhere: float
-    policy: Fit
+    policy: GaussNewton
 
     @classmethod
     def of(
@@ -60,7 +60,7 @@ class Grams:
         penalty: Array,
         pull: Array,
         elsewhere: float,
-        policy: Fit,
+        policy: GaussNewton,
     ) -> Grams:
         """From columns [R, k] and residual [R] of rows whose groups are numbered below `count`."""
         order = np.argsort(group, kind="stable")

@@ -7,21 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.discrimination import kin, told_by_wholes
-from pipeline.criticism.selection.score_test import Candidate
+from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.criticism.selection.stepwise import loss_without, shaped
 
 
 def rivals_of(
     name: str,
-    fitted: Fitted,
-    wide: System,
+    wide: LinearSystem,
     offered: Sequence[Candidate],
-    segments: Sequence[Segment],
     passed_over: Sequence[Candidate] = (),
 ) -> tuple[str, ...]:
     """Effects that explain the captures as well in an effect's place (deviance within 12, and so
@@ -31,20 +28,16 @@ def rivals_of(
     that were `passed_over` for it. Effects that share its closer look are
     alternatives if that look does not discriminate them.
     """
-    policy = fitted.policy.selection
-    effect = next(e for e in fitted.model.effects if e.name == name)
+    policy, effect = wide.policy.selection, wide.fit.effect(name)
     alike = kin(effect, {one.effect.name: one.effect for one in offered})
-    ties = [] if told_by_wholes(segments, fitted, effect) else list(alike)
+    ties = [] if told_by_wholes(wide.fit, effect) else list(alike)
     grams = wide.grams()
-    lost = loss_without(wide, fitted, (name,), grams=grams)
-    most, first = policy.alternative_share * lost, len(own_columns(fitted.model))
+    most = policy.alternative_share * loss_without(wide, (name,), grams=grams)
     near: dict[str, tuple[float, Candidate]] = {}
-    for candidate in offered:
-        places = np.arange(first, first + len(candidate.columns))
-        first += len(candidate.columns)
+    for candidate, places in placed(wide, offered):
         if candidate.effect.name in alike or not _meet(effect, candidate.effect):
             continue
-        rise = loss_without(wide, fitted, (name,), places, grams)
+        rise = loss_without(wide, (name,), places, grams)
         other = candidate.effect.name
         if rise < most and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate
@@ -54,7 +47,7 @@ def rivals_of(
         near.setdefault(candidate.effect.name, (most, candidate))
     nearest = sorted(near.values(), key=lambda pair: (pair[0], pair[1].effect.name))
     for _, candidate in nearest[: policy.most_alternatives]:
-        swapped = _refitted(name, fitted, candidate, segments, wide)
+        swapped = _refitted(name, candidate, wide)
         if (
             swapped is not None
             and swapped.misfit < wide.misfit + policy.tie
@@ -64,15 +57,13 @@ def rivals_of(
     return tuple(sorted(ties))
 
 
-def _refitted(
-    name: str, fitted: Fitted, candidate: Candidate, segments: Sequence[Segment], wide: System
-) -> System | None:
+def _refitted(name: str, candidate: Candidate, wide: LinearSystem) -> LinearSystem | None:
     """The system with a candidate in an effect's place; None without a shape to speak of."""
-    model = fitted.model.without(name).with_effects(candidate.effect)
-    kept = {k: v for k, v in fitted.values.items() if not k.startswith(f"{name}.")}
-    start = replace(fitted, model=model, values={**kept, **candidate.values})
-    swapped, around = gauss_newton(segments, start, before=wide)
-    return around if shaped(swapped, candidate.effect) else None
+    less = wide.fit.without(name)
+    model = less.model.with_effects(candidate.effect)
+    start = replace(less, model=model, values={**less.values, **candidate.values})
+    swapped = gauss_newton(start, before=wide)
+    return swapped if shaped(swapped.fit, candidate.effect) else None
 
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:
@@ -93,23 +84,19 @@ def remedies(
     }
 
 
-def detectable(effect: Effect, fitted: Fitted, wide: System, offered: Sequence[Candidate]) -> float:
+def detectable(effect: Effect, wide: LinearSystem, offered: Sequence[Candidate]) -> float:
     """Signal-to-noise ratio that the captures give an effect of typical size.
 
     The typical amplitudes over their standard deviations when fitted with all else; the best
     shape and amplitude count.
     """
-    first = len(own_columns(fitted.model))
-    own = np.arange(first)
-    machine = fitted.model.machine
+    own, machine = wide.own, wide.fit.machine
     sizes = {
         f"{effect.name}.{p.name}": p.typical * machine.scale(p)
         for p in effect.parameters_of(machine)
     }
     best = 0.0
-    for candidate in offered:
-        places = np.arange(first, first + len(candidate.columns))
-        first += len(candidate.columns)
+    for candidate, places in placed(wide, offered):
         if candidate.effect.name != effect.name:
             continue
         covariance = wide.covariance(np.concatenate([own, places]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,25 +11,25 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Parameter, Told, Values, Whole
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
-from pipeline.criticism.regression.gauss_newton import clipped, gauss_newton
-from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.regression.gauss_newton import gauss_newton
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem
 from pipeline.criticism.residuals.residual import measured, operate
 
 
-def told_by_wholes(segments: Sequence[Segment], fitted: Fitted, effect: Effect) -> Told | None:
+def told_by_wholes(fit: Fit, effect: Effect) -> Told | None:
     """What the closer look of an effect in the model says; None where it has none, or no logs."""
     if effect.closer is None:
         return None
-    model, values = fitted.model.without(effect.name), fitted.values
-    wholes = [_whole(s, model, fitted) for s in segments if s.whole is not None]
+    model, values = fit.model.without(effect.name), fit.values
+    wholes = [_whole(s, model, fit) for s in fit.segments if s.whole is not None]
     return effect.closer(wholes, values_of(effect, model.machine, values))
 
 
-def _whole(segment: Segment, model: Model, fitted: Fitted) -> Whole:
+def _whole(segment: Segment, model: Model, fit: Fit) -> Whole:
     """One log at full rate, as a model without the effect sees it."""
     signals = dict(segment.whole or {})
     good = signals.pop("good") > 0
-    values = fitted.values
+    values = fit.values
     full = replace(segment, recorded=signals, weak=None)
     x = operate(full, signals, model, values)
     drag = evaluate(model, x, values).drag_nm
@@ -69,29 +69,23 @@ def _known(p: Parameter, told: Told) -> Parameter:
     return replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1])
 
 
-def renamed(
-    segments: Sequence[Segment],
-    chosen: tuple[Fitted, System],
-    name: str,
-    library: Mapping[str, Effect],
-) -> tuple[Fitted, System]:
+def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
     """The fit with the effect `name` exchanged for the one that whole logs tell, of those that
     share its closer look, and with the numbers that these logs tell.
     """
-    fitted, around = chosen
-    effect = next(e for e in fitted.model.effects if e.name == name)
-    told = told_by_wholes(segments, fitted, effect)
+    fit = system.fit
+    effect = fit.effect(name)
+    told = told_by_wholes(fit, effect)
     if told is None or told.name not in (name, *kin(effect, library)):
-        return chosen
+        return system
     truth = settled(library[told.name], told)
-    effects = tuple(truth if e.name == name else e for e in fitted.model.effects)
-    model = replace(fitted.model, effects=effects)
+    effects = tuple(truth if e.name == name else e for e in fit.model.effects)
+    model = replace(fit.model, effects=effects)
     own = f"{name}."
-    values = {key: v for key, v in fitted.values.items() if not key.startswith(own)}
-    values |= zero(truth, model)
+    values = fit.without(name).values | zero(truth, model)
     for p in truth.parameters_of(model.machine):
-        if own + p.name in fitted.values:
-            values[f"{truth.name}.{p.name}"] = fitted.values[own + p.name]
+        if own + p.name in fit.values:
+            values[f"{truth.name}.{p.name}"] = fit.values[own + p.name]
     values |= {f"{truth.name}.{key}": value for key, (value, _) in told.values.items()}
-    start = replace(fitted, model=model, values=clipped(model, values))
-    return gauss_newton(segments, start, before=around)
+    start = replace(fit, model=model, values=values).at({})
+    return gauss_newton(start, before=system)

@@ -21,7 +21,7 @@ from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fitted
+from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.residual import disturbed
 from pipeline.records.diagnosis import Remainder
@@ -30,9 +30,7 @@ _WANDERS = ("v", "i", "torque")
 """Beginnings of the names of signals that drift: voltages, currents and torque."""
 
 
-def wandering(
-    segments: Sequence[Segment], fitted: Fitted, left: Sequence[Remainder]
-) -> tuple[Segment, ...] | None:
+def wandering(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...] | None:
     """The segments, knowing the drift that their instruments may have.
 
     None if a fit with that drift leaves anything over the floor. None as well if what is `left` is
@@ -40,12 +38,12 @@ def wandering(
     changes slowly in one.
     """
     captures = {one.capture for one in left}
-    tests = {segment.test for segment in segments if segment.capture in captures}
-    if len(tests) < fitted.policy.selection.drift_tests:
+    tests = {segment.test for segment in fit.segments if segment.capture in captures}
+    if len(tests) < fit.policy.selection.drift_tests:
         return None
-    told = with_wander(segments, fitted.model, fitted.values)
-    _, around = gauss_newton(told, fitted)
-    return None if remainder(around, told, around.residual, large=True) else told
+    told = with_wander(fit.segments, fit.model, fit.values)
+    system = gauss_newton(replace(fit, segments=told))
+    return None if remainder(system, large=True) else told
 
 
 def with_wander(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Segment, ...]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Parameter, Values
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
@@ -35,9 +35,7 @@ from pipeline.criticism.selection.score_test import (
 
 
 def with_starts(
-    segments: Sequence[Segment],
-    wide: System,
-    fitted: Fitted,
+    wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],
     told: NDArray[np.bool_],
@@ -49,13 +47,13 @@ def with_starts(
     if not told.any():
         return tuple(scores)
     best = {score.candidate.effect.name: score for score in scores}
-    thorough = fitted.policy.selection.thorough
-    own = wide.along(range(len(own_columns(fitted.model))))
+    thorough = wide.policy.selection.thorough
+    own = wide.along(wide.own)
     before = Standing.of(own, np.arange(len(own.columns)), own.grams().best(*thorough))
     price = searched(offered)
     for candidate in offered:
-        for parameter in candidate.effect.parameters_of(fitted.model.machine):
-            for score in _tried(segments, own, fitted, candidate, parameter, before, told):
+        for parameter in candidate.effect.parameters_of(wide.fit.machine):
+            for score in _tried(own, candidate, parameter, before, told):
                 known = best.get(candidate.effect.name)
                 if known is None or score.fall > known.fall:
                     best[candidate.effect.name] = replace(score, price=score.price + price)
@@ -63,9 +61,7 @@ def with_starts(
 
 
 def _tried(
-    segments: Sequence[Segment],
-    own: System,
-    fitted: Fitted,
+    own: LinearSystem,
     candidate: Candidate,
     parameter: Parameter,
     before: Standing,
@@ -75,16 +71,16 @@ def _tried(
     if not parameter.starts:
         return ()
     name = f"{candidate.effect.name}.{parameter.name}"
-    scale, policy = fitted.model.machine.scale(parameter), fitted.policy.selection
+    scale, policy = own.fit.machine.scale(parameter), own.policy.selection
 
-    def at(start: float) -> tuple[float, float, System, Descent]:
-        moved = _moved(segments, own, fitted, candidate, {name: start * scale})
+    def at(start: float) -> tuple[float, float, LinearSystem, Descent]:
+        moved = _moved(own, candidate, {name: start * scale})
         end = moved.grams().best(*policy.thorough)
         return end.misfit, start, moved, end
 
     nearest = min((at(start) for start in parameter.starts), key=lambda one: one[:2])
-    around = [at(factor * nearest[1]) for factor in policy.finer_starts]
-    _, start, moved, end = min([nearest, *around], key=lambda one: one[:2])
+    beside = [at(factor * nearest[1]) for factor in policy.finer_starts]
+    _, start, moved, end = min([nearest, *beside], key=lambda one: one[:2])
     places = np.arange(len(own.columns))
     after = Standing.of(moved, places, end)
     found = Score(
@@ -99,32 +95,25 @@ def _tried(
         clears(own, told, before.spreads, after.spreads),
         policy=policy,
     )
-    dof = paid_for(candidate.effect, fitted.model.machine, found)
+    dof = paid_for(candidate.effect, own.fit.machine, found)
     search = 2.0 * math.log(len(parameter.starts) + len(policy.finer_starts))
     return (replace(found, price=dof * math.log(own.size) + search),)
 
 
-def _moved(
-    segments: Sequence[Segment],
-    own: System,
-    fitted: Fitted,
-    candidate: Candidate,
-    start: Values,
-) -> System:
+def _moved(own: LinearSystem, candidate: Candidate, start: Values) -> LinearSystem:
     """The system with its residual where the candidate's amplitude is at a start, and the columns
     of where it is not.
     """
-    effect, model = candidate.effect, fitted.model.with_effects(candidate.effect)
-    values = {**fitted.values, **candidate.values, **start}
-    none = tuple(np.zeros(sigma.size) for sigma in fitted.sigma)
-    floors = tuple(zip(fitted.sigma, fitted.tolerance or none, strict=True))
+    fit, effect = own.fit, candidate.effect
+    model = fit.model.with_effects(effect)
+    values = {**fit.values, **candidate.values, **start}
+    segments, floors = fit.segments, tuple(fit.floors)
     heard = [number for number, segment in enumerate(segments) if observes(segment, effect)]
-    each = [(model, values, *floors[number], fitted.near) for number in heard]
+    each = [(model, values, *floors[number], fit.near) for number in heard]
     rows = on_each(_residual, [segments[number] for number in heard], each)
     residual = own.residual.copy()
-    segment = np.array([number for number, _, _ in own.labels])[own.group]
     for number, row in zip(heard, rows, strict=True):
-        residual[segment == number] = row
+        residual[own.segment == number] = row
     return replace(own, residual=residual)
 
 

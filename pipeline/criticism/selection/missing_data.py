@@ -45,13 +45,13 @@ def unexcited(
     """Effects that no capture here would show at typical size, for want of their first test or of
     a signal in it; each with the tests that are not there.
     """
-    inside = {effect.name for effect in last.fitted.model.effects}
-    least, found = last.fitted.policy.selection.visible_u, []
+    inside = {effect.name for effect in last.system.fit.model.effects}
+    least, found = last.system.policy.selection.visible_u, []
     for name, effect in library.items():
         lacking = tuple(test for test in effect.tests if not _holds(campaign, effect, test))
         if name in inside or not lacking or lacking[0] != effect.tests[0]:
             continue
-        if detectable(effect, last.fitted, last.around, offered) < least:
+        if detectable(effect, last.system, offered) < least:
             signals = _missing(campaign, effect, lacking)
             found.append(Unexcited(name, lacking, effect.experiment, signals))
     return tuple(found)

@@ -28,21 +28,21 @@ from pipeline.criticism.effect import Array, Complex
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.goodness import material_size
-from pipeline.criticism.regression.linear_system import System
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.orders import TURN_RAD
 from pipeline.numerics.projection import Projection, bump
 
 
-def orders_left(segments: Sequence[Segment], around: System) -> tuple[float, ...]:
+def orders_left(system: LinearSystem) -> tuple[float, ...]:
     """Orders that two captures have over what is beside them and in a size that matters, of those
     that no equation looks at; one that is no whole number as close as their angles tell it.
     """
-    policy = around.policy.order_scan
+    policy = system.policy.order_scan
     lines = [
         (order, log)
-        for segment in segments
-        for log in _logs(segment, around)
+        for segment in system.segments
+        for log in _logs(segment, system)
         for order in _lines(log, policy)
         if order not in log.looked_at
     ]
@@ -129,23 +129,23 @@ Line = tuple[float, Log]
 """An order that stands out of a log."""
 
 
-def _logs(segment: Segment, around: System) -> Iterator[Log]:
+def _logs(segment: Segment, system: LinearSystem) -> Iterator[Log]:
     weak, theta = segment.weak, segment.recorded.get("theta_mech_rad")
     if not equation_of(segment).use.currents or weak is None or theta is None:
         return
     if not (weak.orders > 0).any():
         return
     weight = _weight(weak, segment.size)
-    rows = list(_parts(theta, weight, around.policy.order_scan))
+    rows = list(_parts(theta, weight, system.policy.order_scan))
     if not rows:
         return
-    fitted, current = around.around, segment.recorded["iq_a"]
-    left = residual(segment, fitted.model, fitted.values)
+    fit, current = system.fit, segment.recorded["iq_a"]
+    left = residual(segment, fit.model, fit.values)
     looked_at = frozenset(weak.orders.tolist())
     for channel, one in zip(segment.channels, left, strict=True):
         parts = tuple(Part(one[r], theta[r], weight[r], current[r]) for r in rows)
         whole = Part(one, theta, weight, current)
-        least = material_size(segment, channel, around)
+        least = material_size(segment, channel, fit)
         yield Log(segment.capture, channel, whole, parts, least, looked_at)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_fit
-from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import Hum, hum_of, with_hum
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
@@ -18,11 +18,9 @@ from pipeline.criticism.selection.stepwise import begun
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """A model fitted to segments, which know the mains lines in them; the system around it."""
+    """The system around a model fitted to segments, which know the mains lines in them."""
 
-    segments: tuple[Segment, ...]
-    fitted: Fitted
-    around: System
+    system: LinearSystem
     hum: tuple[Hum, ...]
 
 
@@ -41,21 +39,22 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     near = rough_fit(segments, model.without(*shaped))
     hum = hum_of(segments, near.model, near.values)
     heard = with_hum(segments, hum, near.model, near.values)
-    fitted, around = first_fit(heard, near)
+    system = first_fit(replace(near, segments=heard))
     if not shaped:
-        return Begun(heard, fitted, around, hum)
+        return Begun(system, hum)
     while shaped:
-        offered = candidates(shaped, fitted)
-        wide = widened(heard, fitted, offered, around)
-        scores = score_all(wide, fitted, offered)
+        offered = candidates(shaped, system.fit.model)
+        wide = widened(system.fit, offered, system)
+        scores = score_all(wide, offered)
         if not scores:
             break
         del shaped[scores[0].candidate.effect.name]
-        fitted, around = gauss_newton(heard, begun(fitted, scores[0]), before=wide)
-    for effect in fitted.model.effects:
-        fitted, around = renamed(heard, (fitted, around), effect.name, {effect.name: effect})
-    settled = {effect.name: effect for effect in fitted.model.effects}
+        system = gauss_newton(begun(system.fit, scores[0]), before=wide)
+    for effect in system.fit.model.effects:
+        system = renamed(system, effect.name, {effect.name: effect})
+    fit = system.fit
+    settled = {effect.name: effect for effect in fit.model.effects}
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
     unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
-    whole = replace(fitted, model=model, values={**fitted.values, **unheard})
-    return Begun(heard, *reconsidered(heard, *gauss_newton(heard, whole)), hum)
+    whole = replace(fit, model=model, values={**fit.values, **unheard})
+    return Begun(reconsidered(gauss_newton(whole)), hum)

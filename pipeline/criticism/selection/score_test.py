@@ -8,18 +8,22 @@ search over candidates.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
-from pipeline.criticism.machine.model import zero
+from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.selection import Selection
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linear_system import (
+    Fit,
+    LinearSystem,
+    linear_system,
+    own_columns,
+)
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.criticism.regression.normal_equations import Descent, Grams, misfit_of
 
@@ -106,15 +110,14 @@ class Standing:
     prior_cost: float
 
     @classmethod
-    def of(cls, around: System, places: NDArray[np.int64], end: Descent) -> Standing:
+    def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> Standing:
         """Where a descent along `places` left the system."""
-        cost = float(around.prior_costs(places, end.step).sum())
+        cost = float(system.prior_costs(places, end.step).sum())
         return cls(end.misfit, end.spreads, cost)
 
 
-def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate, ...]:
+def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, ...]:
     """Every effect that is not in the model, once for each combination of trial shapes."""
-    model = fitted.model
     inside = {effect.name for effect in model.effects}
     found = []
     for effect in library.values():
@@ -131,11 +134,8 @@ def candidates(library: Mapping[str, Effect], fitted: Fitted) -> tuple[Candidate
 
 
 def widened(
-    segments: Sequence[Segment],
-    fitted: Fitted,
-    offered: Sequence[Candidate],
-    before: System | None = None,
-) -> System:
+    fit: Fit, offered: Sequence[Candidate], before: LinearSystem | None = None
+) -> LinearSystem:
     """The system around a fit with the candidates' columns behind its own, in order.
 
     The candidates' may stay as they were in `before`. Its own are made anew: what the station's
@@ -144,14 +144,15 @@ def widened(
     """
     columns = [c for candidate in offered for c in candidate.columns]
     if before is not None:
-        own = {column.key for column in own_columns(fitted.model)}
-        before = before.along([n for n, c in enumerate(before.columns) if c.key not in own])
-    return system(segments, fitted, columns, before)
+        own = {column.key for column in own_columns(fit.model)}
+        before = before.along(
+            np.array([n for n, c in enumerate(before.columns) if c.key not in own], dtype=int)
+        )
+    return linear_system(fit, columns, before)
 
 
 def score_all(
-    around: System,
-    fitted: Fitted,
+    system: LinearSystem,
     offered: Sequence[Candidate],
     told: NDArray[np.bool_] | None = None,
 ) -> tuple[Score, ...]:
@@ -159,23 +160,30 @@ def score_all(
 
     `told` [G] are groups that would be told as a remainder if nothing were added.
     """
-    by = _Scoring.of(around, fitted, told)
-    price = math.log(float(around.size))
+    by, policy = _Scoring.of(system, told), system.policy.selection
+    price = math.log(float(system.size))
     search_price = searched(offered)
     best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
-    first = by.own.size
-    for candidate in offered:
-        places = np.arange(first, first + len(candidate.columns))
-        first += len(candidate.columns)
-        score = by.score(candidate, places, fitted.policy.selection.quick)
-        cost = paid_for(candidate.effect, fitted.model.machine, score) * price + search_price
-        if score is not None and score.fall > fitted.policy.selection.quick_penalties * cost:
-            score = by.score(candidate, places, fitted.policy.selection.thorough)
+    for candidate, places in placed(system, offered):
+        score = by.score(candidate, places, policy.quick)
+        cost = paid_for(candidate.effect, system.fit.machine, score) * price + search_price
+        if score is not None and score.fall > policy.quick_penalties * cost:
+            score = by.score(candidate, places, policy.thorough)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known[0].fall):
             best[candidate.effect.name] = replace(score, price=cost), places
     found = [replace(one, shadow=by.shadow(one, best)) for one, _ in best.values()]
     return tuple(sorted(found, key=lambda s: (-s.fall, s.candidate.effect.name)))
+
+
+def placed(
+    wide: LinearSystem, offered: Sequence[Candidate]
+) -> Iterator[tuple[Candidate, NDArray[np.int64]]]:
+    """Every candidate of a widened system with the places of its columns there."""
+    first = wide.own.size
+    for candidate in offered:
+        yield candidate, np.arange(first, first + len(candidate.columns))
+        first += len(candidate.columns)
 
 
 def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
@@ -199,19 +207,18 @@ class _Scoring:
     alone fit, groups [G] that are then told as a remainder.
     """
 
-    around: System
+    system: LinearSystem
     grams: Grams
-    fitted: Fitted
     own: NDArray[np.int64]
     before: Standing
     told: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, around: System, fitted: Fitted, told: NDArray[np.bool_] | None) -> _Scoring:
-        own, grams = np.arange(len(own_columns(fitted.model))), around.grams()
-        before = Standing.of(around, own, grams.along(own).best())
-        left = np.zeros(len(around.labels), dtype=bool) if told is None else told
-        return cls(around, grams, fitted, own, before, left)
+    def of(cls, system: LinearSystem, told: NDArray[np.bool_] | None) -> _Scoring:
+        own, grams = system.own, system.grams()
+        before = Standing.of(system, own, grams.along(own).best())
+        left = np.zeros(len(system.labels), dtype=bool) if told is None else told
+        return cls(system, grams, own, before, left)
 
     def score(
         self,
@@ -220,7 +227,7 @@ class _Scoring:
         effort: tuple[tuple[float, ...], int],
     ) -> Score | None:
         """Score of one candidate with parameters on the wrong side of a bound left at zero."""
-        around, machine = self.around, self.fitted.model.machine
+        system, machine = self.system, self.system.fit.machine
         known = {
             f"{candidate.effect.name}.{p.name}": (p, machine.scale(p))
             for p in candidate.effect.parameters_of(machine)
@@ -229,11 +236,11 @@ class _Scoring:
         while live.size:
             end = self.grams.along(np.concatenate([self.own, live])).best(*effort)
             steps = end.step[self.own.size :].tolist()
-            mine = dict(zip((around.columns[n].name for n in live), steps, strict=True))
+            mine = dict(zip((system.columns[n].name for n in live), steps, strict=True))
             wrong = [
                 n
                 for n in live
-                if _outside(mine[around.columns[n].name], known[around.columns[n].name][0])
+                if _outside(mine[system.columns[n].name], known[system.columns[n].name][0])
             ]
             if not wrong:
                 break
@@ -245,20 +252,20 @@ class _Scoring:
             for name, value in mine.items()
             if known[name][0].negligible > 0
         ]
-        after = Standing.of(around, np.concatenate([self.own, live]), end)
-        names = (around.columns[n].name for n in self.own)
+        after = Standing.of(system, np.concatenate([self.own, live]), end)
+        names = (system.columns[n].name for n in self.own)
         return Score(
             candidate,
             self.before.misfit - after.misfit,
             0.0,
             mine,
             dict(zip(names, end.step[: self.own.size].tolist(), strict=True)),
-            share_of(around, candidate.effect, self.before, after),
+            share_of(system, candidate.effect, self.before, after),
             max(sizes, default=math.inf),
-            quiet_fall(around, self.before.spreads, after.spreads),
+            quiet_fall(system, self.before.spreads, after.spreads),
             candidate.effect.closer is None
-            and clears(around, self.told, self.before.spreads, after.spreads),
-            policy=self.fitted.policy.selection,
+            and clears(system, self.told, self.before.spreads, after.spreads),
+            policy=system.policy.selection,
         )
 
     def shadow(
@@ -282,7 +289,7 @@ class _Scoring:
         if not small:
             return None
         clearest, beside = max(small, key=lambda pair: pair[0].fall)
-        thorough = self.fitted.policy.selection.thorough
+        thorough = self.system.policy.selection.thorough
         _, mine = best[score.candidate.effect.name]
         without = self.grams.along(np.concatenate([self.own, beside])).best(*thorough)
         both = self.grams.along(np.concatenate([self.own, beside, mine])).best(*thorough)
@@ -290,12 +297,12 @@ class _Scoring:
         return None if worth else clearest.candidate.effect.name
 
 
-def clears(around: System, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
+def clears(system: LinearSystem, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
     """Whether most of the power over the floor goes, between two sets of χ²/n [G], of the groups
     that are `told` [G] as a remainder.
     """
-    over, left = (around.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
-    most = around.policy.selection.clears_share * float(over[told].sum())
+    over, left = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
+    most = system.policy.selection.clears_share * float(over[told].sum())
     return bool(told.any()) and float(left[told].sum()) < most
 
 
@@ -303,7 +310,7 @@ def _outside(value: float, parameter: Parameter) -> bool:
     return (value < 0 <= parameter.low) or (value > 0 >= parameter.high)
 
 
-def share_of(around: System, effect: Effect, before: Standing, after: Standing) -> float:
+def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Standing) -> float:
     """Largest share of the removable misfit that went away: of one recorded signal, of the
     captures of the tests that excite the effect, or of what the priors of the station cost; but of
     a signal's error no more than the share of its power, at one order, that went with it.
@@ -311,47 +318,47 @@ def share_of(around: System, effect: Effect, before: Standing, after: Standing) 
     Small excesses do not count (`excess`, `excess_a_sample`): drift and unmodelled effects are
     deviance that many candidates partly absorb.
     """
-    policy = around.policy.selection
-    excess = around.counts * np.log(np.maximum(before.spreads, 1.0))
-    left = around.counts * np.log(np.maximum(after.spreads, 1.0))
-    channel = np.array([name for _, name, _ in around.labels])
+    policy = system.policy.selection
+    excess = system.counts * np.log(np.maximum(before.spreads, 1.0))
+    left = system.counts * np.log(np.maximum(after.spreads, 1.0))
+    channel = np.array([name for _, name, _ in system.labels])
     places = [channel == name for name in dict.fromkeys(channel.tolist())]
-    places.append(np.array([around.tests[n] in effect.tests for n, _, _ in around.labels]))
+    places.append(np.array([system.segments[n].test in effect.tests for n, _, _ in system.labels]))
     shares = [0.0]
     for place in places:
         had = float(excess[place].sum())
-        if had > min(policy.excess, policy.excess_a_sample * float(around.counts[place].sum())):
+        if had > min(policy.excess, policy.excess_a_sample * float(system.counts[place].sum())):
             shares.append(1.0 - float(left[place].sum()) / had)
-    error = min(max(shares), power_share(around, before.spreads, after.spreads))
+    error = min(max(shares), power_share(system, before.spreads, after.spreads))
     cost = before.prior_cost
     return max(error, 1.0 - after.prior_cost / cost if cost > policy.excess else 0.0)
 
 
-def quiet_fall(around: System, before: Array, after: Array) -> float:
+def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
     """Fall of misfit between two sets of χ²/n [G], in signals without an excess that counts."""
-    fall, policy = 0.0, around.policy.selection
-    channel = np.array([name for _, name, _ in around.labels])
+    fall, policy = 0.0, system.policy.selection
+    channel = np.array([name for _, name, _ in system.labels])
     for name in dict.fromkeys(channel.tolist()):
         mine = channel == name
-        counts = around.counts[mine]
+        counts = system.counts[mine]
         excess = float(counts @ np.log(np.maximum(before[mine], 1.0)))
         if excess <= min(policy.excess, policy.excess_a_sample * float(counts.sum())):
             fall += misfit_of(counts, before[mine]) - misfit_of(counts, after[mine])
     return fall
 
 
-def power_share(around: System, before: Array, after: Array) -> float:
+def power_share(system: LinearSystem, before: Array, after: Array) -> float:
     """Largest share of the power over the noise floor, of one signal at one order, that went away
     between two sets of χ²/n [G].
     """
     numbers: dict[tuple[str, int], int] = {}
-    pool = [numbers.setdefault((name, k), len(numbers)) for _, name, k in around.labels]
-    count = np.bincount(pool, around.counts)
-    nats = np.bincount(pool, around.counts * np.log(np.maximum(before, 1.0)))
+    pool = [numbers.setdefault((name, k), len(numbers)) for _, name, k in system.labels]
+    count = np.bincount(pool, system.counts)
+    nats = np.bincount(pool, system.counts * np.log(np.maximum(before, 1.0)))
     had, has = (
-        np.bincount(pool, around.counts * np.maximum(spreads - 1.0, 0.0))
+        np.bincount(pool, system.counts * np.maximum(spreads - 1.0, 0.0))
         for spreads in (before, after)
     )
-    policy = around.policy.selection
+    policy = system.policy.selection
     worth = nats > np.minimum(policy.excess, policy.excess_a_sample * count)
     return float((1.0 - has[worth] / had[worth]).max(initial=0.0))

@@ -6,16 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.machine.model import values_of
 from pipeline.criticism.regression.goodness import HeldOut, remainder, told_groups
-from pipeline.criticism.regression.linear_system import System, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.selection.stepwise import Rung
 from pipeline.records.diagnosis import Remainder
 
 
 def trusted(
-    found: Sequence[Segment], rungs: Sequence[Rung], held: Sequence[HeldOut]
+    rungs: Sequence[Rung], held: Sequence[HeldOut]
 ) -> tuple[tuple[Rung, ...], tuple[Remainder, ...]]:
     """The ladder without unsupported trailing steps, and what is left over the floor at its end.
 
@@ -26,10 +25,10 @@ def trusted(
        the step cleared a signal of all waves of the angle;
     3. came after the first effect and lowered the held-out error by less than `little_share`.
     """
-    policy = rungs[0].fitted.policy.selection
+    policy = rungs[0].fit.policy.selection
     for count in range(len(rungs), 0, -1):
-        kept, around = tuple(rungs[:count]), rungs[count - 1].around
-        left = remainder(around, found, around.residual)
+        kept, system = tuple(rungs[:count]), rungs[count - 1].system
+        left = remainder(system)
         most = (1.0 - policy.little_share) * held[count - 2].total
         worse = count > 2 and held[count - 1].total > most
         if count == 1 or not left or (explained(kept, held, left) and not worse):
@@ -38,7 +37,7 @@ def trusted(
             continue
         if held[count - 1].total < (1.0 - policy.guess_share) * held[count - 2].total:
             break
-        if not worse and _clears_orders(found, rungs[count - 2].around, around):
+        if not worse and _clears_orders(rungs[count - 2].system, system):
             break
     return kept, left
 
@@ -48,14 +47,14 @@ def denied(rung: Rung) -> str:
     amplitude of it that they know is not half of the one that it should come to
     (`Parameter.at_least`).
     """
-    around, model = rung.around, rung.fitted.model
-    share = rung.fitted.policy.selection.companion_share
+    system, model = rung.system, rung.fit.model
+    share = rung.fit.policy.selection.companion_share
     for effect in model.effects:
         if effect.name not in rung.added[-1:]:
             continue
-        values = values_of(effect, model.machine, rung.fitted.values)
+        values = values_of(effect, model.machine, rung.fit.values)
         for p in effect.parameters_of(model.machine):
-            known = np.any(around.matrix[:, around.place([f"{effect.name}.{p.name}"])])
+            known = np.any(system.matrix[:, system.place([f"{effect.name}.{p.name}"])])
             if p.at_least and known and values[p.name] < share * values[p.at_least]:
                 other = f"{p.at_least} of {values[p.at_least]:.2g}"
                 return (
@@ -65,19 +64,19 @@ def denied(rung: Rung) -> str:
     return ""
 
 
-def _clears_orders(found: Sequence[Segment], before: System, after: System) -> bool:
+def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
     """Whether some signal had waves of the angle over its floor before a step, and none after it.
 
     Cogging is no guess where it takes every wave there was in a torque, however much a drag of
     nobody's library leaves at order nought, or another capture in a voltage.
     """
-    return bool(_waved(found, before) - _waved(found, after))
+    return bool(_waved(before) - _waved(after))
 
 
-def _waved(found: Sequence[Segment], around: System) -> set[str]:
+def _waved(system: LinearSystem) -> set[str]:
     """Signals with waves of the angle that are reported."""
-    told = told_groups(around, found)
-    return {c for (_, c, order), over in zip(around.labels, told, strict=True) if over and order}
+    told = told_groups(system)
+    return {c for (_, c, order), over in zip(system.labels, told, strict=True) if over and order}
 
 
 def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Remainder]) -> bool:
@@ -89,7 +88,7 @@ def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Rem
     logarithmic: of an equation that is given up at a million floors it takes half to come to a
     thousand.
     """
-    policy = rungs[0].fitted.policy.selection
+    policy = rungs[0].fit.policy.selection
     first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(rungs) - 1))
     if last > policy.unexplained_share * first:
         return not left
@@ -104,8 +103,7 @@ def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Rem
 
 
 def _excess(rung: Rung, channels: set[str]) -> float:
-    around = rung.around
-    own = np.arange(len(own_columns(rung.fitted.model)))
-    spreads = around.grams(own).best().spreads
-    inside = np.array([channel in channels for _, channel, _ in around.labels])
-    return float((around.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())
+    system = rung.system
+    spreads = system.grams(system.own).best().spreads
+    inside = np.array([channel in channels for _, channel, _ in system.labels])
+    return float((system.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())

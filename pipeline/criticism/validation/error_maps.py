@@ -14,7 +14,7 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.validation import Validation
-from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.cell_means import cell_means, visits_of
@@ -55,16 +55,17 @@ def unit_of(signal: str) -> str:
     return SUFFIX_UNITS.get(suffix_of(signal), "1")
 
 
-def window_errors(found: Sequence[Segment], around: System, whitened: Array) -> tuple[Errors, ...]:
+def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
     """Every signal's errors in the plain windows of all captures, from whitened residuals [R]."""
+    found = system.segments
     parts: dict[str, list[tuple[int, NDArray[np.bool_]]]] = {}
-    for place, (number, channel, order) in enumerate(around.labels):
-        mine = around.group == place
+    for place, (number, channel, order) in enumerate(system.labels):
+        mine = system.group == place
         if order == 0 and found[number].weak is not None and mine.any():
             parts.setdefault(reported_signal(found[number], channel), []).append((number, mine))
     told = [window_variables(segment) for segment in found]
     return tuple(
-        _errors_of(signal, groups, found, told, around, whitened)
+        _errors_of(signal, groups, told, system, whitened)
         for signal, groups in sorted(parts.items())
     )
 
@@ -72,17 +73,16 @@ def window_errors(found: Sequence[Segment], around: System, whitened: Array) -> 
 def _errors_of(
     signal: str,
     groups: Sequence[tuple[int, NDArray[np.bool_]]],
-    found: Sequence[Segment],
     told: Sequence[Mapping[str, Array]],
-    around: System,
+    system: LinearSystem,
     whitened: Array,
 ) -> Errors:
-    unit = np.concatenate([around.unit[mine] for _, mine in groups])
-    soft = np.concatenate([around.soft[mine] for _, mine in groups])
+    unit = np.concatenate([system.unit[mine] for _, mine in groups])
+    soft = np.concatenate([system.soft[mine] for _, mine in groups])
 
     def variable(name: str, number: int, mine: NDArray[np.bool_]) -> Array:
-        values = told[number].get(name, np.full(found[number].size, np.nan))
-        chosen: Array = values[around.window[mine]]
+        values = told[number].get(name, np.full(system.segments[number].size, np.nan))
+        chosen: Array = values[system.window[mine]]
         return chosen
 
     names = sorted({name for number, _ in groups for name in told[number]})
@@ -91,7 +91,7 @@ def _errors_of(
         np.concatenate([whitened[mine] for _, mine in groups]) * unit,
         unit * soft,
         np.concatenate([np.full(int(mine.sum()), number) for number, mine in groups]),
-        np.concatenate([around.window[mine] for _, mine in groups]),
+        np.concatenate([system.window[mine] for _, mine in groups]),
         {name: np.concatenate([variable(name, *group) for group in groups]) for name in names},
     )
 
@@ -198,7 +198,7 @@ def _place(value: Array, bins: Bins) -> NDArray[np.int64]:
     return np.searchsorted(inner, value, side="right").astype(np.int64)
 
 
-def angle_maps(found: Sequence[Segment], fitted: Fitted) -> tuple[ErrorMap, ...]:
+def angle_maps(fit: Fit) -> tuple[ErrorMap, ...]:
     """Mean error over the electrical and the mechanical angle of a turn, sample by sample.
 
     Each window's mean is taken off first: what is left is what turns with the shaft. A window is
@@ -206,14 +206,14 @@ def angle_maps(found: Sequence[Segment], fitted: Fitted) -> tuple[ErrorMap, ...]
     """
     parts: dict[tuple[str, str], list[tuple[Array, Array, Array, Array]]] = {}
     cells = {
-        "theta_elec_rad": fitted.policy.validation.angle_cells,
-        "theta_mech_rad": _mechanical_cells(fitted.model),
+        "theta_elec_rad": fit.policy.validation.angle_cells,
+        "theta_mech_rad": _mechanical_cells(fit.model),
     }
     first = 0
-    for segment in found:
+    for segment in fit.segments:
         if segment.weak is None or not _turns(segment):
             continue
-        for signal, variable, part in _by_angle(segment, fitted, cells, first):
+        for signal, variable, part in _by_angle(segment, fit, cells, first):
             parts.setdefault((signal, variable), []).append(part)
         first += segment.weak.starts.size
     made = []
@@ -239,21 +239,21 @@ def _mechanical_cells(model: Model) -> int:
 
 
 def _by_angle(
-    segment: Segment, fitted: Fitted, cells: Mapping[str, int], first: int
+    segment: Segment, fit: Fit, cells: Mapping[str, int], first: int
 ) -> Iterator[tuple[str, str, tuple[Array, Array, Array, Array]]]:
     weak = segment.weak
     if weak is None:
         return
-    left = residual(segment, fitted.model, fitted.values)
+    left = residual(segment, fit.model, fit.values)
     theta = segment.recorded["theta_mech_rad"]
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(2, weak.length - 2)[None, :]
     window = np.broadcast_to(first + np.arange(starts.size)[:, None], rows.shape).ravel()
     own_zero = "bench_angle_rad" in equation_of(segment).observes.constants
     # the bench's encoder has a zero of its own, which is known as an electrical angle alone
-    zero_rad = fitted.values["bench_angle_rad"] if own_zero else 0.0
+    zero_rad = fit.values["bench_angle_rad"] if own_zero else 0.0
     turned = {
-        "theta_elec_rad": fitted.model.machine.pole_pairs * theta - zero_rad,
+        "theta_elec_rad": fit.model.machine.pole_pairs * theta - zero_rad,
         "theta_mech_rad": theta,
     }
     for place, channel in enumerate(segment.channels):
@@ -288,13 +288,12 @@ def histograms(errors: Sequence[Errors], policy: Validation) -> tuple[Histogram,
     return tuple(made)
 
 
-def all_maps(
-    found: Sequence[Segment], around: System, residual_over_floor: Array, fitted: Fitted
-) -> tuple[ErrorMap, ...]:
+def all_maps(system: LinearSystem, residual_over_floor: Array) -> tuple[ErrorMap, ...]:
     """Every map of every signal: speed and current, angles, and one curve a variable."""
     made: list[ErrorMap | None] = []
-    for errors in window_errors(found, around, residual_over_floor):
-        made.append(speed_current_map(errors, fitted.policy.validation))
-        made.extend(curve(errors, variable, fitted.policy.validation) for variable in CURVES)
+    policy = system.policy.validation
+    for errors in window_errors(system, residual_over_floor):
+        made.append(speed_current_map(errors, policy))
+        made.extend(curve(errors, variable, policy) for variable in CURVES)
         made.append(direction(errors))
-    return (*(one for one in made if one is not None), *angle_maps(found, fitted))
+    return (*(one for one in made if one is not None), *angle_maps(system.fit))

@@ -13,9 +13,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.regression.gauss_newton import clipped
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import Fitted, System
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import disjoint, unit_of
 from pipeline.criticism.validation.free_run import Run, free_run
@@ -35,26 +34,21 @@ class Simulated:
 
 
 def values_without(
-    number: int, fitted: Fitted, around: System, held: HeldOut
+    number: int, system: LinearSystem, held: HeldOut
 ) -> tuple[dict[str, float], Split]:
     """Parameters fitted without a capture; those of the full fit where it alone carries one."""
     step = held.steps.get(number)
-    values = dict(fitted.values)
     if step is None:
-        return values, "fit"
-    for column, change in zip(around.columns[: step.size], step.tolist(), strict=True):
-        values[column.name] += change
-    return clipped(fitted.model, values), "held_out"
+        return system.fit.values, "fit"
+    return system.fit.moved(system.columns[: step.size], step).values, "held_out"
 
 
-def simulate(
-    found: Sequence[Segment], fitted: Fitted, around: System, held: HeldOut
-) -> tuple[Simulated, ...]:
+def simulate(system: LinearSystem, held: HeldOut) -> tuple[Simulated, ...]:
     """Free runs of every capture that allows one."""
     made = []
-    for number, segment in enumerate(found):
-        values, split = values_without(number, fitted, around, held)
-        run = free_run(segment, fitted.model, values)
+    for number, segment in enumerate(system.segments):
+        values, split = values_without(number, system, held)
+        run = free_run(segment, system.fit.model, values)
         if run is not None:
             made.append(Simulated(number, split, values, run))
     return tuple(made)
@@ -89,20 +83,18 @@ def effective(residual: Array) -> float:
     return n * (1.0 - max(r, 0.0)) / (1.0 + max(r, 0.0))
 
 
-def traces(
-    found: Sequence[Segment], fitted: Fitted, simulated: Sequence[Simulated]
-) -> Iterator[Trace]:
+def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
     """Recorded and predicted signals of the simulated captures, window by window."""
     for one in simulated:
-        segment, run = found[one.number], one.run
+        segment, run = fit.segments[one.number], one.run
         if equation_of(segment).use.currents:
-            yield from _equations(segment, fitted, one)
+            yield from _equations(segment, fit, one)
         for signal in run.signals:
             told, made = run.recorded[signal], run.simulated[signal]
             yield _trace(segment, signal, "free_run", one.split, run.t_s, told, made)
 
 
-def _equations(segment: Segment, fitted: Fitted, one: Simulated) -> Iterator[Trace]:
+def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
     """What the equations predict from the recorded state, averaged over a millisecond.
 
     Without the mean, the noise of the angle's second difference would cover the torque.
@@ -110,8 +102,8 @@ def _equations(segment: Segment, fitted: Fitted, one: Simulated) -> Iterator[Tra
     weak = segment.weak
     if weak is None:
         return
-    left = residual(segment, fitted.model, one.values)
-    width = max(2 * round(fitted.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
+    left = residual(segment, fit.model, one.values)
+    width = max(2 * round(fit.policy.validation.look_s / segment.ts_s / 2) + 1, 1)
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):

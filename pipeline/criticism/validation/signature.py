@@ -8,7 +8,7 @@ which the change of the error is largest beside what is left of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,6 @@ class _Curve:
 
 
 def signature(
-    found: Sequence[Segment],
     rungs: tuple[Rung, Rung],
     records: tuple[LadderRung, LadderRung],
 ) -> Signature | None:
@@ -68,8 +67,6 @@ def signature(
 
     Parameters
     ----------
-    found : sequence of Segment
-        What the rungs were fitted to.
     rungs : pair of Rung
         Without and with what came.
     records : pair of LadderRung
@@ -81,13 +78,13 @@ def signature(
         An error of acceleration is told as torque, by the inertia that was fitted.
 
     """
-    curves = [*_window_curves(found, rungs), *_turn_curves(records)]
+    curves = [*_window_curves(rungs), *_turn_curves(records)]
     if not curves:
         return None
     best = max(curves, key=lambda one: one.contrast)
     scale, signal = 1.0, best.signal
     if signal == _ACCELERATION:
-        scale, signal = rungs[1].fitted.values["j_kgm2"], _TORQUE
+        scale, signal = rungs[1].fit.values["j_kgm2"], _TORQUE
     return Signature(
         signal,
         unit_of(signal),
@@ -100,10 +97,10 @@ def signature(
     )
 
 
-def _window_curves(found: Sequence[Segment], rungs: tuple[Rung, Rung]) -> Iterator[_Curve]:
+def _window_curves(rungs: tuple[Rung, Rung]) -> Iterator[_Curve]:
     """Window errors of every signal of every capture over every variable that was recorded."""
     told = [
-        {one.signal: one for one in window_errors(found, rung.around, rung.around.residual)}
+        {one.signal: one for one in window_errors(rung.system, rung.system.residual)}
         for rung in rungs
     ]
     for signal, before in told[0].items():
@@ -112,7 +109,7 @@ def _window_curves(found: Sequence[Segment], rungs: tuple[Rung, Rung]) -> Iterat
             continue
         for number in np.unique(before.segment).tolist():
             mine = before.segment == number
-            yield from _of_capture(found[number], before, after, mine)
+            yield from _of_capture(rungs[0].system.segments[number], before, after, mine)
 
 
 def _of_capture(

@@ -11,7 +11,7 @@ from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import GAINS, STATE, Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.numerics.projection import projection
 
 BASE = {
@@ -161,15 +161,15 @@ LIBRARY = {
 def fitted(segments, **start):
     """The fit from the true constants, or from others that are given."""
     model = Model(machine(), ())
-    begun = Fitted(model, {**BASE, **start}, floors(segments, model, BASE), BASE)
-    return gauss_newton(segments, begun)[0]
+    begun = Fit(tuple(segments), model, {**BASE, **start}, floors(segments, model, BASE), BASE)
+    return gauss_newton(begun).fit
 
 
 def cautious(segments, times):
     """A fit whose noise floors are some times what the sensors' noise makes."""
     model = Model(machine(), ())
     sigma = tuple(times * one for one in floors(segments, model, BASE))
-    return gauss_newton(segments, Fitted(model, dict(BASE), sigma, BASE))[0]
+    return gauss_newton(Fit(tuple(segments), model, dict(BASE), sigma, BASE)).fit
 
 
 def with_drag(drag, seed=5):

@@ -24,10 +24,10 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
         return 0.03 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    last = search(segments, fitted(segments), library)[-1]
+    last = search(fitted(segments), library)[-1]
     assert last.added in {("windage",), ("brake",)}
-    offered = candidates(library, last.fitted)
-    rivals = rivals_of(last.added[0], last.fitted, last.around, offered, segments)
+    offered = candidates(library, last.fit.model)
+    rivals = rivals_of(last.added[0], last.system, offered)
     assert set(rivals) == {"windage", "brake"} - set(last.added)
 
 
@@ -35,11 +35,11 @@ def test_a_rival_is_told_whatever_size_it_comes_out_at():
     """That it would be too small to matter does not part it from what it is confused with."""
     twin = replace(asking_for(0.1)["windage"], name="brake")
     segments = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
-    fit = search(segments, fitted(segments), LIBRARY)[-1].fitted
+    fit = search(fitted(segments), LIBRARY)[-1].fit
     assert [effect.name for effect in fit.model.effects] == ["windage"]
-    offered = candidates({**LIBRARY, "brake": twin}, fit)
-    around = widened(segments, fit, offered)
-    assert rivals_of("windage", fit, around, offered, segments) == ("brake",)
+    offered = candidates({**LIBRARY, "brake": twin}, fit.model)
+    system = widened(fit, offered)
+    assert rivals_of("windage", system, offered) == ("brake",)
 
 
 @pytest.mark.parametrize("told", ["brake", "windage", None])
@@ -57,13 +57,13 @@ def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
         return 0.03 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    last = search(segments, fitted(segments), library)[-1]
+    last = search(fitted(segments), library)[-1]
     assert len(last.added) == 1
     name = last.added[0]
-    offered = candidates(library, last.fitted)
-    rivals = rivals_of(name, last.fitted, last.around, offered, segments)
+    offered = candidates(library, last.fit.model)
+    rivals = rivals_of(name, last.system, offered)
     if told is None:
         assert set(rivals) == {"windage", "brake"} - {name}
         return
     assert (name, rivals) == (told, ())
-    assert last.fitted.values[f"{told}.drag_nm"] == pytest.approx(0.03, rel=0.05)
+    assert last.fit.values[f"{told}.drag_nm"] == pytest.approx(0.03, rel=0.05)

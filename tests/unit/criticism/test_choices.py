@@ -10,7 +10,7 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.choices import reconsidered
 from tests.unit.criticism.machines import BASE, log, machine
@@ -40,17 +40,17 @@ def rippling(seed: int):
 def test_a_choice_that_no_longer_holds_is_made_again(chosen, moved):
     segments = (rippling(1), rippling(2))
     start = {**TRUE, "bemf_harmonics.ripple_share": chosen}
-    ended = gauss_newton(segments, Fitted(MODEL, start, floors(segments, MODEL, start), start))
-    fitted, around = reconsidered(segments, *ended)
-    assert fitted.values["bemf_harmonics.ripple_share"] == 1.0
-    assert (around.misfit < ended[1].misfit - 12.0) is moved
-    assert (fitted is ended[0]) is not moved
+    ended = gauss_newton(Fit(segments, MODEL, start, floors(segments, MODEL, start), start))
+    system = reconsidered(ended)
+    assert system.fit.values["bemf_harmonics.ripple_share"] == 1.0
+    assert (system.misfit < ended.misfit - 12.0) is moved
+    assert (system is ended) is not moved
 
 
 def test_choices_are_left_where_nothing_is_left_over_the_floor(monkeypatch):
     segments = (rippling(1), rippling(2))
     loud = tuple(np.full_like(sigma, 1e3) for sigma in floors(segments, MODEL, TRUE))
     start = {**TRUE, "bemf_harmonics.ripple_share": 0.0}
-    ended = gauss_newton(segments, Fitted(MODEL, start, loud, start))
+    ended = gauss_newton(Fit(segments, MODEL, start, loud, start))
     monkeypatch.setattr("pipeline.criticism.selection.choices.gauss_newton", None)
-    assert reconsidered(segments, *ended)[0] is ended[0]
+    assert reconsidered(ended) is ended

@@ -12,7 +12,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.selection.drift import slowest, wandering, wanders
 from tests.unit.criticism.machines import BASE, log, machine
@@ -33,11 +33,11 @@ def walked(seed: int, test: str, size: float = 3.0):
     )
 
 
-def around(segments):
+def fitted(segments):
     model = Model(machine(), ())
-    start = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
-    fitted, system = gauss_newton(segments, start)
-    return fitted, remainder(system, segments, system.residual)
+    start = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
+    system = gauss_newton(start)
+    return system, remainder(system)
 
 
 def test_the_slowest_sines_have_the_variance_of_a_random_walk():
@@ -64,18 +64,18 @@ def test_a_walk_of_its_size_is_all_but_noise_once_it_is_known():
 
 def test_wander_in_captures_of_two_tests_leaves_nothing():
     segments = (walked(5, "torque_map"), walked(6, "drive"))
-    fitted, left = around(segments)
+    system, left = fitted(segments)
     assert len({one.capture for one in left}) == 2
-    told = wandering(segments, fitted, left)
+    told = wandering(system.fit, left)
     assert told is not None
     assert told[0].lines.shape[0] == 5 * 8
 
 
 def test_in_captures_of_one_test_it_may_be_the_machine():
     segments = (walked(5, "drive"), replace(walked(6, "drive"), capture="drive_1.mcap"))
-    fitted, left = around(segments)
+    system, left = fitted(segments)
     assert left
-    assert wandering(segments, fitted, left) is None
+    assert wandering(system.fit, left) is None
 
 
 def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
@@ -90,27 +90,27 @@ def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
     walks = tuple(walked(seed, test) for seed, test in pairs)
     drags = tuple(dragged(walked(seed, test, 0.0)) for seed, test in pairs)
     for segments, told in ((walks, False), (drags, True)):
-        fitted, left = around(segments)
+        system, left = fitted(segments)
         assert left
-        sketch, _ = unknown_structure(segments, fitted, sorted({one.signal for one in left}))
+        sketch, _ = unknown_structure(system, sorted({one.signal for one in left}))
         assert (sketch is not None) is told
 
 
 def test_a_walk_far_beyond_the_noise_stays_a_remainder():
     size = DEFAULT.selection.drift_size
     segments = (walked(5, "torque_map", 60 * size), walked(6, "drive", 60 * size))
-    fitted, left = around(segments)
-    assert wandering(segments, fitted, left) is None
+    system, left = fitted(segments)
+    assert wandering(system.fit, left) is None
 
 
 @pytest.mark.parametrize(("large", "noise"), [(False, True), (True, False)])
 def test_what_is_small_for_the_machine_stops_no_wander(large: bool, noise: bool, monkeypatch):
     """At standstill half a per cent of R i is told, which an instrument's walk leaves as well."""
     segments = (walked(5, "torque_map"), walked(6, "drive"))
-    fitted, left = around(segments)
+    system, left = fitted(segments)
 
     def still_left(*_, **asked):
         return left if large or not asked.get("large") else ()
 
     monkeypatch.setattr("pipeline.criticism.selection.drift.remainder", still_left)
-    assert (wandering(segments, fitted, left) is not None) is noise
+    assert (wandering(system.fit, left) is not None) is noise

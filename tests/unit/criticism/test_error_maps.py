@@ -11,7 +11,7 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import (
     Errors,
@@ -89,9 +89,8 @@ def test_cells_of_one_variable_hold_equal_shares_and_the_sense_has_two():
 def test_a_map_of_a_fit_knows_speed_and_current_of_its_windows():
     """The closed-form log: speed and mean current of every window, and the residual in volts."""
     segment, model = log(noise=1.0), Model(machine(), ())
-    fitted = Fitted(model, dict(BASE), floors([segment], model, BASE), BASE)
-    around = system([segment], fitted)
-    errors = {e.signal: e for e in window_errors([segment], around, around.residual)}
+    system = linear_system(Fit((segment,), model, dict(BASE), floors([segment], model, BASE), BASE))
+    errors = {e.signal: e for e in window_errors(system, system.residual)}
     assert set(errors) == {"vd_v", "vq_v", "torque_shaft_nm"}
     one = errors["vq_v"]
     middle = (segment.weak.starts + segment.weak.length / 2) * 5e-5
@@ -115,7 +114,7 @@ def test_a_harmonic_shows_over_the_electrical_angle_with_its_size():
     segment.recorded["torque_shaft_nm"] -= 0.01 * np.sin(12 * theta)
     maps = {
         (m.signal, m.x.variable): m
-        for m in angle_maps([segment], Fitted(plain, dict(BASE), (), BASE))
+        for m in angle_maps(Fit((segment,), plain, dict(BASE), (), BASE))
     }
     seen = maps["torque_shaft_nm", "theta_mech_rad"]
     middle = 0.5 * (np.array(seen.x.edges[1:]) + np.array(seen.x.edges[:-1]))
@@ -125,7 +124,7 @@ def test_a_harmonic_shows_over_the_electrical_angle_with_its_size():
     model = plain.with_effects(effect)
     names = [f"cogging.{p.name}" for p in effect.parameters_of(model.machine)]
     values = {**BASE, **dict.fromkeys(names, 0.0), "cogging.sin_12_nm": 0.01}
-    left = angle_maps([segment], Fitted(model, values, (), values))
+    left = angle_maps(Fit((segment,), model, values, (), values))
     after = next(
         m for m in left if (m.signal, m.x.variable) == ("torque_shaft_nm", "theta_mech_rad")
     )
@@ -158,8 +157,8 @@ def test_an_open_circuit_spin_is_mapped_over_the_motor_s_own_angle(zero_rad):
     )
     values = {**BASE, "bench_angle_rad": zero_rad}
     model = Model(machine(), ())
-    fit = Fitted(model, values, floors((spin,), model, values), values)
-    made = {(one.signal, one.x.variable): one for one in angle_maps((spin,), fit)}
+    fit = Fit((spin,), model, values, floors((spin,), model, values), values)
+    made = {(one.signal, one.x.variable): one for one in angle_maps(fit)}
     one = made["vd_v", "theta_elec_rad"]
     middle = 0.5 * (np.array(one.x.edges[1:]) + np.array(one.x.edges[:-1]))
     assert one.mean == pytest.approx(0.05 * np.cos(middle - at_rad), abs=2e-3)

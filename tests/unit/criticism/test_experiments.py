@@ -16,7 +16,7 @@ from pipeline.criticism.effect import Parameter
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, widened
@@ -34,9 +34,9 @@ def state(name, size, others, segments):
     values = {k: 0.0 if v is None else v for k, v in values.items()}
     values |= {f"{effect.name}.{p.name}": p.scan[0] for p in effect.parameters if p.choice}
     values[f"{effect.name}.{parameter.name}"] = size
-    fitted = Fitted(model, values, floors(segments, model, values), values)
-    offered = candidates({other: ALL[other] for other in others}, fitted)
-    return effect, fitted, widened(segments, fitted, offered), offered
+    fit = Fit(segments, model, values, floors(segments, model, values), values)
+    offered = candidates({other: ALL[other] for other in others}, model)
+    return effect, widened(fit, offered), offered
 
 
 def _base():
@@ -47,8 +47,8 @@ def _base():
 
 def told(name, size, other, segments=None):
     segments = segments or (log(noise=1.0),)
-    effect, fitted, wide, offered = state(name, size, (other,), segments)
-    return separations(effect, (other,), fitted, wide, offered, segments, {other: "as declared"})
+    effect, wide, offered = state(name, size, (other,), segments)
+    return separations(effect, wide, offered, {other: "as declared"})
 
 
 def test_power_is_that_of_a_chi_square_test_at_one_per_cent():
@@ -72,11 +72,11 @@ def test_what_the_others_leave_of_a_vector_is_its_part_off_their_plane():
 def test_a_twin_under_another_name_is_parted_by_nothing():
     """No figure is given where none can be predicted; what the effect declares is told instead."""
     segments = (log(noise=1.0),)
-    effect, fitted, wide, _ = state("torque_scale", 0.02, (), segments)
+    effect, wide, _ = state("torque_scale", 0.02, (), segments)
     twin = replace(effect, name="twin")
-    offered = candidates({"twin": twin}, fitted)
-    wide = widened(segments, fitted, offered)
-    found = separations(effect, ("twin",), fitted, wide, offered, segments, {"twin": "a lever"})
+    offered = candidates({"twin": twin}, wide.fit.model)
+    wide = widened(wide.fit, offered)
+    found = separations(effect, wide, offered, {"twin": "a lever"})
     assert [(one.against, one.experiment, one.power) for one in found] == [
         ("twin", "a lever", None)
     ]
@@ -119,8 +119,8 @@ def test_a_planned_test_obeys_the_model_it_is_planned_with(test):
     values = {c.name: BASE.get(c.name, 0.0) for c in _base()}
     values["coulomb_friction.torque_nm"] = 0.01
     segments = (log(),)
-    fitted = Fitted(model, values, floors(segments, model, values), values)
-    for segment in planned(test, fitted, segments):
+    fit = Fit(segments, model, values, floors(segments, model, values), values)
+    for segment in planned(test, fit):
         left = residual(segment, model, values)
         assert segment.weak is not None
         assert segment.weak.starts.size

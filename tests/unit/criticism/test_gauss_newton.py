@@ -10,14 +10,14 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
-from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
 from pipeline.criticism.selection.stepwise import _floored_anew
 from tests.unit.criticism.machines import BASE, coasting, fitted, log, machine, with_drag
 
 STRIBECK = Model(machine(), (effects()["stribeck"],))
 
 
-def astray(segments) -> Fitted:
+def astray(segments) -> Fit:
     """A fit with a thousandth of the inertia, and floors as they are with that."""
     values = {
         **BASE,
@@ -27,7 +27,7 @@ def astray(segments) -> Fitted:
         "stribeck.exponent": 2.0,
         "stribeck.tail": 0.0,
     }
-    return Fitted(STRIBECK, values, floors(segments, STRIBECK, values), values)
+    return Fit(segments, STRIBECK, values, floors(segments, STRIBECK, values), values)
 
 
 def test_a_fit_begun_anew_forgets_its_constants_and_keeps_its_shapes(monkeypatch):
@@ -35,18 +35,18 @@ def test_a_fit_begun_anew_forgets_its_constants_and_keeps_its_shapes(monkeypatch
     lost = replace(astray(segments), tolerance=tuple(np.full(12, 1e-3) for _ in segments))
     begun = []
 
-    def watched(found, start, *more, **other):
+    def watched(start, *more, **other):
         begun.append(start.values)
-        return gauss_newton(found, start, *more, **other)
+        return gauss_newton(start, *more, **other)
 
     monkeypatch.setattr("pipeline.criticism.regression.gauss_newton.gauss_newton", watched)
-    fitted, around = first_fit(segments, rough_anew(segments, lost))
+    system = first_fit(rough_anew(lost))
+    fitted = system.fit
     assert begun[0]["stribeck.speed_rad_s"] == 9.0
     assert begun[0]["stribeck.excess_nm"] == 0.0
     assert begun[0]["j_kgm2"] != lost.values["j_kgm2"]
     assert fitted.values["j_kgm2"] == pytest.approx(BASE["j_kgm2"], rel=0.02)
     assert fitted.tolerance is lost.tolerance
-    assert around.around.sigma is fitted.sigma
 
 
 def test_whichever_end_is_better_stays(monkeypatch):
@@ -54,14 +54,11 @@ def test_whichever_end_is_better_stays(monkeypatch):
     lost = astray(segments)
     monkeypatch.setattr(
         "pipeline.criticism.selection.stepwise.gauss_newton",
-        lambda found, start: (
-            start,
-            system(found, start),
-        ),
+        linear_system,
     )
-    found = _floored_anew(segments, lost)
+    found = _floored_anew(lost)
     assert found.values["j_kgm2"] == pytest.approx(BASE["j_kgm2"], rel=0.02)
-    assert _floored_anew(segments, found).values is found.values
+    assert _floored_anew(found).values is found.values
 
 
 @pytest.mark.parametrize(("share", "times"), [(1e-3, 1), (0.7, 0), (3.0, 1)])
@@ -69,17 +66,17 @@ def test_a_fit_is_begun_anew_only_from_another_inertia(monkeypatch, share, times
     """What is left over the floor may be no fault of the fit: two seconds a rung for nothing."""
     segments = tuple(log(seed=n, noise=1.0) for n in (1, 2))
     values = {**astray(segments).values, "j_kgm2": share * BASE["j_kgm2"]}
-    lost = Fitted(STRIBECK, values, floors(segments, STRIBECK, values), values)
+    lost = Fit(segments, STRIBECK, values, floors(segments, STRIBECK, values), values)
     begun = []
     monkeypatch.setattr(
         "pipeline.criticism.selection.stepwise.first_fit",
-        lambda found, near: begun.append(near) or first_fit(found, near),
+        lambda near: begun.append(near) or first_fit(near),
     )
     monkeypatch.setattr(
         "pipeline.criticism.selection.stepwise.gauss_newton",
-        lambda found, start: (start, system(found, start)),
+        linear_system,
     )
-    _floored_anew(segments, lost)
+    _floored_anew(lost)
     assert len(begun) == times
 
 
@@ -90,8 +87,8 @@ def test_viscous_friction_comes_back_from_next_to_nothing(start):
     """
     segments = (log(noise=1.0), log(noise=1.0, seed=6))
     model = Model(machine(), ())
-    near = Fitted(model, {**BASE, "b_nm_s_rad": start}, floors(segments, model, BASE), BASE)
-    found = gauss_newton(segments, near)[0]
+    near = Fit(segments, model, {**BASE, "b_nm_s_rad": start}, floors(segments, model, BASE), BASE)
+    found = gauss_newton(near).fit
     assert found.values["b_nm_s_rad"] == pytest.approx(BASE["b_nm_s_rad"], rel=0.05)
 
 
@@ -102,9 +99,9 @@ def test_inertia_comes_back_from_where_a_missing_effect_left_it(share):
     """
     segments = (log(noise=1.0), coasting(), log(noise=1.0, seed=6))
     model = Model(machine(), ())
-    near = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
+    near = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
     lost = {**BASE, "j_kgm2": share * BASE["j_kgm2"], "b_nm_s_rad": share * BASE["b_nm_s_rad"]}
-    found = gauss_newton(segments, replace(near, values=lost))[0]
+    found = gauss_newton(replace(near, values=lost)).fit
     assert found.values["j_kgm2"] == pytest.approx(BASE["j_kgm2"], rel=0.01)
     assert found.values["b_nm_s_rad"] == pytest.approx(BASE["b_nm_s_rad"], rel=0.05)
 
@@ -114,8 +111,8 @@ def test_reading_errors_do_not_grow_while_a_fit_makes_the_inertia_small():
     model = Model(machine(), ())
     sigma = floors((shaft,), model, BASE)
     light = {**BASE, "j_kgm2": 0.01 * BASE["j_kgm2"]}
-    around = [system((shaft,), Fitted(model, v, sigma, BASE)) for v in (BASE, light)]
-    assert around[1].whiten == pytest.approx(around[0].whiten)
+    system = [linear_system(Fit((shaft,), model, v, sigma, BASE)) for v in (BASE, light)]
+    assert system[1].whiten == pytest.approx(system[0].whiten)
 
 
 @pytest.mark.parametrize("off", [0.95, 1.03])

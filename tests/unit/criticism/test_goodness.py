@@ -18,19 +18,19 @@ from pipeline.criticism.regression.goodness import (
     remainder,
 )
 from pipeline.criticism.regression.identifiability import known_by
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns, system
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from tests.unit.criticism.machines import BASE, fitted, log, machine
 
 ROWS = 400
 
 
-def captures(levels: list[float], seed: int = 4) -> System:
+def captures(levels: list[float], seed: int = 4) -> LinearSystem:
     """One constant told by several captures, each off by its own level, in noise of one."""
     rng = np.random.default_rng(seed)
     group = np.repeat(np.arange(len(levels)), ROWS)
     told = np.array(levels)[group] + rng.standard_normal(group.size)
-    return System(
+    return LinearSystem(
         columns=(Column("r_ohm", 1.0),),
         residual=told - told.mean(),
         matrix=-np.ones((group.size, 1)),
@@ -42,14 +42,14 @@ def captures(levels: list[float], seed: int = 4) -> System:
         labels=tuple((n, "vq_v", 0) for n in range(len(levels))),
         penalty=np.zeros(1),
         pull=np.zeros(1),
-        around=Fitted(Model(machine(), ()), {}, (), {}),
-        tests=("drive",) * len(levels),
+        fit=Fit((log(),) * len(levels), Model(machine(), ()), {}, (), {}),
+        own_count=1,
         made_at={},
     )
 
 
-def u(around: System) -> float:
-    return float(known_by(around, leave_out(around, 1), 1, np.ones(1)).u[0])
+def u(system: LinearSystem) -> float:
+    return float(known_by(system, leave_out(system), np.ones(1)).u[0])
 
 
 def test_captures_that_agree_are_as_sure_as_their_samples():
@@ -60,40 +60,41 @@ def test_captures_that_agree_are_as_sure_as_their_samples():
 def test_captures_that_disagree_are_not_surer_than_their_scatter():
     """Six means that scatter by s: a mean is no better known than s / sqrt 6."""
     levels = [0.3, -0.3, 0.1, -0.2, 0.25, -0.15]
-    around = captures(levels)
+    system = captures(levels)
     scatter = np.std(levels, ddof=1) / 6**0.5
-    assert u(around) == pytest.approx(scatter, rel=0.3)
+    assert u(system) == pytest.approx(scatter, rel=0.3)
 
 
 def test_a_fit_that_a_bound_keeps_from_its_end_is_no_surer_than_what_is_left_to_go():
     """Six captures agree on a step of 0.5 that is not done."""
-    around = captures([0.0] * 6)
-    held_back = replace(around, residual=around.residual + 0.5)
+    system = captures([0.0] * 6)
+    held_back = replace(system, residual=system.residual + 0.5)
     assert u(held_back) == pytest.approx(0.5, rel=0.05)
 
 
 def test_one_capture_alone_has_its_noise():
-    around = captures([0.0])
-    assert u(around) == pytest.approx(ROWS**-0.5, rel=0.1)
+    system = captures([0.0])
+    assert u(system) == pytest.approx(ROWS**-0.5, rel=0.1)
 
 
 def test_a_column_that_one_capture_carries_predicts_nothing_better():
     """It keeps the worst capture in the fit, which is no prediction: rows count in both or none."""
-    around = captures([0.0, 0.0, 0.0, 0.0, 3.0])
-    own = np.random.default_rng(9).standard_normal(around.size) * (around.group == 4)
+    system = captures([0.0, 0.0, 0.0, 0.0, 3.0])
+    own = np.random.default_rng(9).standard_normal(system.size) * (system.group == 4)
     wider = replace(
-        around,
-        columns=(*around.columns, Column("psi_wb", 1.0)),
-        matrix=np.column_stack([around.matrix, own]),
+        system,
+        columns=(*system.columns, Column("psi_wb", 1.0)),
+        matrix=np.column_stack([system.matrix, own]),
         penalty=np.zeros(2),
         pull=np.zeros(2),
+        own_count=2,
     )
-    alone = leave_out(around, 1), leave_out(wider, 2)
+    alone = leave_out(system), leave_out(wider)
     assert alone[1].total < 0.9 * alone[0].total
-    before, after = in_common((around, wider), alone)
+    before, after = in_common((system, wider), alone)
     assert after.total == pytest.approx(before.total, rel=0.02)
-    assert np.array_equal(np.isfinite(before.residual), around.group != 4)
-    assert np.array_equal(np.isfinite(after.residual), around.group != 4)
+    assert np.array_equal(np.isfinite(before.residual), system.group != 4)
+    assert np.array_equal(np.isfinite(after.residual), system.group != 4)
 
 
 @pytest.mark.parametrize(("times", "carries"), [(4.0, False), (6.0, True)])
@@ -101,11 +102,11 @@ def test_a_capture_without_which_a_variance_grows_fivefold_is_not_held_out(times
     """Of three captures the first has 2 (times − 1) the information of one of the others, so that
     the variance without it is `times` that with it; the other two are predicted all the same.
     """
-    around = captures([0.0, 0.0, 0.0])
+    system = captures([0.0, 0.0, 0.0])
     strong = np.sqrt(2.0 * (times - 1.0))
-    matrix = np.where(around.group == 0, strong, 1.0)[:, None] * around.matrix
-    held = leave_out(replace(around, matrix=matrix, residual=0.01 * around.residual), 1)
-    assert np.array_equal(np.isfinite(held.residual), (around.group != 0) | (not carries))
+    matrix = np.where(system.group == 0, strong, 1.0)[:, None] * system.matrix
+    held = leave_out(replace(system, matrix=matrix, residual=0.01 * system.residual))
+    assert np.array_equal(np.isfinite(held.residual), (system.group != 0) | (not carries))
 
 
 def test_at_standstill_a_voltage_is_measured_by_what_is_there():
@@ -115,34 +116,33 @@ def test_at_standstill_a_voltage_is_measured_by_what_is_there():
         n: 0.2 * running.recorded[n] / np.abs(running.recorded[n]).max() for n in ("vd_v", "vq_v")
     }
     standing = replace(running, recorded={**running.recorded, **still})
-    fitted = Fitted(Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
-    around = system((running,), fitted)
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
     volt, torque = (running.channels[n] for n in (0, 2))
-    assert material_size(running, volt, around) == pytest.approx(5e-4 * 20.0)
-    assert material_size(standing, volt, around) == pytest.approx(5e-3 * 0.2)
-    assert material_size(standing, volt, around, large=True) == pytest.approx(5e-4 * 20.0)
-    assert material_size(standing, torque, around) == material_size(running, torque, around)
+    assert material_size(running, volt, fit) == pytest.approx(5e-4 * 20.0)
+    assert material_size(standing, volt, fit) == pytest.approx(5e-3 * 0.2)
+    assert material_size(standing, volt, fit, large=True) == pytest.approx(5e-4 * 20.0)
+    assert material_size(standing, torque, fit) == material_size(running, torque, fit)
 
 
 @pytest.mark.parametrize(("share", "matters"), [(0.8, False), (1.3, True)])
 def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(share, matters):
     """A held-out error far over the floor has to be somewhere."""
     running = log()
-    fitted = Fitted(Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
-    around = system((running,), fitted)
-    place = next(n for n, label in enumerate(around.labels) if label[1:] == ("torque_shaft_nm", 0))
-    mine = around.group == place
-    limit = material_size(running, "torque_shaft_nm", around)
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    system = linear_system(fit)
+    place = next(n for n, label in enumerate(system.labels) if label[1:] == ("torque_shaft_nm", 0))
+    mine = system.group == place
+    limit = material_size(running, "torque_shaft_nm", fit)
     small = np.where(mine, 0.1 * limit, 1.0)
-    quiet = replace(around, unit=small, residual=np.zeros(around.size))
     left = np.where(mine, np.hypot(share, 0.1) * limit / small, 0.0)
-    (told,) = over_floor(quiet, (running,), left)
+    off = replace(system, unit=small, residual=left)
+    (told,) = over_floor(off)
     assert told.size == pytest.approx(share * limit)
     assert told.matters == matters
-    assert remainder(quiet, (running,), left) == ((told,) if matters else ())
-    page = _as_told((running,), replace(quiet, residual=left), ())
+    assert remainder(off) == ((told,) if matters else ())
+    page = _as_told(off, ())
     assert [(one.signal, one.matters) for one in page] == [("torque_shaft_nm", False)]
-    assert over_floor(quiet, (running,), np.where(mine, 1.2, 0.0)) == ()
+    assert over_floor(replace(off, residual=np.where(mine, 1.2, 0.0))) == ()
 
 
 @pytest.mark.parametrize(
@@ -151,48 +151,53 @@ def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(sha
 def test_few_samples_are_over_their_floor_by_chance_far_more_often(count, q, told):
     """Of χ² with 4 degrees of freedom, 36.0 is passed as seldom as 5 by a normal variable."""
     running = log()
-    fitted = Fitted(Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
-    around = system((running,), fitted)
-    place = next(n for n, label in enumerate(around.labels) if label[1:] == ("torque_shaft_nm", 0))
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    system = linear_system(fit)
+    place = next(n for n, label in enumerate(system.labels) if label[1:] == ("torque_shaft_nm", 0))
     group = np.full(count, place)
     few = replace(
-        around,
+        system,
         group=group,
         residual=np.full(count, np.sqrt(q)),
         soft=np.ones(count),
         unit=np.ones(count),
     )
-    assert bool(over_floor(few, (running,), few.residual)) == told
+    assert bool(over_floor(few)) == told
 
 
 def test_a_capture_left_out_is_predicted_from_the_others():
     """As a fit to the others alone predicts it, which is not as the fit to all of them has it."""
     segments = tuple(log(noise=1.0, seed=n) for n in (5, 6, 7))
     start = fitted(segments)
-    around = system(segments, start)
-    held = leave_out(around, len(own_columns(start.model)))
+    system = linear_system(start)
+    held = leave_out(system)
     assert np.isfinite(held.residual).all()
-    in_sample = np.sqrt(np.mean((around.residual / around.soft) ** 2))
+    in_sample = np.sqrt(np.mean((system.residual / system.soft) ** 2))
     assert in_sample < held.total < 1.2
-    capture = np.array([number for number, _, _ in around.labels])[around.group]
+    capture = system.segment
     for number in range(3):
         others = [n for n in range(3) if n != number]
         # from a start that is off: a fit that has nothing worth a step to gain takes none
         off = {**start.values, "psi_wb": 1.002 * start.values["psi_wb"]}
-        less = replace(start, values=off, sigma=tuple(start.sigma[n] for n in others))
-        alone = gauss_newton([segments[n] for n in others], less)[0]
-        told = system(segments, replace(start, values=alone.values)).residual[capture == number]
+        less = replace(
+            start,
+            segments=tuple(segments[n] for n in others),
+            values=off,
+            sigma=tuple(start.sigma[n] for n in others),
+        )
+        alone = gauss_newton(less).fit
+        told = linear_system(replace(start, values=alone.values)).residual[capture == number]
         assert held.residual[capture == number] == pytest.approx(told, abs=1e-3)
-        assert np.abs(told - around.residual[capture == number]).max() > 0.1
+        assert np.abs(told - system.residual[capture == number]).max() > 0.1
 
 
 def test_one_capture_alone_has_the_error_of_its_fit_and_says_so():
     start = fitted((log(noise=1.0),))
-    around = system((log(noise=1.0),), start)
-    held = leave_out(around, len(own_columns(start.model)))
+    system = linear_system(start)
+    held = leave_out(system)
     assert not np.isfinite(held.residual).any()
-    rms = np.sqrt(np.mean((around.residual / around.soft) ** 2))
+    rms = np.sqrt(np.mean((system.residual / system.soft) ** 2))
     assert held.total == pytest.approx(rms, rel=1e-12)
     assert "of the fit" in held.notes[0]
     two = tuple(log(noise=1.0, seed=n) for n in (5, 6))
-    assert leave_out(system(two, fitted(two)), len(own_columns(start.model))).notes == ()
+    assert leave_out(linear_system(fitted(two))).notes == ()

@@ -10,7 +10,7 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fitted, floors
+from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
 from tests.unit.criticism.machines import BASE, log, machine
@@ -47,14 +47,14 @@ def test_the_state_of_the_instruments_undoes_what_it_does():
 def test_a_usual_offset_is_a_nuisance_and_a_large_one_a_name(times, named):
     segments = (recorded(1.0, times), recorded(1.0, times, seed=6))
     model = Model(machine(), ())
-    start = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
-    fitted, _ = gauss_newton(segments, start)
+    start = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
+    fit = gauss_newton(start).fit
     library = {n: effects()[n] for n in ("current_offset", "angle_offset", "current_delay")}
-    offered = candidates(library, fitted)
-    scores = score_all(widened(segments, fitted, offered), fitted, offered)
+    offered = candidates(library, fit.model)
+    scores = score_all(widened(fit, offered), offered)
     passing = {s.candidate.effect.name for s in scores if s.passes}
     assert named <= passing if named else not passing
     if not named:
-        assert fitted.values["zero_alpha_a"] == pytest.approx(ALPHA_A, rel=0.2)
-        assert fitted.values["zero_beta_a"] == pytest.approx(BETA_A, rel=0.2)
-        assert fitted.values["zero_angle_rad"] == pytest.approx(ZERO_RAD, rel=0.3)
+        assert fit.values["zero_alpha_a"] == pytest.approx(ALPHA_A, rel=0.2)
+        assert fit.values["zero_beta_a"] == pytest.approx(BETA_A, rel=0.2)
+        assert fit.values["zero_angle_rad"] == pytest.approx(ZERO_RAD, rel=0.3)

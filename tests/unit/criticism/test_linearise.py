@@ -11,7 +11,13 @@ from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import Fitted, _kept, floors, own_columns, system
+from pipeline.criticism.regression.linear_system import (
+    Fit,
+    _kept,
+    floors,
+    linear_system,
+    own_columns,
+)
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
 from pipeline.criticism.residuals.residual import residual
@@ -43,12 +49,12 @@ def test_candidates_columns_survive_a_tolerance_of_form():
     """
     segments = (log(noise=1.0),)
     values = {**BASE}
-    start = Fitted(PLAIN, values, floors(segments, PLAIN, values), values)
+    start = Fit(segments, PLAIN, values, floors(segments, PLAIN, values), values)
     gain = effect_columns(effects()["torque_scale"], PLAIN)
-    before = system(segments, start, gain)
+    before = linear_system(start, gain)
     wrong = tuple(40.0 * sigma for sigma in start.sigma)
     doubted = replace(start, tolerance=wrong)
-    kept, made = (system(segments, doubted, gain, b).matrix for b in (before, None))
+    kept, made = (linear_system(doubted, gain, b).matrix for b in (before, None))
     assert kept == pytest.approx(made, rel=1e-6, abs=1e-9 * np.abs(made).max())
     names = [column.name for column in own_columns(PLAIN)]
     pair = kept[:, names.index("gain_torque")], kept[:, -1]
@@ -58,26 +64,26 @@ def test_candidates_columns_survive_a_tolerance_of_form():
 def test_candidates_columns_survive_other_floors():
     """A sensor's error that was found changes the floors, and little that other effects do."""
     segments = (log(noise=1.0),)
-    start = Fitted(PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
+    start = Fit(segments, PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
     offered = [
         c for name in ("windage", "torque_scale") for c in effect_columns(LIBRARY[name], PLAIN)
     ]
-    before = system(segments, start, offered)
+    before = linear_system(start, offered)
     louder = replace(start, sigma=tuple(3.0 * sigma for sigma in start.sigma), values={**BASE})
-    kept, made = (system(segments, louder, offered, b) for b in (before, None))
+    kept, made = (linear_system(louder, offered, b) for b in (before, None))
     assert kept.matrix == pytest.approx(made.matrix, rel=1e-6, abs=1e-9 * np.abs(made.matrix).max())
     assert all(kept.made_at[c.key] is before.made_at[c.key] for c in offered)
 
 
 def test_what_turns_the_angle_is_made_anew_where_another_error_of_it_was_found():
     segments = (log(noise=1.0),)
-    start = Fitted(PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
+    start = Fit(segments, PLAIN, {**BASE}, floors(segments, PLAIN, BASE), BASE)
     off, late = LIBRARY["angle_eccentricity"], LIBRARY["angle_offset"]
     drag = effect_columns(LIBRARY["windage"], PLAIN)
-    before = system(segments, start, [*effect_columns(late, PLAIN), *drag])
+    before = linear_system(start, [*effect_columns(late, PLAIN), *drag])
     model = PLAIN.with_effects(off)
     found = {**BASE, **zero(off, model), "angle_eccentricity.sine_rad": 0.1}
-    turned = Fitted(model, found, start.sigma, found)
+    turned = Fit(segments, model, found, start.sigma, found)
     kept = _kept(before, turned, before.columns, chord=False)
     assert drag[0].key in kept
     assert not any(name.startswith("angle_offset.") for name, _ in kept)
@@ -91,21 +97,21 @@ def test_a_sensor_s_column_holds_until_a_parameter_of_the_model_moves():
     model = PLAIN.with_effects(off)
     segments, name = (log(noise=1.0),), "angle_eccentricity.sine_rad"
     values = {**BASE, **zero(off, model), name: 0.01}
-    here = Fitted(model, values, floors(segments, PLAIN, BASE), values)
-    before = system(segments, here)
+    here = Fit(segments, model, values, floors(segments, PLAIN, BASE), values)
+    before = linear_system(here)
     near, far = (replace(here, values={**values, name: size}) for size in (0.0103, 0.012))
     keys = {column.key for column in effect_columns(off, model)}
     assert keys <= set(_kept(before, near, before.columns, chord=False))
     assert keys.isdisjoint(_kept(before, far, before.columns, chord=False))
     assert ("lq_h", ()) in _kept(before, far, before.columns, chord=False)
-    without = Fitted(PLAIN, {**BASE}, here.sigma, BASE)
+    without = Fit(segments, PLAIN, {**BASE}, here.sigma, BASE)
     heat = [c for c in before.columns if c.name == "offset_temp_k"]
     assert _kept(before, without, heat, chord=False) == {}
     # what is made anew is of the new place, and what stays of the old one
-    after = system(segments, far, before=before)
+    after = linear_system(far, before=before)
     assert all(after.made_at[key][name] == 0.012 for key in keys)
     assert after.made_at["lq_h", ()][name] == 0.01
-    fresh = system(segments, far)
+    fresh = linear_system(far)
     place = [n for n, c in enumerate(fresh.columns) if c.key in keys]
     assert after.matrix[:, place] == pytest.approx(fresh.matrix[:, place])
 

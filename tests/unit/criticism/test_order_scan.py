@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.data.segment import electrical_orders, row_index
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
 from pipeline.criticism.selection.order_scan import Part, orders_left
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
@@ -32,8 +32,8 @@ def spinning(seed, waves=(), name="torque_shaft_nm"):
 
 def left(*segments):
     values = dict(BASE)
-    fitted = Fitted(PLAIN, values, floors(segments, PLAIN, values), values)
-    return orders_left(segments, system(segments, fitted))
+    fit = Fit(tuple(segments), PLAIN, values, floors(segments, PLAIN, values), values)
+    return orders_left(linear_system(fit))
 
 
 def test_waves_under_load_are_found_by_their_orders():

@@ -10,7 +10,7 @@ from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import DEFAULT, policy_changes, policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import system
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.execution.keys import key_of, model_parts
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -34,12 +34,13 @@ def test_a_fit_goes_by_it():
     segments = (log(noise=1.0),)
     near = fitted(segments)
     start = replace(near, values={**near.values, "psi_wb": 0.5 * near.values["psi_wb"]})
-    plain, _ = gauss_newton(segments, start)
+    plain = gauss_newton(start).fit
     once = replace(start, model=replace(start.model, policy=policy_of(CHANGES)))
-    stayed, around = gauss_newton(segments, once)
+    system = gauss_newton(once)
+    stayed = system.fit
     assert stayed.values == start.values != plain.values
-    assert around.policy == once.policy == policy_of(CHANGES)
-    assert system(segments, once).grams().policy.settled == 0.1
+    assert system.policy == once.policy == policy_of(CHANGES)
+    assert linear_system(once).grams().policy.settled == 0.1
 
 
 def test_a_kept_verdict_of_another_policy_does_not_count():

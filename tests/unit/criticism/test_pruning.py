@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
-from pipeline.criticism.regression.linear_system import Fitted
+from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.selection import pruning
 from pipeline.criticism.selection.pruning import trimmed, whole
 from tests.unit.criticism.machines import BASE, machine
@@ -21,13 +21,13 @@ NEEDED = {D_ODD: 20.0, Q_FALL: 0.1, Q_BEND: 0.0, D_FALL: 0.3, D_BEND: 0.0}
 """What the misfit loses by the removal of each term."""
 
 
-class Around:
-    """A fit of 40 samples whose misfit is known."""
+class Known:
+    """A system of 40 samples around a fit whose misfit is known."""
 
     size = 40
 
-    def __init__(self, misfit: float) -> None:
-        self.misfit = misfit
+    def __init__(self, fit: Fit, misfit: float) -> None:
+        self.fit, self.misfit = fit, misfit
 
 
 @pytest.mark.parametrize(
@@ -43,25 +43,24 @@ def test_the_terms_that_pay_stay_whatever_the_tangent_says(tangent, refits, monk
     """Where d_odd and d_fall tie to first order, the tangent may take the wrong one."""
     tried = []
 
-    def without(_segments, fitted, around, effect, terms):
+    def without(system, effect, terms):
         tried.append(terms)
         gone = tuple(sorted({*effect.left_out, *terms}))
         less = Model(machine(), (replace(effect, left_out=gone),))
-        return Fitted(less, fitted.values, (), BASE), Around(
-            around.misfit + sum(NEEDED[term] for term in terms)
-        )
+        fit = Fit((), less, system.fit.values, (), BASE)
+        return Known(fit, system.misfit + sum(NEEDED[term] for term in terms))
 
     monkeypatch.setattr(pruning, "_spare", lambda *_: tangent)
     monkeypatch.setattr(pruning, "_without", without)
-    monkeypatch.setattr(pruning, "_doubtful", lambda *known: sorted({*NEEDED} - {*known[3]}))
+    monkeypatch.setattr(pruning, "_doubtful", lambda *known: sorted({*NEEDED} - {*known[2]}))
     model = Model(machine(), (SATURATION,))
-    start = Fitted(model, {**BASE, **zero(SATURATION, model)}, (), BASE)
-    fitted, around = trimmed((), start, Around(0.0), ("saturation",))
+    start = Fit((), model, {**BASE, **zero(SATURATION, model)}, (), BASE)
+    system = trimmed(Known(start, 0.0), ("saturation",))
     assert len(tried) == refits
-    gone = set(fitted.model.effects[0].left_out)
+    gone = set(system.fit.model.effects[0].left_out)
     assert gone == ({*NEEDED} - {D_ODD} if tangent else set())
-    assert around.misfit == pytest.approx(sum(NEEDED[term] for term in gone))
-    assert np.log(Around.size) < NEEDED[D_ODD]
+    assert system.misfit == pytest.approx(sum(NEEDED[term] for term in gone))
+    assert np.log(Known.size) < NEEDED[D_ODD]
 
 
 def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
@@ -69,7 +68,7 @@ def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
     less = replace(SATURATION, left_out=(D_ODD, D_BEND)), replace(encoder, left_out=(1,))
     model = Model(machine(), less)
     values = {**BASE, **zero(less[0], model), **zero(less[1], model), "saturation.q_fall": 0.2}
-    full = whole(Fitted(model, values, (), BASE))
+    full = whole(Fit((), model, values, (), BASE))
     assert [effect.left_out for effect in full.model.effects] == [(), (1,)]
     assert full.values["saturation.q_fall"] == 0.2
     assert full.values["saturation.d_odd"] == 0.0 and full.values["saturation.d_bend"] == 1.0
@@ -79,9 +78,9 @@ def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
 def test_what_clearly_pays_is_not_asked_for_by_a_refit(loss, asked, monkeypatch):
     """In prices of a parameter: the tangent is not wrong about as much as that."""
     price = 5.0
-    monkeypatch.setattr(pruning, "_loss", lambda _f, _a, _k, names: loss * price * len(names))
+    monkeypatch.setattr(pruning, "_loss", lambda _s, _k, names: loss * price * len(names))
     model = Model(machine(), (SATURATION,))
-    fitted = Fitted(model, {**BASE, **zero(SATURATION, model)}, (), BASE)
-    around = SimpleNamespace(grams=lambda: None)
-    found = pruning._doubtful(fitted, around, SATURATION, (Q_BEND,), price)
+    fit = Fit((), model, {**BASE, **zero(SATURATION, model)}, (), BASE)
+    system = SimpleNamespace(grams=lambda: None, fit=fit)
+    found = pruning._doubtful(system, SATURATION, (Q_BEND,), price)
     assert found == (tuple(sorted({*NEEDED} - {Q_BEND})) if asked else ())

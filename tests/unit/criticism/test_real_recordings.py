@@ -22,13 +22,13 @@ def found(folder, motor=None):
 
 
 def in_sample(made):
-    return signal_errors(made.segments, made.around, made.around.residual)
+    return signal_errors(made.system, made.system.residual)
 
 
 def parameters(made):
     """Names of the constants and effect parameters that the captures tell of, gains aside."""
-    heard = np.any(made.around.matrix != 0.0, axis=0)
-    names = [c.name for n, c in enumerate(made.around.columns) if heard[n]]
+    heard = np.any(made.system.matrix != 0.0, axis=0)
+    names = [c.name for n, c in enumerate(made.system.columns) if heard[n]]
     return [name for name in names if not name.startswith("gain_")]
 
 

@@ -10,7 +10,7 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem, own_columns
 from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates, score_all, widened
 from pipeline.criticism.selection.stepwise import _floored_anew
@@ -56,15 +56,15 @@ def test_a_fits_own_columns_are_made_where_it_stands():
     segments = (log(noise=1.0),)
     here = fitted(segments)
     away = replace(here, values={**here.values, "psi_wb": 1.03 * here.values["psi_wb"]})
-    offered = candidates(LIBRARY, here)
-    before = widened(segments, away, offered)
-    around, fresh = widened(segments, here, offered, before), widened(segments, here, offered)
+    offered = candidates(LIBRARY, here.model)
+    before = widened(away, offered)
+    system, fresh = widened(here, offered, before), widened(here, offered)
     own = len(own_columns(here.model))
     # how many columns are projected at a time is a matter of rounding on some processors
-    off = np.abs(around.matrix[:, :own] - fresh.matrix[:, :own]).max(axis=0)
+    off = np.abs(system.matrix[:, :own] - fresh.matrix[:, :own]).max(axis=0)
     assert (off <= 1e-13 * np.abs(fresh.matrix[:, :own]).max(axis=0)).all()
-    assert not np.allclose(around.matrix[:, :own], before.matrix[:, :own], rtol=1e-3, atol=0.0)
-    kept, made = (s.matrix[:, own:] / s.whiten[:, None] for s in (around, before))
+    assert not np.allclose(system.matrix[:, :own], before.matrix[:, :own], rtol=1e-3, atol=0.0)
+    kept, made = (s.matrix[:, own:] / s.whiten[:, None] for s in (system, before))
     assert kept == pytest.approx(made, rel=1e-9, abs=1e-12 * np.abs(made).max())
 
 
@@ -76,8 +76,8 @@ def test_a_drag_of_the_wrong_sign_is_no_friction():
 
     segments = (with_drag(drag), with_drag(drag, 6))
     start = fitted(segments)
-    offered = candidates(LIBRARY, start)
-    scores = score_all(widened(segments, start, offered), start, offered)
+    offered = candidates(LIBRARY, start.model)
+    scores = score_all(widened(start, offered), offered)
     assert "windage" not in {s.candidate.effect.name for s in scores if s.passes}
 
 
@@ -89,8 +89,8 @@ def test_an_amplitude_that_may_not_be_above_zero_is_not_offered_above_it(size_nm
     pushing = replace(windage, parameters=(replace(braking, low=-1.0, high=0.0),))
     segments = (with_drag(curved(size_nm)), with_drag(curved(size_nm), 6))
     start = fitted(segments)
-    offered = candidates({"windage": pushing}, start)
-    scores = score_all(widened(segments, start, offered), start, offered)
+    offered = candidates({"windage": pushing}, start.model)
+    scores = score_all(widened(start, offered), offered)
     assert [s.candidate.effect.name for s in scores] == ["windage"] * told
 
 
@@ -112,7 +112,7 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
     random = np.random.default_rng(4)
     shape = np.concatenate([np.sqrt(2.0) * random.choice([-1.0, 1.0], 100), np.zeros(100)])
     noise = random.choice([-1.0, 1.0], 200)
-    around = System(
+    system = LinearSystem(
         columns=(*own_columns(model), column),
         residual=noise * np.repeat([1.0, np.sqrt(other)], 100) - shape,
         matrix=np.column_stack([np.zeros((200, len(own_columns(model)))), shape / 0.1]),
@@ -124,11 +124,11 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
         labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
         penalty=np.zeros(1 + len(own_columns(model))),
         pull=np.zeros(1 + len(own_columns(model))),
-        around=Fitted(model, dict(BASE), (), BASE),
-        tests=("drive", "drive"),
+        fit=Fit((log(), log()), model, dict(BASE), (), BASE),
+        own_count=len(own_columns(model)),
         made_at={},
     )
-    (score,) = score_all(around, around.around, [Candidate(effect, (column,))])
+    (score,) = score_all(system, [Candidate(effect, (column,))])
     assert score.fall > score.price
     assert score.share == pytest.approx(expected, abs=0.2 * expected)
 
@@ -145,6 +145,6 @@ def test_floors_are_made_anew_where_undoing_a_lag_brings_noise(lag_s, anew):
         model=before.model.with_effects(effects()["torque_lag"]),
         values={**before.values, "torque_lag.lag_s": lag_s} | NO_STAMP,
     )
-    after = _floored_anew(segments, lagging)
+    after = _floored_anew(lagging)
     assert (after.sigma is not before.sigma) is anew
     assert bool(after.sigma[0][-1] > 2.0 * before.sigma[0][-1]) is anew

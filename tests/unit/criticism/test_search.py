@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from pipeline.criticism import search
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.search import ended
 from pipeline.records.comparison import ModelSpec
 from tests.unit.criticism.machines import machine
@@ -31,8 +33,9 @@ def climbs(monkeypatch):
     def climbed(begun, _):
         looked = begun if isinstance(begun, tuple) else "calm"
         made.orders.append(looked)
-        rung = SimpleNamespace(around=None, fitted=None)
-        inside = SimpleNamespace(segments=(), fitted=None, hum=())
+        fit = Fit((), Model(machine(), ()), {}, (), {})
+        rung = SimpleNamespace(system=None, fit=fit)
+        inside = SimpleNamespace(system=SimpleNamespace(fit=fit), hum=())
         return Ladder(looked=looked, left=(looked,), rungs=(rung,), begun=inside)
 
     def sketched(ladder, left, name, in_parts=False):
@@ -46,7 +49,7 @@ def climbs(monkeypatch):
     monkeypatch.setattr(search, "model_of", lambda *_: None)
     monkeypatch.setattr(search, "orders_left", lambda *_: made.seen)
     monkeypatch.setattr(search, "wandering", lambda *_: () if made.wanders else None)
-    monkeypatch.setattr(search, "gauss_newton", lambda *_: (None, None))
+    monkeypatch.setattr(search, "gauss_newton", lambda *_: None)
     return made
 
 

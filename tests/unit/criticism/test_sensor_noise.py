@@ -16,7 +16,7 @@ from pipeline.criticism.data.sensor_noise import (
     sensor_noise,
 )
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.linear_system import Fitted, floors, floors_grown, system
+from pipeline.criticism.regression.linear_system import Fit, floors, floors_grown, linear_system
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.selection.stepwise import _shrunk
 from tests.unit.criticism.machines import BASE, coasting, log, machine
@@ -98,13 +98,13 @@ def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     segments = (replace(log(), noise=noise), coasting())
     model = Model(machine(), ())
     halved = {**BASE, **{name: 0.5 * BASE[name] for name in ("r_ohm", "ld_h", "lq_h")}}
-    fit = Fitted(model, halved, floors(segments, model, BASE), BASE)
-    grown, free = floors_grown(segments, fit)
+    fit = Fit(segments, model, halved, floors(segments, model, BASE), BASE)
+    grown, free = floors_grown(fit)
     groups = row_index(segments[0])[3]
     volts = [n for n, (channel, _) in enumerate(groups) if channel != "torque_shaft_nm"]
     assert grown[volts] == pytest.approx(0.5, abs=0.05)
     assert np.array_equal(free, np.ones(free.size))
-    around = system(segments, fit)
-    factors = _shrunk(segments, around)
+    system = linear_system(fit)
+    factors = _shrunk(system)
     assert factors.min() >= 1.0 - 1e-9
     assert 1.2 < factors[volts].max() <= 4.0 + 1e-9

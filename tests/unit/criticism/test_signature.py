@@ -35,6 +35,13 @@ def errors(signal: str, shape: np.ndarray, of: int = 0, seed: int = 1) -> Errors
     return Errors(signal, noisy, np.full(N, 0.01), np.full(N, of), np.arange(N), at)
 
 
+def twice(*captures: str, fit: Any = None) -> tuple[Any, Any]:
+    """Two equal rungs of segments of these captures."""
+    segments = tuple(segment(name) for name in captures)
+    rung = SimpleNamespace(system=SimpleNamespace(residual=np.empty(0), segments=segments), fit=fit)
+    return rung, rung
+
+
 def found_in(
     monkeypatch: pytest.MonkeyPatch,
     before: list[Errors],
@@ -44,9 +51,8 @@ def found_in(
     quiet = [errors(one.signal, np.zeros(N), int(one.segment[0]), seed=2) for one in before]
     told = iter([before, quiet])
     monkeypatch.setattr(module, "window_errors", lambda *_: next(told))
-    fitted = SimpleNamespace(values={"j_kgm2": INERTIA_KGM2})
-    rung: Any = SimpleNamespace(around=SimpleNamespace(residual=np.empty(0)), fitted=fitted)
-    return signature([segment("a.mcap"), segment("b.mcap")], (rung, rung), records)
+    fit = SimpleNamespace(values={"j_kgm2": INERTIA_KGM2})
+    return signature(twice("a.mcap", "b.mcap", fit=fit), records)
 
 
 def test_a_bump_of_speed_is_drawn_over_speed_in_its_capture(
@@ -138,8 +144,7 @@ def test_what_an_effect_explains_wholly_comes_before_what_it_only_lessens(
         ]
     )
     monkeypatch.setattr(module, "window_errors", lambda *_: next(told))
-    rung: Any = SimpleNamespace(around=SimpleNamespace(residual=np.empty(0)))
-    one = signature([segment("a.mcap")], (rung, rung), (EMPTY, EMPTY))
+    one = signature(twice("a.mcap"), (EMPTY, EMPTY))
     assert one is not None
     assert one.signal == "vd_v"
 

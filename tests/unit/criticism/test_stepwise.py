@@ -8,7 +8,7 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fitted
+from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import _doubt, _kin, material, search, size_of
 from tests.unit.criticism.machines import (
@@ -26,9 +26,9 @@ from tests.unit.criticism.machines import (
 
 def test_a_sound_machine_is_left_alone():
     segments = (log(noise=1.0), log(noise=1.0, seed=6))
-    rungs = search(segments, fitted(segments), LIBRARY)
+    rungs = search(fitted(segments), LIBRARY)
     assert [rung.added for rung in rungs] == [()]
-    assert rungs[0].fitted.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+    assert rungs[0].fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
 
 
 def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none():
@@ -36,23 +36,23 @@ def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none
         return 0.02 * omega * np.abs(omega) / 250.0**2
 
     hidden, none = ((with_drag(one), with_drag(one, 6)) for one in (drag, lambda *_: 0.0))
-    rungs = search(hidden, cautious(hidden, 3.0), LIBRARY)
-    assert rungs[0].around.spreads(rungs[0].around.residual).max() < 1.0
+    rungs = search(cautious(hidden, 3.0), LIBRARY)
+    assert rungs[0].system.spreads(rungs[0].system.residual).max() < 1.0
     assert rungs[-1].added == ("windage",)
-    assert search(none, cautious(none, 3.0), LIBRARY)[-1].added == ()
+    assert search(cautious(none, 3.0), LIBRARY)[-1].added == ()
 
 
 def test_choices_are_made_again_on_every_rung_and_at_the_end_of_what_is_asked_for(monkeypatch):
     made = []
 
-    def watched(_, found, around):
-        made.append([effect.name for effect in found.model.effects])
-        return found, around
+    def watched(system):
+        made.append([effect.name for effect in system.fit.model.effects])
+        return system
 
     for place in ("stepwise", "requested_model"):
         monkeypatch.setattr(f"pipeline.criticism.selection.{place}.reconsidered", watched)
     hidden = (with_drag(curved(0.02)), with_drag(curved(0.02), 6))
-    assert search(hidden, cautious(hidden, 3.0), LIBRARY)[-1].added == ("windage",)
+    assert search(cautious(hidden, 3.0), LIBRARY)[-1].added == ("windage",)
     assert made == [["windage"]]
     fit_of(hidden, Model(machine(), (effects()["stribeck"],)))
     assert made == [["windage"], ["stribeck"]]
@@ -61,12 +61,12 @@ def test_choices_are_made_again_on_every_rung_and_at_the_end_of_what_is_asked_fo
 def test_floors_at_a_fit_s_end_count_on_both_sides_of_a_comparison(monkeypatch):
     """Constants that have moved since floors were made moved without windage as well."""
 
-    def eightfold(_, around):
-        return np.full(len(around.labels), 8.0)
+    def eightfold(system):
+        return np.full(len(system.labels), 8.0)
 
     monkeypatch.setattr("pipeline.criticism.selection.stepwise._shrunk", eightfold)
     hidden = (with_drag(curved(0.02)), with_drag(curved(0.02), 6))
-    assert search(hidden, cautious(hidden, 3.0), LIBRARY)[-1].added == ("windage",)
+    assert search(cautious(hidden, 3.0), LIBRARY)[-1].added == ("windage",)
 
 
 def test_a_small_effect_matters_where_it_takes_what_would_be_told_as_a_remainder():
@@ -75,13 +75,13 @@ def test_a_small_effect_matters_where_it_takes_what_would_be_told_as_a_remainder
     """
     segments = (with_drag(curved(0.1)), with_drag(curved(0.1), 6))
     library = asking_for(0.3)
-    rungs = search(segments, fitted(segments), library)
-    assert remainder(rungs[0].around, segments, rungs[0].around.residual)
+    rungs = search(fitted(segments), library)
+    assert remainder(rungs[0].system)
     assert rungs[-1].added == ("windage",)
-    assert size_of(rungs[-1].fitted, library["windage"], "negligible") < 0.3
+    assert size_of(rungs[-1].fit, library["windage"], "negligible") < 0.3
     few = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
     for captured, times in ((few, 1.0), (segments, 10.0)):
-        last = search(captured, cautious(captured, times), library)[-1]
+        last = search(cautious(captured, times), library)[-1]
         assert last.added == ()
         seen = next(s for s in last.scores if s.candidate.effect.name == "windage")
         assert seen.shortfall.startswith("seen, at 0.")
@@ -92,9 +92,9 @@ def test_what_a_small_effect_explains_is_not_named_after_another():
     segments = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
     start = cautious(segments, 2.0)
     without = {k: v for k, v in LIBRARY.items() if k != "windage"}
-    other = search(segments, start, without)[-1].added
+    other = search(start, without)[-1].added
     assert other
-    last = search(segments, start, asking_for(0.1))[-1]
+    last = search(start, asking_for(0.1))[-1]
     assert last.added == ()
     shadowed = next(s for s in last.scores if s.candidate.effect.name == other[0])
     assert shadowed.fall > shadowed.price
@@ -106,9 +106,9 @@ def test_windage_is_found_with_its_size():
         return 0.03 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    rungs = search(segments, fitted(segments), LIBRARY)
+    rungs = search(fitted(segments), LIBRARY)
     assert rungs[-1].added == ("windage",)
-    assert rungs[-1].fitted.values["windage.drag_nm"] == pytest.approx(0.03, rel=0.05)
+    assert rungs[-1].fit.values["windage.drag_nm"] == pytest.approx(0.03, rel=0.05)
 
 
 def test_two_effects_are_found_whatever_their_order():
@@ -116,9 +116,9 @@ def test_two_effects_are_found_whatever_their_order():
         return 0.02 * np.sign(omega) + 0.02 * np.sin(theta + 0.4)
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    rungs = search(segments, fitted(segments), LIBRARY)
+    rungs = search(fitted(segments), LIBRARY)
     assert set(rungs[-1].added) == {"coulomb_friction", "unbalance"}
-    values = rungs[-1].fitted.values
+    values = rungs[-1].fit.values
     assert np.hypot(values["unbalance.sin_nm"], values["unbalance.cos_nm"]) == pytest.approx(
         0.02, rel=0.03
     )
@@ -131,22 +131,22 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
         return 0.03 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    last = search(segments, fitted(segments), LIBRARY)[-1]
-    (windage,) = last.fitted.model.effects
-    doubt = _doubt(segments, last.fitted, last.around, (windage,))
+    last = search(fitted(segments), LIBRARY)[-1]
+    (windage,) = last.fit.model.effects
+    doubt = _doubt(last.system, (windage,))
     omega = np.gradient(log().recorded["theta_mech_rad"], 5e-5)
-    place = last.around.labels.index((0, "torque_shaft_nm", 0))
-    mine = last.around.group == place
+    place = last.system.labels.index((0, "torque_shaft_nm", 0))
+    mine = last.system.group == place
     plain = segments[0].weak.project(drag(omega, 0.0)[None])[0, :, 0]
-    wrong = 0.05 * np.sqrt(np.mean(plain[last.around.window[mine]] ** 2))
-    noise = np.mean(last.around.whiten[mine] ** -2.0)
+    wrong = 0.05 * np.sqrt(np.mean(plain[last.system.window[mine]] ** 2))
+    noise = np.mean(last.system.whiten[mine] ** -2.0)
     assert doubt[place] == pytest.approx(noise / (noise + wrong**2), rel=0.1)
     assert doubt[place] < 0.9
-    assert doubt[last.around.labels.index((0, "vd_v", 0))] == 1.0
+    assert doubt[last.system.labels.index((0, "vd_v", 0))] == 1.0
     delay = effects()["sample_delay"]
     assert _kin(effects()["iron_eddy"], (windage, delay)) == [windage]
     assert _kin(delay, (windage, delay)) == []
-    assert (_doubt(segments, last.fitted, last.around, ()) == 1.0).all()
+    assert (_doubt(last.system, ()) == 1.0).all()
 
 
 def test_what_is_asked_for_is_looked_for_at_all_its_trial_shapes():
@@ -157,7 +157,7 @@ def test_what_is_asked_for_is_looked_for_at_all_its_trial_shapes():
 
     segments = (with_drag(drag), with_drag(drag, 6))
     asked = tuple(effects()[name] for name in ("coulomb_friction", "stribeck"))
-    found = fit_of(segments, Model(machine(), asked)).fitted.values
+    found = fit_of(segments, Model(machine(), asked)).system.fit.values
     assert found["stribeck.speed_rad_s"] == pytest.approx(20.0, rel=0.05)
     assert found["stribeck.excess_nm"] == pytest.approx(0.03, rel=0.05)
     assert found["coulomb_friction.torque_nm"] == pytest.approx(0.02, rel=0.05)
@@ -169,7 +169,7 @@ def test_an_effect_is_material_by_its_amplitude_and_by_shapes_that_have_a_least(
 
     def judged(name: str, **values: float) -> bool:
         full = {f"{name}.{k}": v for k, v in values.items()}
-        return material(Fitted(Model(machine(), (library[name],)), full, (), full), library[name])
+        return material(Fit((), Model(machine(), (library[name],)), full, (), full), library[name])
 
     rigid = {"damping_s": 0.0, "between": 0.0}
     assert judged("compliance", share=0.3, twist_rad=0.005, **rigid)

@@ -41,15 +41,15 @@ def with_torque(campaign: Campaign, torque) -> Campaign:
 def fit_of(campaign: Campaign):
     machine = machine_of(campaign, Constants())
     found = segments(campaign, machine)
-    return first_fit(found, rough_fit(found, Model(machine, ())))
+    return first_fit(rough_fit(found, Model(machine, ()))).fit
 
 
 def test_its_slope_is_kt():
     """1.5 p psi, whatever the transducer's zero is."""
-    fitted, _ = fit_of(table())
+    fitted = fit_of(table())
     assert 1.5 * 7 * fitted.values["psi_wb"] == pytest.approx(KT_NM_A, rel=2e-3)
     moved = with_torque(table(), lambda iq, _: 0.2 + KT_NM_A * iq)
-    assert 1.5 * 7 * fit_of(moved)[0].values["psi_wb"] == pytest.approx(KT_NM_A, rel=1e-4)
+    assert 1.5 * 7 * fit_of(moved).values["psi_wb"] == pytest.approx(KT_NM_A, rel=1e-4)
 
 
 def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
@@ -68,7 +68,7 @@ def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
 def test_state_and_transducer_are_in_the_prediction():
     """Electrical angle p theta, a shaft at rest, and 1 + gain of the transducer."""
     campaign = table()
-    fitted, _ = fit_of(campaign)
+    fitted = fit_of(campaign)
     (segment,) = segments(campaign, fitted.model.machine)
     x = operate(segment, segment.recorded, fitted.model, fitted.values)
     assert x.eps_rad == pytest.approx(7 * segment.recorded["theta_mech_rad"])
@@ -103,7 +103,7 @@ def test_a_sweep_without_levels_is_held_out_in_parts():
     sweep = Campaign("m", (replace(capture, tables=(pl.DataFrame(rows),)),))
     (segment,) = segments_of(sweep)
     assert set(segment.blocks.tolist()) == set(range(12))
-    assert 1.5 * 7 * fit_of(sweep)[0].values["psi_wb"] == pytest.approx(KT_NM_A, rel=0.01)
+    assert 1.5 * 7 * fit_of(sweep).values["psi_wb"] == pytest.approx(KT_NM_A, rel=0.01)
     still = Campaign("m", (replace(capture, tables=(pl.DataFrame(rows).head(1),)),))
     assert segments_of(still) == ()
 

@@ -13,7 +13,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect, Operating, Parameter, Told, Values
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
-from pipeline.criticism.regression.linear_system import Fitted, System, system
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import base_columns
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.selection.discrimination import told_by_wholes
@@ -149,9 +149,9 @@ def test_columns_of_a_free_shaft_that_are_kept_go_by_the_new_inertia():
     coast = replace(log(), kind="motion", channels=("torque_shaft_nm",))
     columns = base_columns(machine(), base_scales(machine()))
 
-    def around(values: dict[str, float], before: System | None = None) -> System:
-        fitted = Fitted(Model(machine(), ()), values, sigma, BASE)
-        return system((coast,), fitted, (), before)
+    def around(values: dict[str, float], before: LinearSystem | None = None) -> LinearSystem:
+        fit = Fit((coast,), Model(machine(), ()), values, sigma, BASE)
+        return linear_system(fit, (), before)
 
     sigma = (np.ones(4),)
     heavier = {**BASE, "j_kgm2": 2.0 * BASE["j_kgm2"]}
@@ -173,7 +173,7 @@ def test_a_closer_look_sees_the_torque_without_the_transducer_s_offset():
     whole = {**drive.recorded, "good": np.ones(drive.size)}
     model = Model(machine(), (offset, coupled))
     values = {**BASE, "torque_offset.offset_nm": 0.2, **zero(coupled, model)}
-    told_by_wholes((replace(drive, whole=whole),), Fitted(model, values, (), BASE), coupled)
+    told_by_wholes(Fit((replace(drive, whole=whole),), model, values, (), BASE), coupled)
     assert seen[0] == pytest.approx(drive.recorded["torque_shaft_nm"] - 0.2)
 
 

@@ -13,9 +13,9 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import Fitted, System, own_columns
+from pipeline.criticism.regression.linear_system import Fit, LinearSystem, own_columns
 from pipeline.criticism.regression.linearise import Column
-from pipeline.criticism.search import climbed
+from pipeline.criticism.search import Ladder, climbed
 from pipeline.criticism.selection.requested_model import Begun
 from pipeline.criticism.selection.score_test import Candidate, Score
 from pipeline.criticism.selection.stepwise import Rung, _holds, _refitted, _sure, search
@@ -28,7 +28,7 @@ def missing_by(**spreads):
     """A rung around which signals have these χ²/n in a hundred samples each, and no columns."""
     model = Model(machine(), ())
     none = np.zeros(len(own_columns(model)))
-    around = System(
+    system = LinearSystem(
         columns=tuple(own_columns(model)),
         residual=np.repeat(np.sqrt(list(spreads.values())), 100),
         matrix=np.zeros((100 * len(spreads), none.size)),
@@ -40,11 +40,11 @@ def missing_by(**spreads):
         labels=tuple((0, name, 0) for name in spreads),
         penalty=none,
         pull=none,
-        around=Fitted(model, dict(BASE), (), BASE),
-        tests=("drive",),
+        fit=Fit((log(),) * 3, model, dict(BASE), (), BASE),
+        own_count=none.size,
         made_at={},
     )
-    return Rung((), around.around, around, ())
+    return Rung((), system, ())
 
 
 @pytest.mark.parametrize(("after", "kept"), [(5.5, 2), (4.97, 2), (4.9, 3)])
@@ -52,8 +52,8 @@ def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, 
     rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
-    totals = [HeldOut(rungs[0].around.residual, total) for total in (10.0, 5.0, after)]
-    assert len(trusted((), rungs, totals)[0]) == kept
+    totals = [HeldOut(rungs[0].system.residual, total) for total in (10.0, 5.0, after)]
+    assert len(trusted(rungs, totals)[0]) == kept
 
 
 @pytest.mark.parametrize(
@@ -67,29 +67,33 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     """
     skin = effects()["skin_effect"]
     first = missing_by(vq_v=1e4)
-    model = first.fitted.model.with_effects(skin)
+    model = first.fit.model.with_effects(skin)
     columns = own_columns(model)
     matrix = np.zeros((100, len(columns)))
     matrix[:, [c.name == "skin_effect.meter_rise" for c in columns]] = float(heard)
     found = {"rise": 0.5, "meter_rise": meter_rise, "inner": 0.0, "bend": 0.0}
     values = {**BASE, **{f"skin_effect.{name}": value for name, value in found.items()}}
     rung = missing_by(vq_v=1e3)
-    around = replace(rung.around, columns=tuple(columns), matrix=matrix)
-    second = Rung(("skin_effect",), Fitted(model, values, (), BASE), around, ())
+    fit = Fit((log(),), model, values, (), BASE)
+    system = replace(
+        rung.system, columns=tuple(columns), matrix=matrix, fit=fit, own_count=len(columns)
+    )
+    second = Rung(("skin_effect",), system, ())
     over = (Remainder("one", "vq_v", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
-    held = [HeldOut(first.around.residual, total) for total in (10.0, 5.0)]
-    assert len(trusted((log(),), (first, second), held)[0]) == kept
+    held = [HeldOut(first.system.residual, total) for total in (10.0, 5.0)]
+    assert len(trusted((first, second), held)[0]) == kept
     assert ("meter_rise of 0" in denied(second)) is (kept == 1)
     found, totals = (first, second), iter(held)
     monkeypatch.setattr("pipeline.criticism.search.search", lambda *_: found)
     monkeypatch.setattr("pipeline.criticism.search.leave_out", lambda *_: next(totals))
     monkeypatch.setattr("pipeline.criticism.search.in_common", lambda _, alone: list(alone))
-    cut = climbed(Begun((log(),), first.fitted, first.around, ()), {}).cut
+    cut = climbed(Begun(first.system, ()), {}).cut
     assert list(cut) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0, policy=DEFAULT.selection)
-    (ranked,) = _ranking((replace(first, scores=(score,)),), held[:1], (), {}, (), cut)
+    ladder = Ladder(Begun(first.system, ()), (replace(first, scores=(score,)),), held[:1], (), cut)
+    (ranked,) = _ranking(ladder, (), {})
     assert ("speak against" in ranked.shortfall) is (kept == 1)
 
 
@@ -98,7 +102,7 @@ def with_waves(*spreads: float) -> Rung:
     names = ("plain", "seventh", "cogging")
     rung = missing_by(**dict(zip(names, spreads, strict=True)))
     labels = tuple((0, "torque_shaft_nm", order) for order in (0, 7, 84))
-    return replace(rung, around=replace(rung.around, labels=labels))
+    return replace(rung, system=replace(rung.system, labels=labels))
 
 
 @pytest.mark.parametrize(
@@ -110,8 +114,8 @@ def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeyp
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
-    held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 98.0)]
-    assert len(trusted((log(),), rungs, held)[0]) == kept
+    held = [HeldOut(rungs[0].system.residual, total) for total in (97.0, 98.0)]
+    assert len(trusted(rungs, held)[0]) == kept
 
 
 @pytest.mark.parametrize(("after", "kept"), [(0.5, 2), (20.0, 1)])
@@ -121,14 +125,14 @@ def test_waves_that_another_signal_keeps_do_not_make_a_guess_of_what_clears_one(
     """An open winding whose magnet's temperature was not logged, beside cogging in a slow turn."""
     labels = ((0, "torque_shaft_nm", 84), (1, "vd_v", 42))
     rungs = [
-        replace(rung, around=replace(rung.around, labels=labels))
+        replace(rung, system=replace(rung.system, labels=labels))
         for rung in (missing_by(cogging=5e3, winding=1e6), missing_by(cogging=after, winding=1e6))
     ]
     over = (Remainder("one", "vd_v", 42, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
-    held = [HeldOut(rungs[0].around.residual, total) for total in (97.0, 97.0)]
-    assert len(trusted((log(), log()), rungs, held)[0]) == kept
+    held = [HeldOut(rungs[0].system.residual, total) for total in (97.0, 97.0)]
+    assert len(trusted(rungs, held)[0]) == kept
 
 
 @pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])
@@ -140,7 +144,7 @@ def test_what_one_signal_gained_does_not_explain_another(speed, said):
     left = [Remainder("one", name, 0, 9.0, 1.0) for name in names]
     first = missing_by(omega_mech_rad_s=100.0, torque_shaft_nm=1e6)
     last = missing_by(omega_mech_rad_s=speed, torque_shaft_nm=2.0)
-    held = [HeldOut(first.around.residual, total) for total in (100.0, 2.0)]
+    held = [HeldOut(first.system.residual, total) for total in (100.0, 2.0)]
     assert explained((first, last), held, left) is said
 
 
@@ -149,7 +153,7 @@ def test_what_predicts_no_capture_better_explains_nothing(total, said):
     """From a million floors to a thousand is half of the logarithm, and still a thousand."""
     left = [Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0)]
     first, last = missing_by(torque_shaft_nm=1e6), missing_by(torque_shaft_nm=900.0)
-    held = [HeldOut(first.around.residual, one) for one in (244.1, total)]
+    held = [HeldOut(first.system.residual, one) for one in (244.1, total)]
     assert explained((first, last), held, left) is said
 
 
@@ -158,7 +162,7 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
     """χ²/n of 3 that forms which are a little wrong may have made: neither a signal below its floor
     nor one above says that an effect is there.
     """
-    wide, tried = (missing_by(torque_shaft_nm=q).around for q in (3.0, 0.2))
+    wide, tried = (missing_by(torque_shaft_nm=q).system for q in (3.0, 0.2))
     after = tried.spreads(tried.residual)
     doubts = np.array([doubt]), np.array([doubt])
     assert _holds(wide, np.array([3.0]), tried, after, (10.0, 10.0), doubts) is kept
@@ -175,24 +179,26 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
         ("compliance", {"share": 0.1, "twist_rad": 1e-3}, {"twist_rad": 1e-3}, False),
     ],
 )
-def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, sure):
+def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, sure, monkeypatch):
     """Two captures, without the one or the other of which the parameters move so far."""
-    plain = missing_by(torque_shaft_nm=1.0).around
+    plain = missing_by(torque_shaft_nm=1.0).system
     full = {f"{name}.{key}": value for key, value in values.items()}
     model = Model(machine(), (effects()[name],))
-    fitted = Fitted(model, {**BASE, **zero(effects()[name], model), **full}, (), {})
+    fit = Fit((log(),) * 3, model, {**BASE, **zero(effects()[name], model), **full}, (), {})
     random = np.random.default_rng(4)
-    around = replace(
+    system = replace(
         plain,
         columns=tuple(Column(key, 1e-3) for key in full),
         matrix=random.normal(0.0, 1e5, (plain.size, len(full))),
         penalty=np.zeros(len(full)),
         pull=np.zeros(len(full)),
-        around=fitted,
+        fit=fit,
+        own_count=len(full),
     )
     step = np.array([apart.get(key, 0.0) for key in values])
     held = HeldOut(plain.residual, 1.0, {0: step, 1: -step})
-    assert _sure(fitted, around, held) is sure
+    monkeypatch.setattr("pipeline.criticism.selection.stepwise.leave_out", lambda _: held)
+    assert _sure(system) is sure
 
 
 @pytest.mark.parametrize(
@@ -215,23 +221,23 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
         policy=DEFAULT.selection,
     )
 
-    def gauss_newton(_segments, start, before):
+    def gauss_newton(start, before):
         asked.append(round(start.values["r_ohm"], 6))
         misfit = foreseen if asked[-1] == 0.4 else near
-        return start, replace(before, residual=np.full(before.size, misfit))
+        return replace(before, fit=start, residual=np.full(before.size, misfit))
 
     monkeypatch.setattr("pipeline.criticism.selection.stepwise.gauss_newton", gauss_newton)
-    monkeypatch.setattr(System, "misfit", property(lambda one: float(one.residual[0])))
-    wide = missing_by(torque_shaft_nm=100.0**2).around
-    fitted = Fitted(Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
-    assert _refitted((), fitted, score, wide)[1].misfit == end
+    monkeypatch.setattr(LinearSystem, "misfit", property(lambda one: float(one.residual[0])))
+    fit = Fit((log(),), Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
+    wide = replace(missing_by(torque_shaft_nm=100.0**2).system, fit=fit)
+    assert _refitted(wide, score).misfit == end
     assert asked == begun
 
 
 def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
     """A removal on the way leaves rungs and names of different counts."""
     rungs = [
-        Rung(added, None, None, ())  # type: ignore[arg-type]
+        Rung(added, None, ())  # type: ignore[arg-type]
         for added in ((), ("cogging",), ("saturation",), ("saturation", "windage"))
     ]
     held = [HeldOut(np.zeros(1), total) for total in (math.e**4, math.e**3, math.e, math.e**1.5)]
@@ -242,9 +248,9 @@ def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
 @pytest.mark.parametrize(("after", "kept"), [(9.5, 1), (8.5, 1), (5.0, 2)])
 def test_beside_an_unknown_a_name_must_take_a_fifth_of_the_error(after, kept):
     segments = tuple(with_drag(lambda _, theta: 0.3 * np.cos(3.0 * theta), n) for n in (5, 6))
-    (first,) = search(segments, fitted(segments), {})
+    (first,) = search(fitted(segments), {})
     second = replace(first, added=("windage",))
-    totals = [HeldOut(first.around.residual, total) for total in (10.0, after)]
-    rungs, left = trusted(segments, (first, second), totals)
+    totals = [HeldOut(first.system.residual, total) for total in (10.0, after)]
+    rungs, left = trusted((first, second), totals)
     assert len(rungs) == kept
     assert {one.signal for one in left} >= {"torque_shaft_nm"}

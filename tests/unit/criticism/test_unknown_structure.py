@@ -18,7 +18,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fitted, floors, system
+from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
 from pipeline.criticism.residuals.residual import residual
 from tests.unit.criticism.machines import BASE, fitted, log, machine, operating, with_drag
 
@@ -26,7 +26,7 @@ from tests.unit.criticism.machines import BASE, fitted, log, machine, operating,
 def told(drag, tmp_path):
     """The structure found in two logs with a further drag, and its effect file as a module."""
     segments = tuple(_cool(with_drag(drag, seed)) for seed in (5, 6))
-    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"], name="mine")
+    found, _ = unknown_structure(linear_system(fitted(segments)), ["torque_shaft_nm"], name="mine")
     path = tmp_path / "mine.py"
     path.write_text(found.source, encoding="utf-8")
     spec = importlib.util.spec_from_file_location("mine", path)
@@ -101,7 +101,7 @@ def _softening(seed, fall_h_k):
 def test_an_inductance_that_goes_with_a_temperature_comes_out_as_one_term(tmp_path):
     fall = 2e-3 * BASE["lq_h"]
     segments = tuple(_softening(seed, fall) for seed in (5, 6))
-    found, _ = unknown_structure(segments, fitted(segments), ["vd_v", "vq_v"], name="mine")
+    found, _ = unknown_structure(linear_system(fitted(segments)), ["vd_v", "vq_v"], name="mine")
     assert found.variables[0] == "temp_winding_degc" and "iq_a" in found.variables
     ((term, size, unit),) = found.sketch
     assert "q axis: iq_a²" in term
@@ -166,7 +166,7 @@ def test_the_effect_file_computes_the_expression_it_tells(tmp_path):
 def test_variables_that_run_along_with_each_other_are_all_told():
     """In these logs temperature rises with speed: either could be the cause, and both are named."""
     segments = (with_drag(brake), with_drag(brake, 6))
-    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"])
+    found, _ = unknown_structure(linear_system(fitted(segments)), ["torque_shaft_nm"])
     assert found.variables == ("omega_mech_rad_s",)
     told_of = {name for names, _ in found.alternatives for name in names}
     assert "temp_winding_degc" in told_of
@@ -176,7 +176,7 @@ def test_variables_that_run_along_with_each_other_are_all_told():
 def test_two_variables_are_told_where_it_takes_two():
     """A grease that melts: speed times a curve of temperature."""
     segments = tuple(_warmed(seed) for seed in (5, 6))
-    found, _ = unknown_structure(segments, fitted(segments), ["torque_shaft_nm"])
+    found, _ = unknown_structure(linear_system(fitted(segments)), ["torque_shaft_nm"])
     assert set(found.variables) == {"temp_winding_degc", "omega_mech_rad_s"}
     assert "omega_mech_rad_s" in found.times
 
@@ -184,7 +184,7 @@ def test_two_variables_are_told_where_it_takes_two():
 def test_a_test_that_was_done_once_is_held_out_in_parts():
     """A drag that melts as one log warms: no other log knows of it, but its other parts do."""
     warmed, cold = _slowly_warmed(5), _cool(log(noise=1.0, seed=6))
-    what = (warmed, cold), fitted((warmed, cold)), ["torque_shaft_nm"]
+    what = linear_system(fitted((warmed, cold))), ["torque_shaft_nm"]
     whole, _ = unknown_structure(*what)
     assert whole is None or "temp_winding_degc" not in whole.variables
     found, _ = unknown_structure(*what, in_parts=True)
@@ -267,8 +267,8 @@ def test_an_unknown_drag_is_told_by_its_variable_and_curve():
 
     segments = (with_drag(drag), with_drag(drag, 6))
     start = fitted(segments)
-    assert remainder(system(segments, start), segments, system(segments, start).residual)
-    sketch, gain = unknown_structure(segments, start, ["torque_shaft_nm"])
+    assert remainder(linear_system(start))
+    sketch, gain = unknown_structure(linear_system(start), ["torque_shaft_nm"])
     assert gain > 100.0
     assert sketch.signal == "torque_shaft_nm"
     assert sketch.variables == ("omega_mech_rad_s",)
@@ -282,8 +282,8 @@ def test_a_wave_of_an_order_that_is_no_whole_number_is_told_with_its_phase():
     load = 0.03 * np.abs(current) / top
     segments = tuple(with_drag(lambda _, th: load * np.sin(4.83 * th + 0.5), n) for n in (5, 6))
     model = Model(replace(machine(), load_orders=(4.83,)), ())
-    begun = Fitted(model, dict(BASE), floors(segments, model, BASE), BASE)
-    sketch, _ = unknown_structure(segments, gauss_newton(segments, begun)[0], ["torque_shaft_nm"])
+    begun = Fit(segments, model, dict(BASE), floors(segments, model, BASE), BASE)
+    sketch, _ = unknown_structure(gauss_newton(begun), ["torque_shaft_nm"])
     assert sketch.variables == ("theta_mech_rad", "iq_a")
     sizes = {term: size for term, size, _ in sketch.sketch}
     (sine,) = (size for term, size in sizes.items() if "sin(4.83 theta_mech_rad)" in term)
