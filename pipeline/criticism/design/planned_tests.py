@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment, electrical_orders, slow_orders
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.design import Design
-from pipeline.criticism.regression.linear_system import Fit
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.projection import projection, window_starts
 

@@ -14,8 +14,9 @@ from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.policy import Policy
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import told_groups
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.records.diagnosis import UnknownStructure
 

@@ -16,7 +16,8 @@ from pipeline.criticism.data.segment import Segment, row_index
 from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.machine.model import PHYSICAL, Model, base_of, zero
 from pipeline.criticism.regression.bounds import Best, bounded_step
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem, floors, linear_system
+from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse

@@ -14,7 +14,8 @@ from scipy.special import chdtri, ndtr
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.regression import Goodness
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import (
     channel_of,
     channel_scale,

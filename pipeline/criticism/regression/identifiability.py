@@ -13,8 +13,9 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from pipeline.numerics.identifiability import (
     REACH,

@@ -7,9 +7,10 @@ from dataclasses import replace
 from itertools import product
 
 from pipeline.criticism.effect import Effect, Values
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import told_groups
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem
+from pipeline.criticism.regression.linear_system import LinearSystem
 
 
 def reconsidered(system: LinearSystem) -> LinearSystem:

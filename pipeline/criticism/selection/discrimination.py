@@ -11,8 +11,9 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Effect, Parameter, Told, Values, Whole
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import measured, operate
 
 

@@ -19,9 +19,9 @@ import numpy as np
 from pipeline.criticism.data.segment import Segment, clock
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.residual import disturbed
 from pipeline.records.diagnosis import Remainder

@@ -13,8 +13,9 @@ import numpy as np
 
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.machine.model import zero
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.normal_equations import Grams
 
 

@@ -18,12 +18,8 @@ from numpy.typing import NDArray
 from pipeline.criticism.effect import Array, Effect, Machine, Parameter
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.selection import Selection
-from pipeline.criticism.regression.linear_system import (
-    Fit,
-    LinearSystem,
-    linear_system,
-    own_columns,
-)
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, own_columns
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.criticism.regression.normal_equations import Descent, Grams, misfit_of
 

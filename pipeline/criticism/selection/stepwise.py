@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Effect
+from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.goodness import (
     in_common,
@@ -18,14 +19,7 @@ from pipeline.criticism.regression.goodness import (
     told_groups,
 )
 from pipeline.criticism.regression.identifiability import surely_there
-from pipeline.criticism.regression.linear_system import (
-    Fit,
-    LinearSystem,
-    floors,
-    floors_grown,
-    linear_system,
-    tolerances,
-)
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import Grams
 from pipeline.criticism.selection.choices import reconsidered

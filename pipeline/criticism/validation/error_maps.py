@@ -14,7 +14,8 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.validation import Validation
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.cell_means import cell_means, visits_of

@@ -13,8 +13,9 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.traces import smoothed
 from pipeline.criticism.effect import Array
 from pipeline.criticism.library.equations import equation_of
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem
+from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import disjoint, unit_of
 from pipeline.criticism.validation.free_run import Run, free_run

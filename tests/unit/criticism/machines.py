@@ -10,8 +10,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import GAINS, STATE, Model
+from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.numerics.projection import projection
 
 BASE = {

@@ -10,9 +10,9 @@ import pytest
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.criticism.regression.linearise import linearise
 from pipeline.criticism.selection.drift import slowest, wandering, wanders
 from tests.unit.criticism.machines import BASE, log, machine

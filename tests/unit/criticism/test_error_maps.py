@@ -11,7 +11,8 @@ import pytest
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
+from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.validation.error_maps import (
     Errors,

@@ -16,7 +16,7 @@ from pipeline.criticism.effect import Parameter
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import Fit, floors
+from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, widened

@@ -9,8 +9,9 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
-from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.selection.stepwise import _floored_anew
 from tests.unit.criticism.machines import BASE, coasting, fitted, log, machine, with_drag
 

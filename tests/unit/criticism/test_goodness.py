@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.criticism.diagnosis import _as_told
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
     in_common,
@@ -18,7 +19,7 @@ from pipeline.criticism.regression.goodness import (
     remainder,
 )
 from pipeline.criticism.regression.identifiability import known_by
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from tests.unit.criticism.machines import BASE, fitted, log, machine
 

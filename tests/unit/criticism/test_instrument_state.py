@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.linear_system import Fit, floors
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
 from tests.unit.criticism.machines import BASE, log, machine

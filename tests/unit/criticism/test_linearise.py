@@ -11,13 +11,8 @@ from pipeline.criticism.data.segment import row_index
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.linear_system import (
-    Fit,
-    _kept,
-    floors,
-    linear_system,
-    own_columns,
-)
+from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.linear_system import _kept, linear_system, own_columns
 from pipeline.criticism.regression.linearise import _Sampler, absorb, effect_columns, whitened_anew
 from pipeline.criticism.regression.noise_floors import offsets
 from pipeline.criticism.residuals.residual import residual

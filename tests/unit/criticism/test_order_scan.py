@@ -9,7 +9,8 @@ import pytest
 
 from pipeline.criticism.data.segment import electrical_orders, row_index
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
+from pipeline.criticism.regression.fit import Fit, floors
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.selection.order_scan import Part, orders_left
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
-from pipeline.criticism.regression.linear_system import Fit
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.selection import pruning
 from pipeline.criticism.selection.pruning import trimmed, whole
 from tests.unit.criticism.machines import BASE, machine

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.criticism import search
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.linear_system import Fit
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.search import ended
 from pipeline.records.comparison import ModelSpec
 from tests.unit.criticism.machines import machine

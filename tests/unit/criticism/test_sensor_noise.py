@@ -16,7 +16,8 @@ from pipeline.criticism.data.sensor_noise import (
     sensor_noise,
 )
 from pipeline.criticism.machine.model import Model
-from pipeline.criticism.regression.linear_system import Fit, floors, floors_grown, linear_system
+from pipeline.criticism.regression.fit import Fit, floors, floors_grown
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.selection.stepwise import _shrunk
 from tests.unit.criticism.machines import BASE, coasting, log, machine

@@ -7,8 +7,8 @@ import pytest
 
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fit
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.selection.stepwise import _doubt, _kin, material, search, size_of
 from tests.unit.criticism.machines import (

@@ -13,7 +13,8 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect, Operating, Parameter, Told, Values
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem, linear_system
+from pipeline.criticism.regression.fit import Fit
+from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import base_columns
 from pipeline.criticism.residuals.residual import operate, residual
 from pipeline.criticism.selection.discrimination import told_by_wholes

@@ -12,8 +12,9 @@ from pipeline.criticism.diagnosis import _drop, _ranking
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
-from pipeline.criticism.regression.linear_system import Fit, LinearSystem, own_columns
+from pipeline.criticism.regression.linear_system import LinearSystem, own_columns
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.search import Ladder, climbed
 from pipeline.criticism.selection.requested_model import Begun

@@ -16,9 +16,10 @@ from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.effect import Effect, Parameter
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
-from pipeline.criticism.regression.linear_system import Fit, floors, linear_system
+from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.residuals.residual import residual
 from tests.unit.criticism.machines import BASE, fitted, log, machine, operating, with_drag
 
