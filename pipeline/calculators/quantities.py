@@ -129,8 +129,27 @@ class Calculator:
 def parse(kind: str, calculator: Calculator, mapping: Mapping[str, str]) -> Given:
     """The typed keys as numbers in the keys' units.
 
-    Raises UsageError for an unknown key, a key given twice, and a value that is no number of the
-    key's unit or outside its sense.
+    Parameters
+    ----------
+    kind
+        Name of the calculator, for messages.
+    calculator
+        Its keys, with their units.
+    mapping
+        What was typed, by the name under which it was: a number, one with a unit, a list or a
+        choice.
+
+    Returns
+    -------
+    Given
+        Numbers [the key's unit] and texts by the key's full name.
+
+    Raises
+    ------
+    UsageError
+        A key is unknown or given twice, or a value is no number of the key's unit or not above the
+        key's lowest.
+
     """
     index = calculator.index()
     numbers: dict[str, tuple[float, ...]] = {}
@@ -190,10 +209,28 @@ def _keys_hint(calculator: Calculator) -> str:
 
 
 def agreed(given: Given, values: Mapping[str, float], quantity: Quantity = "coupling") -> float:
-    """The one value that several keys imply, the first one's.
+    """The one value that several keys imply.
 
-    Raises UsageError where two differ by more than 0.5 %, naming the convention that the ratio
-    lands on.
+    Parameters
+    ----------
+    given
+        What was typed, for messages and for the pole pairs.
+    values
+        What each key implies, in one unit; at least one.
+    quantity
+        What the values are of, for the conventions that they may differ by.
+
+    Returns
+    -------
+    float
+        The first of them.
+
+    Raises
+    ------
+    UsageError
+        Another one differs from it by more than `AGREEMENT`; the message names the convention that
+        their ratio lands on.
+
     """
     (first, value), *others = values.items()
     pairs = round(given.one("pole_pairs")) if given.has("pole_pairs") else None

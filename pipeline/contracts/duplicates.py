@@ -42,9 +42,21 @@ POLICY = DuplicatePolicy()
 
 
 def once(captures: Sequence[Capture]) -> tuple[tuple[Capture, ...], tuple[Finding, ...]]:
-    """The captures without those whose rows another one holds, and a finding for each of these.
+    """The captures without those whose rows another one holds.
 
-    Of two the longer is used, of two equally long the one whose bytes are verified, then the first.
+    Parameters
+    ----------
+    captures
+        Of one motor.
+
+    Returns
+    -------
+    kept
+        By path. Of two the longer, of two equally long the one whose bytes are verified, then the
+        first by path.
+    findings
+        A warning for each of the others.
+
     """
     ranked = sorted(captures, key=lambda c: (-_rows(c), c.integrity != "verified", c.path))
     prints = {c.path: _fingerprint(c) for c in ranked}

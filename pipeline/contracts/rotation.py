@@ -57,10 +57,23 @@ def shaft_angle(capture: Capture, t_s: Array) -> Array | None:
 
 
 def line_voltage_vector(capture: Capture) -> tuple[Array, NDArray[np.complex128]] | None:
-    """Clock [n, s] and space vector [n, V] of the line voltages; None with fewer than two.
+    """Space vector of the line voltages.
 
-    x = (2/3)(ab + bc e^{j2pi/3} + ca e^{-j2pi/3}) turns forward where a leads b leads c; a third
+    Parameters
+    ----------
+    capture
+        With two or three line voltages on one clock.
+
+    Returns
+    -------
+    (t_s, vector) or None
+        [n, s] and complex [n, V]; None with fewer than two.
+
+    Notes
+    -----
+    x = (2/3)(ab + bc e^{j2π/3} + ca e^{−j2π/3}) turns forward where a leads b leads c; a third
     voltage that is not there is minus the sum of the others.
+
     """
     return _vector_of(capture, LINE_VOLTAGES)
 
@@ -87,10 +100,25 @@ def _vector_of(
 
 
 def turning(capture: Capture, vector_of: VectorOf = line_voltage_vector) -> Turning | None:
-    """Electrical cycles a mechanical turn, signed, from line voltages and angle or speed.
+    """Electrical cycles a mechanical turn, signed, from a space vector and the angle or speed.
 
-    Block increments of the space vector's angle are regressed through zero on the shaft's, over
-    the blocks in which the vector stands clear of noise. None where there is too little of it.
+    Parameters
+    ----------
+    capture
+        With both; they may be on different clocks.
+    vector_of
+        Gives the space vector: line voltages by default.
+
+    Returns
+    -------
+    Turning or None
+        None where one is missing or there is too little of it.
+
+    Notes
+    -----
+    Increments of the vector's angle over `BLOCKS` blocks are regressed through zero on the shaft's,
+    over the blocks in which the vector stands clear of noise: above a tenth of its 95th percentile.
+
     """
     vector = vector_of(capture)
     if vector is None:
@@ -120,7 +148,19 @@ def turning(capture: Capture, vector_of: VectorOf = line_voltage_vector) -> Turn
 
 
 def turned_rad(capture: Capture) -> float | None:
-    """Range of shaft angle passed [rad], None without angle or speed."""
+    """Range of shaft angle that was passed.
+
+    Parameters
+    ----------
+    capture
+        With angle or speed.
+
+    Returns
+    -------
+    float or None
+        Largest less smallest angle [rad]; None without angle or speed.
+
+    """
     for table in capture.tables:
         if {"theta_mech_rad", "omega_mech_rad_s"} & set(table.columns) and "t_s" in table.columns:
             angle = shaft_angle(capture, table["t_s"].to_numpy())

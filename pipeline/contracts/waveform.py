@@ -14,17 +14,47 @@ MAD_TO_SIGMA = 1.4826
 
 
 def noise_of(values: Array) -> float:
-    """Standard deviation [unit of values] of white noise on a slow signal [n].
+    """Standard deviation of white noise on a slow signal.
 
-    From the median absolute second difference, which ramps and edges of the signal do not move:
-    sigma = 1.4826 median|x[k+1] - 2 x[k] + x[k-1]| / sqrt(6).
+    Parameters
+    ----------
+    values
+        Samples [n, any unit]; those that are not finite are left out.
+
+    Returns
+    -------
+    float
+        Unit of the values; 0 for fewer than three.
+
+    Notes
+    -----
+    σ = 1.4826 median|x_(k+1) − 2 x_k + x_(k−1)|/√6: ramps and edges of the signal do not move it.
+
     """
     bends = np.abs(np.diff(values[np.isfinite(values)], n=2))
     return MAD_TO_SIGMA * float(np.median(bends)) / math.sqrt(6.0) if bends.size else 0.0
 
 
 def runs_of_equal(values: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First row and length of every stretch of exactly equal samples [n]; NaN equals nothing."""
+    """Stretches of exactly equal samples.
+
+    Parameters
+    ----------
+    values
+        Samples [n]; NaN equals nothing.
+
+    Returns
+    -------
+    starts, lengths
+        First row and number of rows of each; together they cover all rows.
+
+    Examples
+    --------
+    >>> starts, lengths = runs_of_equal(np.array([1.0, 1.0, 2.0]))
+    >>> starts.tolist(), lengths.tolist()
+    ([0, 2], [2, 1])
+
+    """
     if values.size == 0:
         empty = np.empty(0, dtype=np.int64)
         return empty, empty
@@ -40,10 +70,25 @@ def share_of_repeats(values: Array) -> float:
 
 
 def longest_likely_run(values: Array, level: float) -> float:
-    """Length that a run of equal samples exceeds by chance with probability `level` at most.
+    """Length that a run of equal samples exceeds by chance with a given probability at most.
 
-    With p the share of samples equal to the one before, n p^(L-1) is the expected number of
-    runs of L or more in n samples; infinite where most samples repeat and a run says nothing.
+    Parameters
+    ----------
+    values
+        Samples [n].
+    level
+        Expected number of such runs in a signal of this length [1].
+
+    Returns
+    -------
+    float
+        [samples]; infinite where more than half of the samples repeat and a run says nothing.
+
+    Notes
+    -----
+    With p the share of samples equal to the one before, n p^(L−1) is the expected number of runs of
+    L or more in n samples.
+
     """
     repeats = share_of_repeats(values)
     if repeats > 0.5:
@@ -61,7 +106,29 @@ def rows_of_runs(size: int, starts: NDArray[np.int64], lengths: NDArray[np.int64
 
 
 def gaps_of(t_s: Array, factor: float) -> tuple[NDArray[np.int64], float]:
-    """Rows after which more than `factor` median intervals pass, and that interval [s]."""
+    """Gaps of a clock.
+
+    Parameters
+    ----------
+    t_s
+        Instants [n, s].
+    factor
+        Median intervals beyond which an interval is a gap [1].
+
+    Returns
+    -------
+    rows
+        Those after which a gap comes.
+    interval
+        The median [s]; NaN for fewer than two rows.
+
+    Examples
+    --------
+    >>> rows, interval = gaps_of(np.array([0.0, 1.0, 2.0, 5.0]), 1.5)
+    >>> rows.tolist(), interval
+    ([2], 1.0)
+
+    """
     steps = np.diff(t_s)
     if steps.size == 0:
         return np.empty(0, dtype=np.int64), math.nan
@@ -70,9 +137,23 @@ def gaps_of(t_s: Array, factor: float) -> tuple[NDArray[np.int64], float]:
 
 
 def missing_samples(t_s: Array, gaps: NDArray[np.int64], usual_s: float) -> float:
-    """Samples that the gaps cost: what they skip, less what a hurried clock made up for.
+    """Samples that gaps cost: what they skip, less what a hurried clock made up for.
 
-    A logger that stalls and then catches up loses nothing: the rows still fill the time.
+    Parameters
+    ----------
+    t_s
+        Instants [n, s].
+    gaps
+        Rows after which a gap comes.
+    usual_s
+        Interval between two rows [s].
+
+    Returns
+    -------
+    float
+        [samples]. A logger that stalls and then catches up loses nothing: the rows still fill the
+        time.
+
     """
     skipped = float(np.sum(np.diff(t_s)[gaps] / usual_s - 1.0))
     short = (t_s[-1] - t_s[0]) / usual_s + 1.0 - t_s.size
@@ -80,10 +161,23 @@ def missing_samples(t_s: Array, gaps: NDArray[np.int64], usual_s: float) -> floa
 
 
 def samples_per_time_constant(values: Array) -> float:
-    """Samples in one time constant of the edges of an exponential step response [n].
+    """Samples in one time constant of the edges of an exponential step response.
 
-    An exponential passes from 10 % to 90 % of its way in ln(9) time constants, so the rows
-    between those levels over the number of edges, over ln 9. Infinite without an edge.
+    Parameters
+    ----------
+    values
+        Step response [n, any unit], one edge or several.
+
+    Returns
+    -------
+    float
+        [samples]; infinite without an edge.
+
+    Notes
+    -----
+    An exponential passes from 10 % to 90 % of its way in ln 9 time constants, so it is the rows
+    between those levels, over the number of edges, over ln 9.
+
     """
     low, high = np.percentile(values, [1.0, 99.0])
     way = (values - low) / max(high - low, np.finfo(np.float64).tiny)

@@ -80,10 +80,33 @@ CAMPAIGN: tuple[tuple[str, str, Mapping[str, Any]], ...] = (
 def record(
     test: str, motor: Motor, bench: Bench, rng: np.random.Generator, **protocol: Any
 ) -> Recording:
-    """One capture of a test of `contract/capture.md`; `protocol` are fields of its dataclass.
+    """One capture of a test of `contract/capture.md`.
 
-    The station's gains are drawn from `rng` unless `bench.instruments` fixes them. Raises
-    ValueError for an unknown test and TypeError for an unknown protocol field.
+    Parameters
+    ----------
+    test
+        Its name.
+    motor
+        Design and effects.
+    bench
+        The station; its gains are drawn from `rng` unless `bench.instruments` fixes them.
+    rng
+        Source of gains, noise and start angle.
+    protocol
+        Fields of the test's dataclass in `protocols`.
+
+    Returns
+    -------
+    Recording
+        Tables of one clock each.
+
+    Raises
+    ------
+    ValueError
+        There is no such test.
+    TypeError
+        There is no such field of the protocol.
+
     """
     if test not in _TESTS:
         raise ValueError(f"no test {test}; there are {', '.join(_TESTS)}")
@@ -114,7 +137,23 @@ def campaign(
 ) -> list[Recording]:
     """All captures of one motor on one station, whose gains are drawn once.
 
-    Each capture has a generator of its own, so that leaving one out changes no other.
+    Parameters
+    ----------
+    motor
+        Design and effects.
+    bench
+        The station.
+    seed
+        Of the station's gains and of each capture.
+    plan
+        File stem, test and protocol of each capture; `CAMPAIGN` where empty.
+
+    Returns
+    -------
+    list of Recording
+        In order of the plan. Each has a generator of its own, by its place there: another protocol
+        of one changes no other.
+
     """
     steps = plan or CAMPAIGN
     first, *rest = np.random.SeedSequence(seed).spawn(1 + len(steps))

@@ -54,7 +54,24 @@ def _fields(kind: type, document: Mapping[str, Any], what: str) -> dict[str, Any
 
 
 def motor_from(document: Mapping[str, Any]) -> Motor:
-    """A motor from the document of a design; raises ValueError with what is wrong in it."""
+    """A motor from the document of a design.
+
+    Parameters
+    ----------
+    document
+        Fields of `Motor` by name, and `effects`; `bench` is left aside.
+
+    Returns
+    -------
+    Motor
+        With its effects.
+
+    Raises
+    ------
+    ValueError
+        A field is unknown, missing or no number, or an effect impossible.
+
+    """
     plain = {k: v for k, v in document.items() if k not in {"effects", "bench"}}
     values = _fields(Motor, plain, "a motor")
     needed = {f.name for f in fields(Motor) if f.default is f.default_factory is MISSING}
@@ -65,7 +82,27 @@ def motor_from(document: Mapping[str, Any]) -> Motor:
 
 
 def effects_from(document: Mapping[str, Any], motor: Motor) -> Effects:
-    """Effects from name: size or name: {parameter: value}; checked against the library."""
+    """Effects of a document, checked against the library.
+
+    Parameters
+    ----------
+    document
+        Size, or mapping of parameters, by name of the effect.
+    motor
+        Whose ratings make the typical sizes.
+
+    Returns
+    -------
+    dict
+        The same as numbers.
+
+    Raises
+    ------
+    ValueError
+        An effect or parameter is unknown, a value no number, or a size below 0 of an effect without
+        sign.
+
+    """
     effects: dict[str, Size] = {}
     for name, value in document.items():
         size: Size
@@ -90,10 +127,26 @@ def bench_from(document: Mapping[str, Any]) -> Bench:
 
 
 def with_effects(motor: Motor, text: str) -> Motor:
-    """The motor with effects as typed: `[cogging, dead_time=0.3, saturation.size_d=0.1]`.
+    """A motor with effects as typed: `[cogging, dead_time=0.3, saturation.size_d=0.1]`.
 
-    A name alone has its typical size. Names of `outside.OUTSIDE` are understood as well, their
-    value a factor on the typical size. Raises ValueError for what it does not understand.
+    Parameters
+    ----------
+    motor
+        Design and the effects that it has.
+    text
+        Names, which alone have their typical size; those of `outside.OUTSIDE` are understood as
+        well, their value a factor on the typical size [1].
+
+    Returns
+    -------
+    Motor
+        With these effects further.
+
+    Raises
+    ------
+    ValueError
+        The text is not understood, or a size below 0 of an effect without sign.
+
     """
     inside = text.strip().removeprefix("[").removesuffix("]")
     chosen: dict[str, dict[str, float]] = {}
@@ -129,11 +182,29 @@ class Fleet:
 
 
 def fleet_from(document: Mapping[str, Any], design: Mapping[str, Any]) -> Fleet:
-    """The motors of a fleet document; each motor's draw hangs on the seed and its number alone.
+    """The motors of a fleet document.
 
-    `spread` is the relative standard deviation between motors of one lot, `shift` a lot's own
-    relative departure from the design, `effects` those of all motors of a lot, `faults` those of
-    single motors. `tests` names the captures of the campaign that are recorded, all without it.
+    Parameters
+    ----------
+    document
+        `seed`, `station`, `motor` and `lots`; `spread` is the relative standard deviation between
+        motors of one lot [1], `shift` a lot's own relative departure from the design [1], `effects`
+        those of all motors of a lot, `faults` those of single motors, `tests` the captures of the
+        campaign that are recorded, all without it.
+    design
+        The document of the design.
+
+    Returns
+    -------
+    Fleet
+        Each motor's draw depends on the seed and its serial number alone.
+
+    Raises
+    ------
+    ValueError
+        Something in either document is unknown or no number, or a fault is of a motor that no lot
+        holds.
+
     """
     base, seed = motor_from(design), int(_number(document["seed"], "seed"))
     spread = {k: _number(v, k) for k, v in (document.get("spread") or {}).items()}

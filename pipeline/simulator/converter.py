@@ -86,13 +86,48 @@ class Control(NamedTuple):
 
 @njit(cache=True)
 def phase_drop(i: float, p: Plant) -> float:
-    """Voltage that dead time and switches take from one phase [V]."""
+    """Voltage that dead time and switches take from one phase.
+
+    Parameters
+    ----------
+    i
+        Phase current [A].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        V_d i/√(i² + i_knee²) [V], of the sign of the current.
+
+    References
+    ----------
+    Jeong and Park, IEEE Trans. Ind. Electron. 38(2), 1991, 108 (dead-time effect),
+    doi:10.1109/41.88903.
+
+    """
     return float(p.dead_v) * i / math.sqrt(i * i + p.dead_knee_a * p.dead_knee_a)
 
 
 @njit(cache=True)
 def resistance_rise(omega: float, degc: float, p: Plant) -> float:
-    """Factor on the phase resistances from temperature and skin effect."""
+    """Factor on the phase resistances from temperature and skin effect.
+
+    Parameters
+    ----------
+    omega
+        Shaft speed [rad/s].
+    degc
+        Temperature of the winding [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        (1 + α (T − 25)) (1 + s u²/(1 + (u/u_knee)²)) [1], u the speed over the rated one.
+
+    """
     factor = 1.0 + p.alpha_copper * (degc - 25.0)
     if p.skin != 0.0:
         u = p.pole_pairs * omega / p.omega_elec_rated
@@ -102,8 +137,32 @@ def resistance_rise(omega: float, degc: float, p: Plant) -> float:
 
 @njit(cache=True)
 def windings(flux: Pair, mechanics: Mechanics, volt: Pair, warm: Pair, p: Plant) -> Field:
-    """Phase equations: flux rates [V], torque [N·m], powers in, in copper, in switches [W],
-    rotor-frame currents [A] and flux over the magnet's.
+    """Phase equations of the motor at a state.
+
+    Parameters
+    ----------
+    flux
+        Stator-frame flux linkages, alpha and beta [Wb].
+    mechanics
+        Angle and speed of the rotor, then of the far mass [rad, rad/s].
+    volt
+        Applied voltage, alpha and beta [V].
+    warm
+        Temperatures of winding and magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    tuple
+        Flux rates, alpha and beta [V]; electromagnetic torque [N·m]; powers in, in copper and in
+        switches [W]; i_d and i_q [A]; flux over the magnets' at 25 degC [1].
+
+    Notes
+    -----
+    v_x − v_n = R_x i_x + drop(i_x) + dψ_x/dt for the phases a, b, c. The star point v_n takes the
+    mean of the three, which alpha and beta do not see.
+
     """
     theta, omega = mechanics[0], mechanics[1]
     eps = p.pole_pairs * theta
@@ -153,7 +212,27 @@ def net_torque(
 
 @njit(cache=True)
 def accelerations(mechanics: Mechanics, net: float, load: float, held: bool, p: Plant) -> Pair:
-    """Accelerations of the rotor and of the far mass [rad/s²]; a dynamometer holds the far end."""
+    """Accelerations of the rotor and of the far mass.
+
+    Parameters
+    ----------
+    mechanics
+        Angle and speed of the rotor, then of the far mass [rad, rad/s].
+    net
+        Torque on the rotor [N·m].
+    load
+        Torque of the load [N·m].
+    held
+        Whether a dynamometer holds the far end at its speed.
+    p
+        The plant.
+
+    Returns
+    -------
+    near, far
+        [rad/s²]; of a stiff motor the first alone, 0 where it is held.
+
+    """
     if p.two_mass:
         through = coupling(mechanics[0] - mechanics[2], mechanics[1] - mechanics[3], p)
         far = 0.0 if held else (through - load) / p.j_load
@@ -167,9 +246,27 @@ def accelerations(mechanics: Mechanics, net: float, load: float, held: bool, p: 
 def advance(
     y: Array, work: Array, volt: Pair, load: float, warm: Pair, h: float, held: bool, p: Plant
 ) -> None:
-    """One RK4 step of [psi_alpha, psi_beta, theta, omega, far, far_omega, bristle], in place.
+    """One Runge-Kutta step of order four, in place.
 
-    `work` [3] gathers energy in, in copper and in switches [J].
+    Parameters
+    ----------
+    y
+        State [7]: ψ_alpha, ψ_beta [Wb], θ, ω, far θ, far ω [rad, rad/s], bristle [rad].
+    work
+        Energy in, in copper and in switches so far [3, J]; grows by that of the step.
+    volt
+        Applied voltage, alpha and beta [V].
+    load
+        Torque of the load [N·m].
+    warm
+        Temperatures of winding and magnets [degC].
+    h
+        Step [s].
+    held
+        Whether a dynamometer holds the far end at its speed.
+    p
+        The plant.
+
     """
     weights = (1.0, 2.0, 2.0, 1.0)
     parts = (0.0, 0.5, 0.5, 1.0)
@@ -249,9 +346,33 @@ def remembered(history: Array, newest: int, back: float) -> Pair:
 
 @njit(cache=True)
 def command(loop: Array, seen: Pair, eps: float, omega: float, want: Array, c: Control) -> Pair:
-    """Voltage vector for the next period [V]: PI currents, decoupling, speed loop, limits.
+    """Voltage vector for the next period, by field-oriented control.
 
-    `loop` [3] holds the integrators of d [V], q [V] and speed [A].
+    Parameters
+    ----------
+    loop
+        Integrators of d [V], q [V] and speed [A], changed in place; they stop at the limits.
+    seen
+        Currents as the sensors report them, alpha and beta [A].
+    eps
+        Electrical angle as seen [rad].
+    omega
+        Shaft speed as seen [rad/s].
+    want
+        d current [A], q current [A] or speed [rad/s], and more that is not used here.
+    c
+        The controller.
+
+    Returns
+    -------
+    v_alpha, v_beta
+        [V], turned ahead to the middle of the period in which it acts.
+
+    Notes
+    -----
+    v_d = K_d e_d + ∫k_i e_d − ω L_q i_q and v_q = K_q e_q + ∫k_i e_q + ω (ψ + L_d i_d), cut in
+    length at the limit.
+
     """
     ce, se = math.cos(eps), math.sin(eps)
     i_d, i_q = ce * seen[0] + se * seen[1], ce * seen[1] - se * seen[0]
@@ -330,10 +451,25 @@ def run_on(
 
 @njit(cache=True)
 def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
-    """Field-oriented control over n periods: rows of `COLUMNS` at the sampling instants.
+    """Field-oriented control over some periods.
 
-    `reference` [n, 4]: d current [A], q current [A] or speed [rad/s], load torque [N·m],
-    speed the dynamometer holds [rad/s]. `noise` [n, 4]: phase currents [A], angle [rad].
+    Parameters
+    ----------
+    reference
+        d current [A], q current [A] or speed [rad/s], load torque [N·m], speed that the dynamometer
+        holds [rad/s], a row a period [n, 4].
+    noise
+        Of the three phase currents [A] and of the angle [rad], [n, 4].
+    c
+        Controller, inverter and sensors.
+    p
+        The plant.
+
+    Returns
+    -------
+    array [n, 19]
+        `COLUMNS` at the sampling instants, SI units.
+
     """
     out = np.empty((reference.shape[0], len(COLUMNS)))
     y, work, loop = beginning(c, p), np.zeros(3), np.zeros(3)

@@ -193,6 +193,7 @@ NEVER_NEGATIVE = frozenset(
         "copper_temperature",
         "skin_effect",
         "dead_time",
+        "current_delay",
         "torque_lag",
         "saturation",
         "iron_eddy",
@@ -212,9 +213,27 @@ ALWAYS = ("copper_temperature", "magnet_temperature", "coulomb_friction")
 
 
 def parameters(name: str, motor: Motor, size: Size | None = None) -> dict[str, float]:
-    """All parameters of an effect on this motor, `size` a number or a mapping of some of them.
+    """All parameters of an effect on a motor.
 
-    Raises ValueError for an effect or a parameter that does not exist.
+    Parameters
+    ----------
+    name
+        Of the effect.
+    motor
+        Whose ratings make the typical sizes.
+    size
+        A number, or a mapping of some of the parameters; typical where not given.
+
+    Returns
+    -------
+    dict
+        By name, in the units of `FORMS`.
+
+    Raises
+    ------
+    ValueError
+        There is no such effect, or no such parameter of it.
+
     """
     form = FORMS.get(name)
     if form is None:

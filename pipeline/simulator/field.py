@@ -20,9 +20,28 @@ SQRT3 = math.sqrt(3.0)
 
 @njit(cache=True)
 def magnet(eps: float, degc: float, p: Plant) -> tuple[float, float, float, float]:
-    """Magnet flux in the rotor frame and its derivative by electrical angle [Wb, Wb/rad].
+    """Magnet flux in the rotor frame and its derivative by electrical angle.
 
-    The 5th, 7th, 11th and 13th harmonics of the phase flux linkage appear as orders 6 and 12.
+    Parameters
+    ----------
+    eps
+        Electrical angle [rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    psi_d, psi_q, dpsi_d/deps, dpsi_q/deps
+        [Wb, Wb, Wb/rad, Wb/rad]
+
+    Notes
+    -----
+    ψ(T) = ψ_25 (1 + α (T − 25)). The 5th, 7th, 11th and 13th harmonics of a phase's flux linkage
+    are the orders 6 and 12 in the rotor frame: the 5th and 11th turn against the rotor, the 7th and
+    13th with it.
+
     """
     psi = p.psi_wb * (1.0 + p.alpha_magnet * (degc - 25.0))
     if p.h5 == 0.0 and p.h7 == 0.0:
@@ -40,7 +59,25 @@ def magnet(eps: float, degc: float, p: Plant) -> tuple[float, float, float, floa
 
 @njit(cache=True)
 def bend_q(y: float, p: Plant) -> float:
-    """Current that saturation adds on the q axis at flux y [A]."""
+    """Current that saturation adds on the q axis.
+
+    Parameters
+    ----------
+    y
+        q flux less the magnet's [Wb].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        [A], odd in y.
+
+    Notes
+    -----
+    (ψ₀/L_q)(sinh(y/ψ₀) − y/ψ₀), or s (y/L_q) |y/ψ₀|ⁿ with the strength s.
+
+    """
     if p.sat_q == 0.0:
         return 0.0
     if p.sat_form == 1.0:
@@ -64,7 +101,37 @@ def slope_q(y: float, p: Plant) -> float:
 def current(
     psi_d: float, psi_q: float, eps: float, degc: float, p: Plant
 ) -> tuple[float, float, float]:
-    """Currents dW/dpsi [A] and the slope dW/deps at constant rotor-frame flux [V·A·s/rad]."""
+    """Currents of a state, and the derivative of the field energy by angle.
+
+    Parameters
+    ----------
+    psi_d, psi_q
+        Flux linkages in the rotor frame [Wb].
+    eps
+        Electrical angle [rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    i_d, i_q
+        dW/dψ [A].
+    w_eps
+        dW/dε at constant rotor-frame flux [V·A·s/rad].
+
+    Notes
+    -----
+    W(ψ_d, ψ_q, ε) is 2/3 of the field energy, and every effect is a term of it. So the currents are
+    reciprocal (di_d/dψ_q = di_q/dψ_d) and no term makes energy.
+
+    References
+    ----------
+    Woodson and Melcher, Electromechanical Dynamics, part I, Wiley, 1968, ch. 3 (energy state
+    functions).
+
+    """
     md, mq, md_eps, mq_eps = magnet(eps, degc, p)
     x, y = psi_d - md, psi_q - mq
     nu_d, nu_q, lean = 1.0, 1.0, 0.0
@@ -90,7 +157,25 @@ def current(
 def stiffness(
     psi_d: float, psi_q: float, eps: float, degc: float, p: Plant
 ) -> tuple[float, float, float]:
-    """Reciprocal inductances d²W/dpsi², in dd, qq, dq [1/H]."""
+    """Reciprocal inductances: the second derivatives of the field energy.
+
+    Parameters
+    ----------
+    psi_d, psi_q
+        Flux linkages in the rotor frame [Wb].
+    eps
+        Electrical angle [rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    g_dd, g_qq, g_dq
+        d²W/dψ² [1/H].
+
+    """
     md, mq, _, _ = magnet(eps, degc, p)
     x, y = psi_d - md, psi_q - mq
     c = math.cos(6.0 * eps + p.nu_phase)
@@ -112,7 +197,25 @@ def stiffness(
 
 @njit(cache=True)
 def energy(psi_d: float, psi_q: float, eps: float, degc: float, p: Plant) -> float:
-    """Stored field energy 1.5 W [J], zero at zero current."""
+    """Stored field energy, zero at zero current.
+
+    Parameters
+    ----------
+    psi_d, psi_q
+        Flux linkages in the rotor frame [Wb].
+    eps
+        Electrical angle [rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        1.5 W [J]: the three phases of an amplitude-invariant frame.
+
+    """
     md, mq, _, _ = magnet(eps, degc, p)
     x, y = psi_d - md, psi_q - mq
     c = math.cos(6.0 * eps + p.nu_phase)
@@ -134,7 +237,25 @@ def energy(psi_d: float, psi_q: float, eps: float, degc: float, p: Plant) -> flo
 
 @njit(cache=True)
 def flux(i_d: float, i_q: float, eps: float, degc: float, p: Plant) -> tuple[float, float]:
-    """Flux [Wb] that carries the currents [A]: Newton's method on `current`, to rounding."""
+    """Flux that carries given currents: the inverse of `current`.
+
+    Parameters
+    ----------
+    i_d, i_q
+        Currents [A].
+    eps
+        Electrical angle [rad].
+    degc
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    psi_d, psi_q
+        [Wb], by Newton's method to rounding.
+
+    """
     md, mq, _, _ = magnet(eps, degc, p)
     d, q = md + p.ld_h * i_d, mq + p.lq_h * i_q
     for _ in range(60):
@@ -153,13 +274,49 @@ def flux(i_d: float, i_q: float, eps: float, degc: float, p: Plant) -> tuple[flo
 
 @njit(cache=True)
 def torque_of(psi_d: float, psi_q: float, i_d: float, i_q: float, w_eps: float, p: Plant) -> float:
-    """Electromagnetic torque -dW/dtheta at constant phase flux [N·m]."""
+    """Electromagnetic torque of a state.
+
+    Parameters
+    ----------
+    psi_d, psi_q
+        Flux linkages in the rotor frame [Wb].
+    i_d, i_q
+        Their currents [A].
+    w_eps
+        dW/dε at constant rotor-frame flux [V·A·s/rad].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        [N·m]; cogging is not in it.
+
+    Notes
+    -----
+    T = 1.5 p (ψ_d i_q − ψ_q i_d − dW/dε), which is −d(1.5 W)/dθ at constant flux of the phases.
+
+    """
     return float(1.5 * p.pole_pairs * (psi_d * i_q - psi_q * i_d - w_eps))
 
 
 @njit(cache=True)
 def cogging(theta: float, p: Plant) -> float:
-    """Torque of the magnet against the slots on the rotor [N·m]."""
+    """Torque of the magnets against the slots on the rotor.
+
+    Parameters
+    ----------
+    theta
+        Shaft angle [rad].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        Σ A_k sin(k θ + φ_k) [N·m].
+
+    """
     torque = 0.0
     for k in range(p.lines):
         torque += p.cog_amplitude[k] * math.sin(p.cog_order[k] * theta + p.cog_phase[k])
@@ -228,7 +385,25 @@ def open_flux(eps: NDArray[np.float64], degc: NDArray[np.float64], p: Plant) -> 
 def open_emf(
     eps: NDArray[np.float64], omega_elec: NDArray[np.float64], degc: NDArray[np.float64], p: Plant
 ) -> NDArray[np.float64]:
-    """Phase voltages a, b, c [n, 3] with the terminals open: omega_e dpsi/deps."""
+    """Phase voltages with the terminals open.
+
+    Parameters
+    ----------
+    eps
+        Electrical angle [n, rad].
+    omega_elec
+        Electrical speed [n, rad/s].
+    degc
+        Temperature of the magnets [n, degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    array [n, 3]
+        a, b, c [V]: ω dψ/dε of `open_flux`.
+
+    """
     out = np.empty((eps.size, 3))
     for k in range(eps.size):
         d, q, d_eps, q_eps = magnet(eps[k], degc[k], p)

@@ -16,7 +16,27 @@ Pair = tuple[float, float]
 
 @njit(cache=True)
 def pair_current(flux: Pair, way: Pair, eps: float, t_m: float, p: Plant) -> float:
-    """Current through the pair [A]; `way` is its direction in d and q, per ampere."""
+    """Current through a terminal pair.
+
+    Parameters
+    ----------
+    flux
+        Flux linkages in d and q [Wb].
+    way
+        Space vector of one ampere through the pair, in d and q [1]; its length is 2/√3.
+    eps
+        Electrical angle [rad].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        ¾ (way · i) [A], which is the current where it lies along `way`.
+
+    """
     i_d, i_q, _ = current(flux[0], flux[1], eps, t_m, p)
     return float(0.75 * (way[0] * i_d + way[1] * i_q))
 
@@ -25,7 +45,35 @@ def pair_current(flux: Pair, way: Pair, eps: float, t_m: float, p: Plant) -> flo
 def pair_rate(
     flux: Pair, way: Pair, volt: float, ohm: float, eps: float, t_m: float, p: Plant
 ) -> Pair:
-    """Flux rate in d and q [V] that lets current change along the pair alone."""
+    """Flux rate that lets current change along the pair alone.
+
+    Parameters
+    ----------
+    flux
+        Flux linkages in d and q [Wb].
+    way
+        Space vector of one ampere through the pair, in d and q [1].
+    volt
+        Open voltage of the supply [V].
+    ohm
+        Resistance of pair and supply [ohm].
+    eps
+        Electrical angle [rad].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    dpsi_d/dt, dpsi_q/dt
+        [V]
+
+    Notes
+    -----
+    dψ/dt = L way di/dt with L the incremental inductances, and v − R i = 1.5 way · dψ/dt.
+
+    """
     g_dd, g_qq, g_dq = stiffness(flux[0], flux[1], eps, t_m, p)
     det = g_dd * g_qq - g_dq * g_dq
     l_d = (g_qq * way[0] - g_dq * way[1]) / det
@@ -76,13 +124,39 @@ def pair_step(
     t_m: float,
     p: Plant,
 ) -> Array:
-    """Voltage and current [n, 2] of one terminal pair, rotor locked at eps, third open, by RK4.
+    """Voltage and current of one terminal pair, the rotor locked and the third terminal open.
 
-    `source` [n + 1] is the open voltage of the supply, linear between its points except that a
-    jump of more than half its largest value is an edge, `early` [n + 1] samples before the later
-    point. `pair` holds the current direction in alpha and beta and the pair's resistance at
-    25 degC. The state is the flux vector; the open terminal's voltage is what keeps its current
-    zero.
+    Parameters
+    ----------
+    source
+        Open voltage of the supply at each sample [n + 1, V], linear between them except that a jump
+        of more than half its largest value is an edge.
+    early
+        By how much of a sample an edge comes before the later point [n + 1, samples].
+    step_s
+        Sampling period [s].
+    substeps
+        Integration steps a sample.
+    pair
+        Current direction in alpha and beta [1], and the pair's resistance at 25 degC [ohm].
+    source_ohm
+        Resistance of the supply [ohm].
+    eps
+        Electrical angle of the rotor [rad].
+    t_w, t_m
+        Temperatures of winding and magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    array [n, 2]
+        [V] and [A], by the classical Runge-Kutta method of order four.
+
+    Notes
+    -----
+    The state is the flux vector; the open terminal's voltage is what keeps its current zero.
+
     """
     out = np.empty((source.size - 1, 2))
     c, s = np.cos(eps), np.sin(eps)

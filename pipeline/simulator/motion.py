@@ -17,7 +17,35 @@ Array = NDArray[np.float64]
 
 @njit(cache=True)
 def grip(omega: float, torque: float, flux_ratio: float, p: Plant) -> float:
-    """Size of the friction that opposes the direction of motion [N·m]."""
+    """Size of the friction that opposes the direction of motion, whatever the speed.
+
+    Parameters
+    ----------
+    omega
+        Shaft speed [rad/s].
+    torque
+        Electromagnetic torque, which loads the bearings [N·m].
+    flux_ratio
+        Flux over the magnets' at 25 degC [1].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        [N·m], not negative.
+
+    Notes
+    -----
+    T_c + μ |T| + T_s/(1 + (ω/ω_s)²) + T_h (ψ/ψ_pm)^1.6: Coulomb, load-dependent, Stribeck and
+    magnetic hysteresis, the last by Steinmetz's exponent.
+
+    References
+    ----------
+    Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30(7), 1994, 1083 (friction),
+    doi:10.1016/0005-1098(94)90209-7.
+
+    """
     size = p.coulomb + p.load_friction * abs(torque)
     if p.stribeck != 0.0:
         size += p.stribeck / (1.0 + (omega / p.stribeck_w) ** 2)
@@ -28,7 +56,28 @@ def grip(omega: float, torque: float, flux_ratio: float, p: Plant) -> float:
 
 @njit(cache=True)
 def fluid(omega: float, flux_ratio: float, p: Plant) -> float:
-    """Friction that grows with speed: viscous, windage, eddy currents [N·m]."""
+    """Friction that grows with speed.
+
+    Parameters
+    ----------
+    omega
+        Shaft speed [rad/s].
+    flux_ratio
+        Flux over the magnets' at 25 degC [1].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        [N·m], of the sign of the speed.
+
+    Notes
+    -----
+    B ω + T_w |ω/ω_rated|ⁿ sign ω + k ω (ψ/ψ_pm)²/(1 + (ω/ω_k)²): viscous, windage, and eddy
+    currents that their own field keeps out at high speed.
+
+    """
     drag = p.b_visc * omega
     if p.windage != 0.0:
         u = abs(omega) / p.omega_rated
@@ -40,7 +89,23 @@ def fluid(omega: float, flux_ratio: float, p: Plant) -> float:
 
 @njit(cache=True)
 def direction(omega: float, bristle: float, p: Plant) -> float:
-    """Sense of the friction, -1 to 1: a narrow tanh of speed, or the bristle's deflection."""
+    """Sense of the friction, -1 to 1.
+
+    Parameters
+    ----------
+    omega
+        Shaft speed [rad/s].
+    bristle
+        Deflection [rad].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        z/z₀ of the bristle where there is one, else tanh(ω/ω_ε), a sign without a jump.
+
+    """
     if p.bristle > 0.0:
         return float(bristle / p.bristle)
     return math.tanh(omega / p.omega_eps)
@@ -48,7 +113,32 @@ def direction(omega: float, bristle: float, p: Plant) -> float:
 
 @njit(cache=True)
 def bristle_after(bristle: float, travel: float, p: Plant) -> float:
-    """Bristle deflection after a travel, dz = dx (1 - sign(dx) z/z0), solved exactly [rad]."""
+    """Deflection of the bristle after a travel (Dahl's model).
+
+    Parameters
+    ----------
+    bristle
+        Deflection before [rad].
+    travel
+        Of the shaft, in one sense [rad].
+    p
+        The plant; `bristle` there is the largest deflection z₀.
+
+    Returns
+    -------
+    float
+        Deflection after [rad].
+
+    Notes
+    -----
+    dz = dx (1 − sign(dx) z/z₀), solved exactly: z → ±z₀ with exp(−|Δx|/z₀).
+
+    References
+    ----------
+    P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1976, 1675,
+    doi:10.2514/3.61511.
+
+    """
     if p.bristle <= 0.0 or travel == 0.0:
         return bristle
     end = math.copysign(p.bristle, travel)
@@ -57,7 +147,33 @@ def bristle_after(bristle: float, travel: float, p: Plant) -> float:
 
 @njit(cache=True)
 def coupling(twist: float, rate: float, p: Plant) -> float:
-    """Torque through the coupling, zero inside the gap; it never pulls the gap shut [N·m]."""
+    """Torque through an elastic coupling with a gap.
+
+    Parameters
+    ----------
+    twist
+        Angle of the rotor less that of the far mass [rad].
+    rate
+        Its derivative [rad/s].
+    p
+        The plant: stiffness, damping, half the gap.
+
+    Returns
+    -------
+    float
+        On the far mass [N·m]: zero inside the gap, and never so that it pulls the gap shut.
+
+    Notes
+    -----
+    k (φ − φ_gap) + d dφ/dt beyond the gap, cut at zero.
+
+    References
+    ----------
+    Nordin and Gutman, Controlling mechanical systems with backlash: a survey, Automatica 38(10),
+    2002,
+    1633, doi:10.1016/S0005-1098(02)00047-X.
+
+    """
     if twist > p.half_gap:
         return float(max(0.0, p.stiffness * (twist - p.half_gap) + p.damping * rate))
     if twist < -p.half_gap:
@@ -67,7 +183,23 @@ def coupling(twist: float, rate: float, p: Plant) -> float:
 
 @njit(cache=True)
 def lookup(x: float, xs: Array, ys: Array, n: int) -> float:
-    """Linear table, constant outside."""
+    """A table read along straight lines, constant outside.
+
+    Parameters
+    ----------
+    x
+        Where.
+    xs, ys
+        The table, `xs` rising; longer than `n` perhaps.
+    n
+        How many of its points count.
+
+    Returns
+    -------
+    float
+        In the unit of `ys`.
+
+    """
     if x <= xs[0]:
         return float(ys[0])
     if x >= xs[n - 1]:
@@ -127,7 +259,27 @@ def extra(
 def passive(
     theta: float, omega: float, bristle: float, torque: float, flux_ratio: float, p: Plant
 ) -> float:
-    """Torque on the rotor from everything but the windings: cogging, weight, friction [N·m]."""
+    """Torque on the rotor from everything but the windings.
+
+    Parameters
+    ----------
+    theta, omega
+        Shaft angle [rad] and speed [rad/s].
+    bristle
+        Deflection [rad].
+    torque
+        Electromagnetic torque, which loads the bearings [N·m].
+    flux_ratio
+        Flux over the magnets' at 25 degC [1].
+    p
+        The plant.
+
+    Returns
+    -------
+    float
+        Cogging and weight less friction [N·m].
+
+    """
     total = -fluid(omega, flux_ratio, p)
     total -= grip(omega, torque, flux_ratio, p) * direction(omega, bristle, p)
     if p.lines > 0:
@@ -163,7 +315,31 @@ def free_rates(
 def coast(
     theta: float, omega: float, step_s: float, substeps: int, count: int, t_m: float, p: Plant
 ) -> Array:
-    """Angle and speed [count, 2] of a coasting rotor with open terminals, RK4."""
+    """A rotor that coasts with open terminals.
+
+    Parameters
+    ----------
+    theta, omega
+        Shaft angle [rad] and speed [rad/s] at the start; a far mass moves alike, the bristle is
+        bent.
+    step_s
+        Time from one row to the next [s].
+    substeps
+        Integration steps a row.
+    count
+        Rows.
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    array [count, 2]
+        Angle [rad] and speed [rad/s] of the rotor, by the classical Runge-Kutta method of order
+        four.
+
+    """
     out = np.empty((count, 2))
     h = step_s / substeps
     far, far_omega = theta, omega
@@ -191,9 +367,23 @@ def coast(
 
 @njit(cache=True)
 def turned(theta: Array, omega: Array, t_m: float, p: Plant) -> Array:
-    """Shaft torque [n] of an open-circuit motor that a drive turns slowly and steadily.
+    """Shaft torque of an open-circuit motor that a drive turns slowly and steadily.
 
-    It came from the other side: a bristle is still bent the other way at the start.
+    Parameters
+    ----------
+    theta, omega
+        Shaft angle [n, rad] and speed [n, rad/s].
+    t_m
+        Temperature of the magnets [degC].
+    p
+        The plant.
+
+    Returns
+    -------
+    array [n]
+        [N·m]. The motor came from the other side: a bristle is still bent the other way at the
+        start.
+
     """
     out = np.empty(theta.size)
     bristle = -math.copysign(p.bristle, omega[0])
@@ -208,7 +398,33 @@ def turned(theta: Array, omega: Array, t_m: float, p: Plant) -> Array:
 def heat(
     t_w: float, t_m: float, watt: float, ambient: float, h: float, p: Plant
 ) -> tuple[float, float]:
-    """Winding and magnet temperature a time h later, midpoint rule [degC]."""
+    """Temperatures of winding and magnets a moment later.
+
+    Parameters
+    ----------
+    t_w, t_m
+        Of winding and magnets now [degC].
+    watt
+        Heat into the winding [W].
+    ambient
+        [degC]
+    h
+        Time [s].
+    p
+        The plant.
+
+    Returns
+    -------
+    t_w, t_m
+        After h [degC], by the midpoint rule.
+
+    Notes
+    -----
+    C_w dT_w/dt = P − (T_w − T_m)/R_wm − (T_w − T_a)/R_wa
+
+    C_m dT_m/dt = (T_w − T_m)/R_wm − (T_m − T_a)/R_ma
+
+    """
     across = (t_w - t_m) / p.rth_wm
     rate_w = (watt - across - (t_w - ambient) / p.rth_wa) / p.cth_w
     rate_m = (across - (t_m - ambient) / p.rth_ma) / p.cth_m
@@ -221,7 +437,27 @@ def heat(
 
 @njit(cache=True)
 def warmed(watt_25: Array, start: tuple[float, float], ambient: float, h: float, p: Plant) -> Array:
-    """Temperatures [n, 2] of winding and magnet under copper losses [n] stated at 25 degC."""
+    """Temperatures under copper losses, which grow with the temperature of the winding.
+
+    Parameters
+    ----------
+    watt_25
+        Copper losses as they would be at 25 degC [n, W].
+    start
+        Temperatures of winding and magnets at the first row [degC].
+    ambient
+        [degC]
+    h
+        Time between rows [s].
+    p
+        The plant.
+
+    Returns
+    -------
+    array [n, 2]
+        Of winding and magnets [degC].
+
+    """
     out = np.empty((watt_25.size, 2))
     t_w, t_m = start
     for k in range(watt_25.size):

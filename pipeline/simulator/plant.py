@@ -50,7 +50,30 @@ Compiled code takes it by reference and reads its fields by name.
 
 
 def plant_of(motor: Motor) -> Plant:
-    """The plant of a motor; raises ValueError where an effect is too large to be physical."""
+    """The numbers of a motor with all its effects, as compiled code takes them.
+
+    Parameters
+    ----------
+    motor
+        Design and effects.
+
+    Returns
+    -------
+    Plant
+        One record of `LAYOUT`, SI units.
+
+    Raises
+    ------
+    ValueError
+        An effect is too large to be physical: a phase without resistance, a flux map without
+        inverse.
+
+    Notes
+    -----
+    Strengths of saturation are solved so that the apparent inductance falls by the stated share at
+    the rated current of its axis.
+
+    """
     on = active(motor)
     none: dict[str, float] = {}
     values: dict[str, object] = {

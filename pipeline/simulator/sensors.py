@@ -28,10 +28,25 @@ def to_grid(values: Array, step: float) -> Array:
 
 
 def first_order_lag(signal: Array, step: float) -> Array:
-    """What is left [n] of a signal behind a first-order lag that starts settled.
+    """A signal behind a first-order lag that starts settled.
 
-    `step` is the sampling period over the time constant. Exact for a signal that runs straight
-    between its samples: one held between them would come half a period early.
+    Parameters
+    ----------
+    signal
+        [n, any unit]
+    step
+        Sampling period over the time constant [1], above zero.
+
+    Returns
+    -------
+    array [n]
+        Unit of the signal.
+
+    Notes
+    -----
+    T dy/dt = x − y, exact for a signal that runs straight between its samples: one held between
+    them would come half a period early.
+
     """
     from scipy.signal import lfilter
 
@@ -42,7 +57,24 @@ def first_order_lag(signal: Array, step: float) -> Array:
 
 
 def scope_range(largest: float) -> float:
-    """Half the range of a scope, of the series 1, 2, 5: holds a signal and a tenth more."""
+    """Half the range of a scope, of the series 1, 2, 5.
+
+    Parameters
+    ----------
+    largest
+        Largest size of the signal [V or A], above zero.
+
+    Returns
+    -------
+    float
+        The least that holds the signal and a tenth more.
+
+    Examples
+    --------
+    >>> scope_range(1.9), scope_range(4.4)
+    (5.0, 5.0)
+
+    """
     wanted = 1.1 * largest
     decade = 10.0 ** math.floor(math.log10(wanted))
     return next(x * decade for x in (1.0, 2.0, 5.0, 10.0) if x * decade >= wanted)
@@ -71,7 +103,23 @@ class Session:
         return active(self.motor).get(name, {}).get(key, 0.0)
 
     def noise(self, n: int, sigma: float, t_s: Array | None = None) -> Array:
-        """White noise [n] of one channel, with the station's drift and mains pick-up on top."""
+        """Noise of one channel: white, with the station's drift and mains pick-up on top.
+
+        Parameters
+        ----------
+        n
+            Samples.
+        sigma
+            Standard deviation of the white part [unit of the channel].
+        t_s
+            Instants [n, s]; no mains pick-up without.
+
+        Returns
+        -------
+        array [n]
+            Unit of the channel.
+
+        """
         bench = self.bench
         sigma = sigma * bench.noise_scale
         out = sigma * self.rng.standard_normal(n)
@@ -112,7 +160,22 @@ class Session:
         return 0.0
 
     def clock(self, n: int, rate_hz: float) -> tuple[Array, Array]:
-        """Sampling instants and the stamps the recorder writes for them [n each, s]."""
+        """Sampling instants, and the stamps that the recorder writes for them.
+
+        Parameters
+        ----------
+        n
+            Samples.
+        rate_hz
+            Sampling rate [Hz].
+
+        Returns
+        -------
+        true, stamped
+            [n each, s]. The stamps are off by the gain of the time base; jitter never exchanges
+            two.
+
+        """
         t_s = np.arange(n) / rate_hz
         told = t_s * (self.instruments.clock * (1.0 + self.bench.clock_rel))
         if self.bench.jitter_s <= 0.0:

@@ -109,12 +109,27 @@ def _cogging(motor: Motor, p: Plant) -> dict[str, float | int | None]:
 
 
 def truth(motor: Motor) -> dict[str, object]:
-    """Constants (names of `contract/outputs.md`), hidden effects and their sizes.
+    """What is true of a simulated motor, computed from the field that is simulated.
 
-    Inductances are incremental at zero current, averaged over a turn; `ld_rated_h` is
-    (psi_d - psi_pm)/i_d at the largest d current of the bench's torque map without q current,
-    `lq_rated_h` psi_q/i_q at rated q current without d current, `at` says which currents;
-    `kt_peak_nm_a` is the slope at zero current. Magnet and copper are at 25 degC.
+    Parameters
+    ----------
+    motor
+        Design and effects.
+
+    Returns
+    -------
+    dict
+        `constants` by the names of `contract/outputs.md` and in their units, `hidden` effects,
+        their `sizes`, the `nameplate`, and `at` which currents [A] the inductances at rated current
+        hold.
+
+    Notes
+    -----
+    Inductances are incremental at zero current, averaged over a turn; `ld_rated_h` is (ψ_d −
+    ψ_pm)/i_d at the largest d current of the bench's torque map without q current, `lq_rated_h`
+    ψ_q/i_q at rated q current without d current; `kt_peak_nm_a` is the slope at zero current.
+    Magnets and copper are at 25 degC.
+
     """
     p = plant_of(motor)
     ohm = np.array([p.r_a_ohm, p.r_b_ohm, p.r_c_ohm])

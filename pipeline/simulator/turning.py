@@ -21,7 +21,8 @@ def _terminal_voltages(
 ) -> Array:
     """Open-terminal phase voltages [n, 3]: the derivative of the magnet's flux linkage.
 
-    `centred` is the mean over half a period either side, a difference of flux.
+    `centred` is the mean over half a period either side, a difference of flux. A voltage from
+    outside the library is added as it is at the instant.
     """
     from pipeline.simulator.field import open_emf, open_flux
     from pipeline.simulator.motion import extra_volts
@@ -32,9 +33,9 @@ def _terminal_voltages(
         half = 0.5 * (t_s[1] - t_s[0])
         after = open_flux(p * (theta + omega * half), magnet, session.plant)
         before = open_flux(p * (theta - omega * half), magnet, session.plant)
-        mean: Array = (after - before) / (2.0 * half)
-        return mean
-    emf: Array = open_emf(p * theta, p * omega, magnet, session.plant)
+        emf: Array = (after - before) / (2.0 * half)
+    else:
+        emf = open_emf(p * theta, p * omega, magnet, session.plant)
     if session.plant.extras > 0:
         none = np.zeros(theta.size)
         more = extra_volts(theta, omega, none, none, magnet, magnet, session.plant)

@@ -16,7 +16,20 @@ CODE = "angle_coverage"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Whether the turn, or the angles of a table, were covered; names what is missing."""
+    """Whether the turn, or the angles of a table, were covered.
+
+    Notes
+    -----
+    By the test, with the options in brackets:
+
+    - cogging and hand turn: travel of the shaft [turns]; less refuses.
+    - holding current: the same; one way only, less than `return_share` [1] back, warns.
+    - open circuit: electrical cycles of the back-EMF [`cycles`]; fewer refuse.
+    - LCR table: different rotor angles modulo 180° electrical [`rotor_angles`], for
+      L(θ) = mean + amplitude cos(2θ + phase) has three unknowns; fewer warn, one alone refuses,
+      unless all three pairs were measured.
+
+    """
     return LOOKS[capture.meta.test](capture, options)
 
 

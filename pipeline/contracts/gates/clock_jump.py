@@ -30,8 +30,14 @@ REMEDY = "fix the logger's clock, or cut the file at that row"
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Refuses a capture in which a steady signal goes on across a gap as if there were none.
 
-    A skip that is below the uncertainty of the time base over the record changes nothing that the
-    record determines, and is a warning: one late row of a heat run.
+    Notes
+    -----
+    A gap is longer than `gap_intervals` median intervals. Straight lines over `window` samples on
+    either side give the change of the signal across it, Δ, and its slope s. The clock has skipped
+    where |Δ − s · gap| is above `sigmas` of the samples' scatter and |Δ − s · interval| is below a
+    quarter of it. Skips that stay below the uncertainty of the time base over the record change
+    nothing that the record determines, and are warnings: one late row of a heat run.
+
     """
     findings = []
     for table in capture.tables:

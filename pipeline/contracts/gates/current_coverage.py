@@ -16,7 +16,18 @@ CODE = "current_coverage"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Whether the currents of the test were there; a refusal names the missing experiment."""
+    """Whether the currents of the test were there; a refusal names the missing experiment.
+
+    Notes
+    -----
+    By the test, σ being the white noise of the channel and m the option `noise_multiple` [1]:
+
+    - resistance: max |i| > m σ in a line, else refused; one level only warns.
+    - current step, torque map: the range of the current > 2 m σ, else refused.
+    - heat run: max |i| > m σ, else refused; a rise of the winding below `rise_k` [K] warns.
+    - flux map, torque table: two levels or more, else refused; a table of one sense only warns.
+
+    """
     return LOOKS[capture.meta.test](capture, options)
 
 

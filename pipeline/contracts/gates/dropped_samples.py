@@ -30,7 +30,16 @@ REMEDY = "record again with a logger that keeps up, or at a lower rate"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Warns of lost samples; refuses where too many are lost, or those of the step itself."""
+    """Warns of lost samples; refuses where too many are lost, or those of the step itself.
+
+    Notes
+    -----
+    Lost are Σ (gap/interval − 1) samples over the gaps that are longer than `gap_intervals` [1]
+    median intervals, less what a hurried clock made up for. A share above `refuse_share` [1]
+    refuses; so does a gap of a current step in which the current changes by more than `edge_share`
+    [1] of its range.
+
+    """
     findings: list[Finding] = []
     for table in capture.tables:
         if table.height < 3 or "t_s" not in table.columns:

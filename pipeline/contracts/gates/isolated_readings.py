@@ -18,9 +18,13 @@ REMEDY = "look at the sensor's link: a reading that was lost is often written as
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Masks rows whose speed or angle stands alone, counts them, and warns.
 
-    What has inertia cannot leave and come back within two samples. A row counts where it departs
-    from both neighbours the same way, far beyond what its neighbours differ by and beyond what
-    99 % of all rows do, in a log that is sampled faster than a shaft can follow.
+    Notes
+    -----
+    What has inertia cannot leave and come back within two samples. See `isolated` for the
+    statistic, whose limit is the option `ratio` [1]. Only logs of at least `least_rows` rows,
+    sampled at intervals of at most `most_interval_s` [s], faster than a shaft can follow, are
+    looked at.
+
     """
     masks, findings = [], []
     for number, table in enumerate(capture.tables):
@@ -46,19 +50,34 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def isolated(values: Array, ratio: float) -> Rows:
-    """Rows [n] that leave both neighbours the same way by `ratio` times anything usual.
+    """Rows that leave both neighbours the same way, by far more than anything usual.
 
     Parameters
     ----------
-    values : array [n]
-        A signal with inertia, any unit.
-    ratio : float [1]
-        How many times the departure exceeds the neighbours' difference, the scatter of steps, the
-        quantum of the signal and the departures of 99 % of all rows.
+    values
+        A signal with inertia [n, any unit].
+    ratio
+        How many times the departure exceeds the neighbours' difference, the median step, the
+        smallest step and the departures of 99 % of all rows [1].
+
+    Returns
+    -------
+    array [n] of bool
 
     Notes
     -----
-    departure_k = min(|x_k - x_(k-1)|, |x_(k+1) - x_k|) where both have one sign, else 0.
+    departure_k = min(|x_k − x_(k−1)|, |x_(k+1) − x_k|) where x_k is above or below both, else 0.
+
+    Examples
+    --------
+    >>> ramp = np.arange(9.0)
+    >>> ramp[4] = 300.0
+    >>> np.flatnonzero(isolated(ramp, 8.0)).tolist()
+    []
+    >>> ramp = np.arange(900.0)
+    >>> ramp[4] = 300.0
+    >>> np.flatnonzero(isolated(ramp, 8.0)).tolist()
+    [4]
 
     """
     steps = np.diff(values)
@@ -69,7 +88,7 @@ def isolated(values: Array, ratio: float) -> Rows:
     moved = np.abs(steps[np.isfinite(steps) & (steps != 0)])
     alone = np.zeros(values.shape, dtype=bool)
     if moved.size and np.isfinite(departure).any():
-        usual = max(float(np.quantile(departure, 0.99)), float(np.median(moved)), moved.min())
+        usual = max(float(np.quantile(departure, 0.99)), float(np.median(moved)))
         alone[1:-1] = departure > ratio * np.maximum(usual, between)
     return alone
 

@@ -21,8 +21,12 @@ REMEDY = "find out why the channel dropped out, and record again if those rows m
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Sets rows without a needed value aside and counts them; refuses if few are left.
 
-    A column with values in fewer than half of the rows is a slow stream written into a fast
-    table, not a fault: its blanks are left as they are.
+    Notes
+    -----
+    Fewer than `fewest` values of a column that the test rests on refuse. A column with values in
+    fewer than `dense_share` [1] of the rows is a slow stream written into a fast table, not a
+    fault: its blanks are left as they are.
+
     """
     masks: list[Mask] = []
     findings: list[Finding] = []

@@ -22,7 +22,17 @@ CONDITION = 1e3
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Refuses where line voltages, line currents or v_q oppose the shaft's sense of rotation."""
+    """Refuses where line voltages, line currents or v_q oppose the shaft's sense of rotation.
+
+    Notes
+    -----
+    Turned by hand or with open terminals: electrical cycles a turn below −`sigmas` of their
+    standard uncertainty, over at least `cycles` cycles. Under load: the slope of v_q on speed below
+    −`sigmas` of its own (`back_emf_slope`), or line currents that turn −p times a turn within
+    `off_count` [1, relative to the nameplate's p]; currents whose mean is above `common` [1] of
+    them hold another fault, which `phase_sum` names.
+
+    """
     if capture.meta.test in FREE_TURNING:
         seen = turning(capture)
         opposed = (
@@ -86,11 +96,24 @@ def _common_share(capture: Capture) -> float:
 
 
 def back_emf_slope(capture: Capture) -> tuple[float, float]:
-    """Slope of v_q on speed [V s/rad] at no d current, and its standard error.
+    """Slope of v_q on speed at no d current, and its standard error.
 
-    v_q = R i_q + p omega (psi + L_d i_d), regressed over block means on omega, i_q and, where it
-    varies, omega i_d: the slope is p psi, positive where phases and angle are right. (0, inf)
-    where the shaft hardly turns or where a steady i_d may cancel the magnet.
+    Parameters
+    ----------
+    capture
+        With v_q, speed and q current; d current where there.
+
+    Returns
+    -------
+    slope, u
+        [V·s/rad]; (0, inf) where a column is missing, the shaft hardly turns, or a steady d current
+        may cancel the magnet.
+
+    Notes
+    -----
+    v_q = R i_q + p ω (ψ + L_d i_d), regressed over `BLOCKS` block means on ω, i_q and, where i_d
+    varies, ω i_d: the slope is p ψ, positive where phases and angle are right.
+
     """
     names = [n for n in ("vq_v", "omega_mech_rad_s", "iq_a", "id_a") if capture.has(n)]
     if names[:3] != ["vq_v", "omega_mech_rad_s", "iq_a"]:

@@ -24,10 +24,16 @@ REMEDIES = {
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Warns of a sum beyond what the instrument's gains explain, refuses a gross one.
+    """Warns of currents or voltages whose sum is beyond what gains explain, refuses a gross one.
 
-    Gains for which nobody vouches explain nothing here, though budgets take them as 1 %: five
-    times that would pass one sensor that is 8 % off without a word.
+    Notes
+    -----
+    The statistic is `sum_share` [1]. It warns above `warn_share`, or `coverage` times the stated
+    relative uncertainty of the gain where that is more, for three independent gains of u leave a
+    sum of about u; it refuses above `refuse_share`. Gains for which nobody vouches explain nothing
+    here, though budgets take them as 1 %: five times that would pass one sensor that is 8 % off
+    without a word.
+
     """
     stated = {
         LINE_CURRENTS: capture.meta.u_rel_current,
@@ -53,11 +59,27 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def sum_share(table: pl.DataFrame, names: tuple[str, ...], additive: float) -> float:
-    """Root mean square of the sum over that of the three together, white noise left out.
+    """Root mean square of the sum of three signals over that of the three together, noise left out.
 
-    share² = mean(s[k] s[k+1]) / mean(a² + b² + c²): the product of neighbours holds none of the
-    white noise. 0 where it is not clear of its own scatter, mean(s²)/sqrt(n), or where it is
-    below `additive` times the noise: offset, hum and drift of that size are any channel's.
+    Parameters
+    ----------
+    table
+        Columns of the signals.
+    names
+        Which three.
+    additive
+        Multiple of the noise [1] below which a sum is any channel's offset, hum and drift.
+
+    Returns
+    -------
+    float
+        [1]; 0 where the sum is not clear of its own scatter, or below `additive` times the noise.
+
+    Notes
+    -----
+    share² = mean(s_k s_(k+1))/mean(a² + b² + c²): the product of neighbours holds none of the white
+    noise. Its scatter is mean(s²)/√n.
+
     """
     three = [table[name].to_numpy() for name in names]
     total = three[0] + three[1] + three[2]

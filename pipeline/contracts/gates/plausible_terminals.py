@@ -14,7 +14,15 @@ from pipeline.records.finding import Finding
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Warns of a line-to-line resistance, or a measured voltage, beyond what can be."""
+    """Warns of a resistance between terminals, or a voltage on its link, that cannot be.
+
+    Notes
+    -----
+    Resistance: 95th percentile of |v| over that of |i| of the first pair whose current is clear of
+    noise, beyond `least_ohm` to `most_ohm` [ohm]. Voltage: 99th percentile of |v| above `over_link`
+    [1] times the stated DC link.
+
+    """
     findings = [*_resistance(capture, options), *_link(capture, options)]
     return Passed(findings=tuple(findings))
 
@@ -42,8 +50,7 @@ def _resistance(capture: Capture, options: Mapping[str, float]) -> list[Finding]
 
 def _link(capture: Capture, options: Mapping[str, float]) -> list[Finding]:
     link = capture.meta.vdc_v
-    driven = capture.meta.test not in ("open_circuit", "hand_turn", "spin_down")
-    if link is None or not link or not driven:
+    if not link:
         return []
     for pair in PAIRS:
         name = f"v{pair}_v"

@@ -16,7 +16,16 @@ REMEDY = "correct `pole_pairs`; until then the count from the data is used"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Warns where the count is no whole number, or another than the nameplate's."""
+    """Warns where the count of cycles a turn is no whole number, or another than the nameplate's.
+
+    Notes
+    -----
+    The count is that of `rotation.turning`, with its standard uncertainty u. Not looked at below
+    `cycles` electrical cycles, or with u above `largest_u` [1]. No whole number is one that is off
+    by more than `from_whole` + 2 u [1]; where degrees or rpm would make it whole, the capture is
+    refused.
+
+    """
     seen = turning(capture)
     if seen is None or seen.cycles < options["cycles"] or seen.u > options["largest_u"]:
         return Passed()

@@ -16,13 +16,19 @@ FRAME = ("vd_v", "vq_v", "id_a", "iq_a")
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Refuses a two-terminal test or heat run whose terminals deliver energy over the recording.
 
-    The sum of v·i over that of |v·i| is near 1 in a winding that only dissipates and stores.
+    Notes
+    -----
+    Σ v i/Σ |v i| is near 1 in a winding that only dissipates and stores; below −`share` [1]
+    refuses.
+
     """
     pair = capture.meta.pair or "ab"
-    terminals = (f"v{pair}_v", f"i{pair[0]}_a")
+    line = next((phase for phase in pair if capture.has(f"i{phase}_a")), pair[0])
+    terminals = (f"v{pair}_v", f"i{line}_a")
     if capture.has(*terminals):
         data = capture.arrays(*terminals)
-        power = data[terminals[0]] * data[terminals[1]]
+        sense = 1.0 if line == pair[0] else -1.0
+        power = sense * data[terminals[0]] * data[terminals[1]]
     elif capture.has(*FRAME):
         data = capture.arrays(*FRAME)
         power = data["vd_v"] * data["id_a"] + data["vq_v"] * data["iq_a"]

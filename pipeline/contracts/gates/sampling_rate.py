@@ -20,7 +20,17 @@ REMEDY = "record again at a higher rate"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Samples per time constant, electrical period or cogging period, whichever the test has."""
+    """Samples per time constant, electrical period or cogging period, whichever the test has.
+
+    Notes
+    -----
+    Options end in `_refuse` and `_warn`: the least, and what would be good [samples]. Current step:
+    in one electrical time constant (`samples_per_time_constant`), where the trapezoid on an
+    exponential is off by (Δt/τ)²/12. Open circuit: in the shortest electrical period, from the
+    back-EMF and from nameplate and speed. Cogging: in a period of LCM(slots, 2p) a turn. Torque map
+    and drive warn alone.
+
+    """
     return LOOKS[capture.meta.test](capture, options)
 
 

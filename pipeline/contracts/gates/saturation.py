@@ -31,7 +31,11 @@ REMEDY = "record again with a larger range of that channel"
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Sets clipped rows aside; refuses where they are many or where the step's fit needs them.
 
-    A commanded voltage may well stand at the inverter's limit and is not looked at.
+    Notes
+    -----
+    See `clipped_rows`. More than `refuse_share` [1] of the rows refuse, in a current step any. A
+    commanded voltage may well stand at the inverter's limit and is not looked at.
+
     """
     masks: list[Mask] = []
     findings: list[Finding] = []
@@ -55,12 +59,27 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def clipped_rows(values: Array, options: Mapping[str, float]) -> Rows:
-    """True on rows [n] at an extreme value of which some runs are longer than noise allows.
+    """Rows at an extreme value of which some runs are longer than noise allows.
 
-    A run counts if it is longer than chance allows for the repeats seen away from the extremes,
-    and if the samples next to it move by more than the converter's resolution: a decay that
-    settles on one code, or a rounded peak, comes to it by single codes, a clipped signal at its
-    full pace or with its full noise. Exact zero is rest, not a stop.
+    Parameters
+    ----------
+    values
+        Signal [n, any unit].
+    options
+        `chance` [1], `shortest_run` [samples], `inside_share` [1], `pace_steps` [1].
+
+    Returns
+    -------
+    array [n] of bool
+        None for fewer than 50 samples, or fewer than `inside_share` of them between the extremes.
+
+    Notes
+    -----
+    A run counts if it is longer than chance allows for the repeats seen away from the extremes, and
+    if the samples next to it move by `pace_steps` of the converter's resolution or more: a decay
+    that settles on one code, or a rounded peak, comes to it by single codes, a clipped signal at
+    its full pace or with its full noise. Exact zero is rest, not a stop.
+
     """
     clipped = np.zeros(values.size, dtype=bool)
     finite = values[np.isfinite(values)]

@@ -31,7 +31,14 @@ SUSPECTS = {
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Warns of a speed some percent off the angle's; refuses one that is another quantity."""
+    """Warns of a speed some percent off the angle's rate; refuses one that is another quantity.
+
+    Notes
+    -----
+    The ratio of `speed_over_angle` off 1 by more than `warn` [1] warns, by more than `refuse` [1]
+    refuses, with the unit or count that it lands on within 2 %.
+
+    """
     ratio = speed_over_angle(capture, options["turns"])
     if ratio is None or abs(ratio - 1.0) <= options["warn"]:
         return Passed()
@@ -56,12 +63,27 @@ def _standing(ratio: float) -> tuple[str, str]:
 
 
 def speed_over_angle(capture: Capture, turns: float) -> float | None:
-    """Integrated speed over angle, from block increments; None if the shaft hardly turns.
+    """Integrated speed over angle, from block increments.
 
-    A shaft rests where its angle passes less than `turns` and its speed is noise: integrated, the
-    noise makes turns that are no sign of a wrong sign.
+    Parameters
+    ----------
+    capture
+        With time, angle and speed.
+    turns
+        Least travel, forth and back added up, by angle or by integrated speed [turns].
 
-    The regression runs on the larger of the two, so that a channel that stands still reads 0.
+    Returns
+    -------
+    float or None
+        [1]; 0 where the speed stands still while the angle moves, infinite where the angle does.
+        None where a column is missing or the shaft hardly turns.
+
+    Notes
+    -----
+    r = Σ Δθ Δ∫ω dt/Σ Δθ² over `BLOCKS` blocks. A shaft rests where its angle passes less than
+    `turns` and its speed is noise: integrated, the noise makes turns that are no sign of a wrong
+    sign.
+
     """
     for table in capture.tables:
         if not {"t_s", "theta_mech_rad", "omega_mech_rad_s"} <= set(table.columns):

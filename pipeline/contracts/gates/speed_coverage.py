@@ -15,7 +15,15 @@ CODE = "speed_coverage"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Whether the speeds of the test were there; a refusal names the missing experiment."""
+    """Whether the speeds of the test were there.
+
+    Notes
+    -----
+    Spin-down: the median speed of the fastest tenth of the record over that of the last tenth;
+    below `fall` [1] refuses, for Coulomb and viscous friction cannot be separated then. Torque map
+    and drive: less than `turns` [1] of travel warns.
+
+    """
     if capture.meta.test == "spin_down":
         return _coast(capture, options)
     turned = turned_rad(capture)

@@ -17,7 +17,10 @@ REMEDY = "write started_at as ISO 8601 in UTC, such as 2026-01-05T08:00:00Z"
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Warns of a `started_at` that is not ISO 8601 with date, time and UTC; no value rests on it.
 
-    Reference: [1] ISO 8601-1:2019, 5.4.2 (date and time of day in UTC).
+    References
+    ----------
+    ISO 8601-1:2019, 5.4.2 (date and time of day in UTC).
+
     """
     del options
     stated = capture.meta.started_at

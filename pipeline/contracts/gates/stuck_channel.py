@@ -41,7 +41,14 @@ REMEDY = "check the sensor and its lead, and record again"
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
-    """Refuses a dead channel; sets aside the rows in which a noisy one froze."""
+    """Refuses a dead channel; sets aside the rows in which a noisy one froze.
+
+    Notes
+    -----
+    Dead is a column that the test must move and that has one value in every row. Frozen rows are
+    those of `frozen_rows`; more than `refuse_share` [1] of them refuse.
+
+    """
     masks: list[Mask] = []
     findings: list[Finding] = []
     for index, table in enumerate(capture.tables):
@@ -72,11 +79,26 @@ def _refuse_dead(name: str, values: Array) -> None:
 
 
 def frozen_rows(values: Array, options: Mapping[str, float]) -> Rows:
-    """True on rows [n] of runs that a noisy signal does not make by chance.
+    """Rows of runs of one value that a noisy signal does not make by chance.
 
-    Runs at the extremes are the gate `saturation`'s. A run of exact zeros counts only where the
-    signal drops to it from afar: a drive that is switched off logs zero current rightly. A
-    signal that settles on one code repeats more and more before it does; a frozen one does not.
+    Parameters
+    ----------
+    values
+        Signal [n, any unit].
+    options
+        `chance` [1], `shortest_run` [samples], `drop_share` [1].
+
+    Returns
+    -------
+    array [n] of bool
+
+    Notes
+    -----
+    Runs longer than `longest_likely_run`. Those at the extremes are the gate `saturation`'s. A run
+    of exact zeros counts only where the signal drops to it by more than `drop_share` of its range:
+    a drive that is switched off logs zero current rightly. A signal that settles on one code
+    repeats more and more before it does; a frozen one does not.
+
     """
     none = np.zeros(values.size, dtype=bool)
     likely = max(longest_likely_run(values, options["chance"]), options["shortest_run"])

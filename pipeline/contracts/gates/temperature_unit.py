@@ -21,10 +21,13 @@ REMEDY = "write degrees Celsius, or map the column with `unit: K` in conf/source
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Refuses a capture with a temperature column that is in kelvin, naming each such column.
 
-    The coldest part of a column counts, so that no hot end of a test does. It is in kelvin where
-    that lies 273.15 above the stated `ambient_degc`, or beyond any motor: above `most_degc`, and
-    more than `most_rise_k` above an ambient that is stated. A hot start, a cold chamber and an
-    oven are let through.
+    Notes
+    -----
+    The 5th percentile of a column counts, so that no hot end of a test does. It is in kelvin where
+    that lies 273.15 ± `near_k` [K] above the stated `ambient_degc`, or beyond any motor: above
+    `most_degc` [degC], and more than `most_rise_k` [K] above an ambient that is stated. A hot
+    start, a cold chamber and an oven are let through.
+
     """
     faults = [
         fault

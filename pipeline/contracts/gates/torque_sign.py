@@ -17,10 +17,14 @@ BLOCKS = 100
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Refuses a torque map or a drive log whose shaft torque falls as i_q grows.
 
-    In a map the dynamometer holds the speed, and the torque is the current's alone. In a drive log
-    inertia and friction take their share, and a shaft that carries nothing shows the transducer's
-    drift: there a curve of second order in time is taken off, and the torque must fall by a good
-    part of what the voltage at speed promises an ampere, Kt = 1.5 v_q/omega.
+    Notes
+    -----
+    The correlation of `BLOCKS` block means below −`correlation` [1] refuses. In a map the
+    dynamometer holds the speed, and the torque is the current's alone. In a drive log inertia and
+    friction take their share, and a shaft that carries nothing shows the transducer's drift: there
+    a curve of second order in time is taken off, and the torque must also fall by `least_share` [1]
+    of what the voltage at speed promises an ampere, Kt = 1.5 v_q/ω.
+
     """
     drive = capture.meta.test == "drive"
     names = ("iq_a", "torque_shaft_nm", *(("vq_v", "omega_mech_rad_s") if drive else ()))

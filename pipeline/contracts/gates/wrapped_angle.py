@@ -25,7 +25,11 @@ REMEDY = (
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     """Refuses an angle that steps back by about a turn while it otherwise moves in small steps.
 
-    A step over missing rows says nothing: the shaft may have made the turn.
+    Notes
+    -----
+    A step counts within `near_rad` [rad] of 2π, in a record whose median step is at most
+    `usual_rad` [rad]. A step over missing rows says nothing: the shaft may have made the turn.
+
     """
     for name in ANGLES:
         if not capture.has(name):

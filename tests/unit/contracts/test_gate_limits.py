@@ -158,6 +158,8 @@ def test_half_of_the_energy_comes_back(share: float, expected: str) -> None:
     assert said("power_sign", capture("resistance", vab_v=2.0, ia_a=current)) == expected
     other = capture("resistance", vca_v=-2.0, ic_a=-current, meta={"pair": "ca"})
     assert said("power_sign", other) == expected
+    far = capture("resistance", vab_v=2.0, ib_a=-current)
+    assert said("power_sign", far) == expected
     frame = capture("heat_run", vd_v=1.0, id_a=current, vq_v=-3.0, iq_a=-current)
     assert said("power_sign", frame) == expected
     assert said("power_sign", capture("resistance", vab_v=2.0, ia_a=np.zeros(9))) == ""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.simulator.bench import record
+from pipeline.simulator.catalogue import with_effects
 from pipeline.simulator.effects import ALWAYS, FORMS, parameters
 from pipeline.simulator.outside import OUTSIDE, with_unknown
 from pipeline.simulator.sensors import first_order_lag
@@ -389,6 +390,20 @@ def test_effects_outside_the_library_change_something_and_vanish_at_zero(name):
         other = table("torque_map", with_unknown(BASE, name, size), **protocol).tables[0]
         unchanged = all(np.allclose(plain[k], other[k], rtol=0, atol=1e-9) for k in plain)
         assert unchanged == same
+
+
+@pytest.mark.parametrize("timing", ["instant", "centred"])
+def test_a_back_emf_outside_the_library_is_seen_whatever_the_timing(timing):
+    plain, other = (
+        table("open_circuit", motor, voltage_timing=timing).tables[0]
+        for motor in (BASE, with_unknown(BASE, "trapezoid"))
+    )
+    assert np.std(other["vab_v"] - plain["vab_v"]) > 0.01 * np.std(plain["vab_v"])
+
+
+def test_a_delay_has_no_sign():
+    with pytest.raises(ValueError, match="has no sign"):
+        with_effects(BASE, "current_delay=-1e-5")
 
 
 def test_unknown_names_and_parameters_are_refused():
