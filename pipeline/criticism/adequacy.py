@@ -16,7 +16,7 @@ from pipeline.criticism.diagnosis import base_fit, searched
 from pipeline.criticism.regression.goodness import leave_out, remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
-from pipeline.criticism.selection.drift import wandering
+from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.requested_model import Begun
 from pipeline.criticism.validation.error_maps import unit_of
 from pipeline.records.capture import Campaign
@@ -81,7 +81,7 @@ def _stated(model: ModelSpec, found: ModelVerdict) -> ModelVerdict:
 
 def _surely_missing(begun: Begun) -> bool:
     large = remainder(begun.system, large=True)
-    return bool(large) and wandering(begun.system.fit, large) is None
+    return bool(large) and drifting_segments(begun.system.fit, large) is None
 
 
 def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
@@ -131,5 +131,5 @@ def _residuals(begun: Begun) -> ModelVerdict:
 
 def _largest(system: LinearSystem) -> float:
     """The largest root of χ²/n of any group."""
-    spreads = system.spreads(system.residual / system.soft)[system.counts > 0]
-    return math.sqrt(float(np.max(spreads, initial=0.0)))
+    reduced_chi2 = system.reduced_chi2(system.residual / system.noise_ratio)[system.counts > 0]
+    return math.sqrt(float(np.max(reduced_chi2, initial=0.0)))

@@ -13,9 +13,9 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
-from pipeline.criticism.regression.identifiability import combinations_told, parameters_told
+from pipeline.criticism.regression.identifiability import reported_combinations, reported_parameters
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
-from pipeline.criticism.regression.mains_hum import told_hum
+from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.missing_data import at_ambient, unused
@@ -57,7 +57,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     held = leave_out(system)
     simulated = simulate(system, held)
     maps = all_maps(system, held.or_fit(system))
-    parameters = parameters_told(system, held)
+    parameters = reported_parameters(system, held)
     bare = _bare(model_of(model.bare(), machine), parameters, system, held)
     return Comparison(
         campaign.motor_id,
@@ -70,14 +70,14 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         (
             *unused(campaign, system.segments),
             *at_ambient(system.segments, system.fit.model),
-            *told_hum(begun.hum),
+            *hum_notes(begun.hum),
             *held.notes,
         ),
         maps,
         () if bare is None else bare.moved,
         None if bare is None else bare.total,
         tuple(traces(system.fit, simulated)),
-        combinations_told(system, held),
+        reported_combinations(system, held),
         () if bare is None else bare.errors,
     )
 
@@ -114,7 +114,7 @@ def _bare(
     begun = replace(whole.fit.without(*gone), model=without, tolerance=())
     system = linear_system(gauss_newton(begun).fit)
     held = leave_out(system)
-    moved = _moves(parameters_told(system, held), after)
+    moved = _moves(reported_parameters(system, held), after)
     less, full = in_common((system, whole), (held, whole_held))
     errors = tuple(_errors(system, held))
     return _Bare(less.total, full.total, moved, errors)
@@ -140,7 +140,7 @@ def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
             continue
         out = bool(np.isfinite(held.residual[mine]).all())
         residual = held.residual[mine] if out else system.residual[mine]
-        unit, soft = system.unit[mine], system.soft[mine]
+        unit, noise_ratio = system.unit[mine], system.noise_ratio[mine]
         segment = system.segments[number]
         signal = reported_signal(segment, channel)
         yield SignalError(
@@ -148,7 +148,7 @@ def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
             segment.capture,
             "held_out" if out else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
-            math.sqrt(float(((unit * soft) ** 2).mean())),
+            math.sqrt(float(((unit * noise_ratio) ** 2).mean())),
             int(mine.sum()),
             effective(residual),
             unit_of(signal),

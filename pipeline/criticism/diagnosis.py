@@ -12,7 +12,7 @@ from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.design.experiments import separations
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.ladder import parameters_of, rung_record
+from pipeline.criticism.ladder import parameters_of, step_record
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.library.headline import headline
 from pipeline.criticism.library.named_models import model_of
@@ -23,9 +23,9 @@ from pipeline.criticism.regression.goodness import (
     HeldOut,
     over_floor,
 )
-from pipeline.criticism.regression.identifiability import combinations_told
+from pipeline.criticism.regression.identifiability import reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.regression.mains_hum import told_hum
+from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import End, Ladder, ended
@@ -33,7 +33,7 @@ from pipeline.criticism.selection.alternatives import experiment_for, remedies, 
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
 from pipeline.criticism.selection.requested_model import Begun, fit_of
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
-from pipeline.criticism.selection.stepwise import Rung, loss_without
+from pipeline.criticism.selection.stepwise import LadderStep, loss_without
 from pipeline.criticism.validation.signature import signature
 from pipeline.physics.notation import number_text
 from pipeline.records.capture import Campaign
@@ -88,29 +88,29 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
     library, machine = effects(model.effects_path), begun.system.fit.machine
     name = f"{file_stem(campaign.motor_id)}_unknown"
     end = ended(campaign, model, machine, begun, library, name)
-    ladder, last = end.ladder, end.ladder.rungs[-1].system
+    ladder, last = end.ladder, end.ladder.steps[-1].system
     found = last.segments
     offered = candidates(library, last.fit.model)
     ranking = _ranking(ladder, offered, library)
-    unseen = unexcited(campaign, library, ladder.rungs[-1], offered)
+    unseen = unexcited(campaign, library, ladder.steps[-1], offered)
     verdict = _verdict_of(end, unseen)
-    together = combinations_told(last, ladder.held[-1])
+    together = reported_combinations(last, ladder.held[-1])
     stateless = verdict == "unknown" and end.sketch is None
     told = Diagnosis(
         campaign.motor_id,
         model.name,
         verdict,
-        ladder.rungs[-1].added,
+        ladder.steps[-1].added,
         ranking,
-        _records(ladder.rungs, ladder.held),
+        _records(ladder.steps, ladder.held),
         end.sketch if verdict == "unknown" else None,
         _as_told(last, end.left),
         (
             *unused(campaign, found),
             *at_ambient(found, last.fit.model),
-            *told_hum(ladder.begun.hum),
+            *hum_notes(ladder.begun.hum),
             *end.notes,
-            *_together(together, ladder.rungs[-1].added),
+            *_together(together, ladder.steps[-1].added),
             *(note for note in ladder.cut.values() if note),
             *((_STATELESS,) if stateless else ()),
             *ladder.held[0].notes,
@@ -123,11 +123,11 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
     return told, ladder.begun
 
 
-def _records(rungs: Sequence[Rung], held: Sequence[HeldOut]) -> tuple[LadderRung, ...]:
+def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[LadderRung, ...]:
     """The steps for people, each with the signature of what came with it."""
-    told = [rung_record(rung, one) for rung, one in zip(rungs, held, strict=True)]
+    told = [step_record(step, one) for step, one in zip(steps, held, strict=True)]
     signatures = [
-        signature((rungs[n - 1], rungs[n]), (told[n - 1], told[n])) for n in range(1, len(told))
+        signature((steps[n - 1], steps[n]), (told[n - 1], told[n])) for n in range(1, len(told))
     ]
     return tuple(
         replace(one, signature=shown) for one, shown in zip(told, [None, *signatures], strict=True)
@@ -190,7 +190,7 @@ def _verdict_of(end: End, unseen: Sequence[Unexcited]) -> Verdict:
     """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
     if end.left and not end.ladder.explains(end.left):
         return "unknown"
-    if end.ladder.rungs[-1].added:
+    if end.ladder.steps[-1].added:
         return "missing"
     return "insufficient" if unseen else "adequate"
 
@@ -199,7 +199,7 @@ def _ranking(
     ladder: Ladder, offered: Sequence[Candidate], library: Mapping[str, Effect]
 ) -> tuple[RankedEffect, ...]:
     """Found effects in the order found, then the others by their score on the last step."""
-    last = ladder.rungs[-1]
+    last = ladder.steps[-1]
     found = [_found(ladder, last.fit.effect(name), offered, library) for name in last.added]
     others = [_other(s) for s in last.scores if s.candidate.effect.name not in last.added]
     reasons = {name: _AGAINST if note else _GUESS for name, note in ladder.cut.items()}
@@ -211,16 +211,16 @@ def _found(
     ladder: Ladder, effect: Effect, offered: Sequence[Candidate], library: Mapping[str, Effect]
 ) -> RankedEffect:
     """An effect that the ladder found: its evidence, its alternatives and what would part them."""
-    rungs, wide = ladder.rungs, ladder.rungs[-1].system
-    over = _passed_over(rungs, effect.name, rungs[-1].added)
+    steps, wide = ladder.steps, ladder.steps[-1].system
+    over = _passed_over(steps, effect.name, steps[-1].added)
     confused = rivals_of(effect.name, wide, offered, over)
     dof = effect.dof(wide.fit.machine)
     loss = _loss(wide, effect, dof)
-    told = _parameters(rungs[-1], effect, ladder.held[-1])
+    told = _parameters(steps[-1], effect, ladder.held[-1])
     return RankedEffect(
         effect.name,
         loss - dof * math.log(wide.size),
-        _drop(rungs, ladder.held, effect.name),
+        _drop(steps, ladder.held, effect.name),
         _p_value(loss, dof),
         confused,
         f"{effect.words}; {effect.signature}",
@@ -238,13 +238,15 @@ def _loss(last: LinearSystem, effect: Effect, dof: int) -> float:
     loss = loss_without(last, (effect.name,))
     if loss > dof * math.log(last.size):
         return loss
-    return max(loss, gauss_newton(last.fit.without(effect.name)).misfit - last.misfit)
+    return max(loss, gauss_newton(last.fit.without(effect.name)).deviance - last.deviance)
 
 
-def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tuple[Candidate, ...]:
+def _passed_over(
+    steps: Sequence[LadderStep], name: str, added: Sequence[str]
+) -> tuple[Candidate, ...]:
     """Candidates that promised as much as an effect on the step before it was added."""
-    policy = rungs[0].fit.policy.selection
-    before = [rung for rung in rungs if name not in rung.added][-1]
+    policy = steps[0].fit.policy.selection
+    before = [step for step in steps if name not in step.added][-1]
     falls = {score.candidate.effect.name: score.fall for score in before.scores}
     short = max(policy.tie, policy.passed_over_share * falls.get(name, 0.0))
     least = falls[name] - short if name in falls else math.inf
@@ -255,12 +257,12 @@ def _passed_over(rungs: Sequence[Rung], name: str, added: Sequence[str]) -> tupl
     )
 
 
-def _drop(rungs: Sequence[Rung], held: Sequence[HeldOut], name: str) -> float:
+def _drop(steps: Sequence[LadderStep], held: Sequence[HeldOut], name: str) -> float:
     """Share of the removable held-out error, from first to last step, that went where an effect
     was added; 0 where the error grew there.
     """
     totals = [math.log(max(h.total, 1e-300)) for h in held]
-    place = next(n for n, rung in enumerate(rungs) if name in rung.added)
+    place = next(n for n, step in enumerate(steps) if name in step.added)
     if place == 0 or totals[0] <= totals[-1]:
         return 0.0
     return max((totals[place - 1] - totals[place]) / (totals[0] - totals[-1]), 0.0)
@@ -271,7 +273,7 @@ def _other(score: Score) -> RankedEffect:
     dof = max(len(score.step), 1)
     return RankedEffect(
         effect.name,
-        score.fall - score.price,
+        score.fall - score.penalty,
         0.0,
         _p_value(score.fall, dof),
         (),
@@ -287,6 +289,6 @@ def _p_value(fall: float, dof: int) -> float:
     return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
 
 
-def _parameters(rung: Rung, effect: Effect, held: HeldOut) -> dict[str, ToldParameter]:
-    told, start = parameters_of(rung, held), f"{effect.name}."
+def _parameters(step: LadderStep, effect: Effect, held: HeldOut) -> dict[str, ToldParameter]:
+    told, start = parameters_of(step, held), f"{effect.name}."
     return {name.removeprefix(start): one for name, one in told.items() if name.startswith(start)}

@@ -51,7 +51,7 @@ class Parameter:
     of a shape parameter, which has no influence while the amplitudes of its effect are zero; empty
     for an amplitude. A `choice` takes one of these values and is never fitted. `optional`: the
     parameters of one number above 0 form a term that the effect can do without; without it they
-    are zero. `u`: standard uncertainty, in its own unit, of a value that a closer look told.
+    are zero. `u`: standard uncertainty, in its own unit, of a value that a discriminator gives.
     `usual`: what handbooks say of the material, and its standard uncertainty, in its own unit: a
     prior of every fit. `at_least`: another amplitude of the effect; if this one stays below half of
     it, captures speak against the effect. `starts`: values, in multiples of `scale`, at which an
@@ -302,7 +302,7 @@ Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Whole:
+class FullLog:
     """All of one drive log [n], with what the fitted model makes of it.
 
     `x` with its air-gap torque, `drag_nm` of everything else in the model, `shaft_nm` the true
@@ -320,8 +320,8 @@ class Whole:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """Which of the effects that share a closer look it was, and parameters with their standard
+class Discrimination:
+    """Which of the effects that share a discriminator it is, and parameters with their standard
     uncertainties, in their own units.
     """
 
@@ -337,7 +337,7 @@ CurrentHook = Callable[[Recorded, Values], Complex]
 LoadHook = Callable[[Recorded, Values], Array]
 VoltageHook = Callable[[Complex, Operating, Values, str], Complex]
 ClockHook = Callable[[str, Values], float]
-CloserHook = Callable[[Sequence[Whole], Values], Told | None]
+DiscriminatorHook = Callable[[Sequence[FullLog], Values], Discrimination | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,8 +358,8 @@ class Effect:
     shaft(t, q): recorded shaft torque from the true one [N·m].
     clock(recorder, q): recorded time over true time, less one [1], of a `RECORDERS` name.
 
-    closer(wholes, q): which of the effects that share this very function it was, from whole logs;
-        None where these do not tell. For effects whose equations differ in what windows smooth.
+    discriminator(logs, q): which of the effects that share this very function it is;
+        None where full logs do not say. For effects whose equations differ in what windows smooth.
 
     `parameters`, or `expand(machine)` where their number depends on the machine. `signals` are
     capture columns without which the effect cannot be seen, `tests` those that excite it, the
@@ -390,7 +390,7 @@ class Effect:
     shaft: Callable[[Array, Values], Array] | None = None
     speed: Callable[[Array, Values, float], Array] | None = None
     clock: ClockHook | None = None
-    closer: CloserHook | None = None
+    discriminator: DiscriminatorHook | None = None
     left_out: tuple[int, ...] = ()
     headline: str = ""
 

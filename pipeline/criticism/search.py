@@ -16,11 +16,11 @@ from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.drift import wandering
+from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import Begun, fit_of
-from pipeline.criticism.selection.stepwise import Rung, search
-from pipeline.criticism.selection.truncation import denied, explained, trusted
+from pipeline.criticism.selection.stepwise import LadderStep, search
+from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
@@ -34,20 +34,20 @@ _WITHIN = (
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """The rungs as far as they are trusted and where they began, their held-out errors, what is
+    """The steps as far as they are trusted and where they began, their held-out errors, what is
     `left` at their end, and every effect that would take some of that and was `cut`: with a note
     where captures speak against it, with none where it would be a guess.
     """
 
     begun: Begun
-    rungs: tuple[Rung, ...]
+    steps: tuple[LadderStep, ...]
     held: list[HeldOut]
     left: tuple[Remainder, ...]
     cut: dict[str, str]
 
     def explains(self, left: Sequence[Remainder]) -> bool:
         """Whether its names explain what the captures show, but for what is `left`."""
-        return explained(self.rungs, self.held, left)
+        return explained(self.steps, self.held, left)
 
     def large(self) -> tuple[Remainder, ...]:
         """What is left and large for the machine as a whole.
@@ -56,7 +56,7 @@ class Ladder:
         instrument's wander as well as the machine: it is told where some state of the machine
         predicts it.
         """
-        system = self.rungs[-1].system
+        system = self.steps[-1].system
         large = remainder(system, large=True)
         return tuple(one for one in self.left if one in large)
 
@@ -84,18 +84,18 @@ def ended(
     model to the campaign's segments.
     """
 
-    def climb(*orders: float) -> Ladder:
+    def search_again(*orders: float) -> Ladder:
         if not orders:
-            return climbed(begun, library)
+            return ladder_from(begun, library)
         wider = replace(machine, load_orders=orders)
-        return climbed(fit_of(segments(campaign, wider), model_of(model, wider)), library)
+        return ladder_from(fit_of(segments(campaign, wider), model_of(model, wider)), library)
 
-    ladder, sketch = _by_orders(climb, name)
+    ladder, sketch = _by_orders(search_again, name)
     left, notes = ladder.left, []
     if sketch is None:
-        calm = _calmed(ladder, library)
-        if calm is not None:
-            ladder, left = calm, calm.large()
+        drifting = _with_drift(ladder, library)
+        if drifting is not None:
+            ladder, left = drifting, drifting.large()
             sketch, _ = _sketched(ladder, left, name)
             notes.append(_DRIFT.format(policy_of(model.policy).selection.drift_size))
     if sketch is None:
@@ -105,60 +105,62 @@ def ended(
     return End(ladder, left, sketch, tuple(notes))
 
 
-def _by_orders(climb: Callable[..., Ladder], name: str) -> tuple[Ladder, UnknownStructure | None]:
+def _by_orders(
+    search_again: Callable[..., Ladder], name: str
+) -> tuple[Ladder, UnknownStructure | None]:
     """The ladder, and a sketch of what it leaves, with rows for the orders a turn that a first one
     leaves unseen.
 
     Steps of a programme make lines of any order too, and these predict no other capture: orders
     that are no whole numbers join where the sketch with them takes more.
     """
-    ladder = climb()
-    unlooked = orders_left(ladder.rungs[-1].system)
+    ladder = search_again()
+    unlooked = orders_left(ladder.steps[-1].system)
     whole = tuple(order for order in unlooked if isinstance(order, int))
     if whole:
-        ladder = climb(*whole)
+        ladder = search_again(*whole)
     sketch, gain = _sketched(ladder, ladder.left, name)
     if len(unlooked) > len(whole) and not ladder.explains(ladder.left):
-        between = climb(*unlooked)
+        between = search_again(*unlooked)
         other, more = _sketched(between, between.left, name)
         if other is not None and (sketch is None or more > gain):
             return between, other
     return ladder, sketch
 
 
-def _calmed(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
+def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
     """The ladder of instruments that wander; None where nothing large is left, or none does."""
     large = ladder.large()
     if ladder.explains(large):
         return None
-    calm = wandering(ladder.rungs[-1].fit, large)
-    if calm is None:
+    drifting = drifting_segments(ladder.steps[-1].fit, large)
+    if drifting is None:
         return None
-    start = replace(ladder.begun.system.fit, segments=calm)
-    return climbed(Begun(gauss_newton(start), ladder.begun.hum), library)
+    start = replace(ladder.begun.system.fit, segments=drifting)
+    return ladder_from(Begun(gauss_newton(start), ladder.begun.hum), library)
 
 
-def climbed(start: Begun, library: Mapping[str, Effect]) -> Ladder:
+def ladder_from(start: Begun, library: Mapping[str, Effect]) -> Ladder:
     """The ladder from a model fitted, as far as it is trusted."""
-    rungs = search(start.system.fit, library)
-    alone = [leave_out(rung.system) for rung in rungs]
-    kept, left = trusted(rungs, in_common([r.system for r in rungs], alone))
+    steps = search(start.system.fit, library)
+    alone = [leave_out(step.system) for step in steps]
+    kept, left = truncated(steps, in_common([r.system for r in steps], alone))
     held = in_common([r.system for r in kept], alone[: len(kept)])
-    cut = {rung.added[-1]: denied(rung) for rung in rungs[len(kept) :]}
+    cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
     return Ladder(start, kept, list(held), left, cut)
 
 
 def _sketched(
     ladder: Ladder, left: Sequence[Remainder], name: str, in_parts: bool = False
 ) -> tuple[UnknownStructure | None, float]:
-    """What the structure depends on that no effect explains, and the misfit that it takes; None
+    """What the structure depends on that no effect explains, and the deviance that it takes; None
     where there is none, or where nothing that the machine does predicts it.
 
     The signal that misses by most is sketched, winding or shaft; the other one if that fails.
     """
     if ladder.explains(left):
         return None, 0.0
-    last = ladder.rungs[-1].system
+    last = ladder.steps[-1].system
     worst = sorted(left, key=lambda one: -one.chi2_per_n)
     signals = list(dict.fromkeys(one.signal for one in worst))
     other = [one for one in signals if (one in SHAFT) != (signals[0] in SHAFT)]

@@ -121,10 +121,10 @@ def _now(
     mine = f"{effect.name}."
     others = np.array([n for n in wide.own if not wide.columns[n].name.startswith(mine)])
     places = np.concatenate([others, rival]).astype(np.int64)
-    weight = wide.weights(wide.spreads(wide.residual))
+    weight = wide.weights(wide.reduced_chi2(wide.residual))
     matrix = _stacked(wide.matrix, _amplitudes(effect, wide), places)
     normal = (matrix * weight[:, None]).T @ matrix
-    return normal + np.diag(np.concatenate([[0.0], wide.penalty[places]])), places
+    return normal + np.diag(np.concatenate([[0.0], wide.prior_precision[places]])), places
 
 
 def _stacked(matrix: Array, amplitudes: Array, places: NDArray[np.int64]) -> Array:
@@ -144,7 +144,7 @@ def _noncentrality(normal: Array) -> float:
 def _plans(effect: Effect, places: NDArray[np.int64], wide: LinearSystem) -> Iterator[Plan]:
     """Every experiment whose outcome can be predicted: repeats, tests not done, calibrations."""
     policy, amplitudes = wide.policy.design, _amplitudes(effect, wide)
-    weight = wide.weights(wide.spreads(wide.residual))
+    weight = wide.weights(wide.reduced_chi2(wide.residual))
     tests = [segment.test for segment in wide.segments]
     test = np.array(tests)[wide.segment]
     for name in sorted(set(tests)):

@@ -96,16 +96,16 @@ class Pursuit:
         self.system, self.own, self.port = system, own, port
         self.weight = weight
         self.policy = system.policy.discovery
-        self.price = math.log(system.size)
+        self.penalty = math.log(system.size)
         hats = system.matrix[:, own:]
-        mine, pull = system.matrix[:, :own], system.pull[:own]
+        mine, prior_gradient = system.matrix[:, :own], system.prior_gradient[:own]
         root = weight[:, None]
-        normal = mine.T @ (root * mine) + np.diag(system.penalty[:own])
+        normal = mine.T @ (root * mine) + np.diag(system.prior_precision[:own])
         inverse = np.linalg.pinv(_balanced(normal), hermitian=True)
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         inverse = inverse / np.outer(scale, scale)
         cross = mine.T @ (root * hats)
-        slope = mine.T @ (weight * system.residual) + pull
+        slope = mine.T @ (weight * system.residual) + prior_gradient
         self.gram = hats.T @ (root * hats) - cross.T @ inverse @ cross
         self.moment = -(hats.T @ (weight * system.residual) - cross.T @ inverse @ slope)
 
@@ -150,21 +150,23 @@ class Pursuit:
         """Own step, amplitudes, residual [R] and deviance with curves [K, k] beside own columns."""
         system, own = self.system, self.own
         matrix = np.column_stack([system.matrix[:, :own], system.matrix[:, own:] @ curves])
-        penalty = np.concatenate([system.penalty[:own], np.zeros(curves.shape[1])])
-        pull = np.concatenate([system.pull[:own], np.zeros(curves.shape[1])])
+        prior_precision = np.concatenate([system.prior_precision[:own], np.zeros(curves.shape[1])])
+        prior_gradient = np.concatenate([system.prior_gradient[:own], np.zeros(curves.shape[1])])
         weight, before = self.weight, np.inf
         step, left, now = np.zeros(matrix.shape[1]), system.residual, np.inf
         places = np.arange(own)
         for _ in range(self.policy.most_rounds):
             weighted = matrix * weight[:, None]
-            normal = weighted.T @ matrix + np.diag(penalty)
+            normal = weighted.T @ matrix + np.diag(prior_precision)
             scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
             inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-11, hermitian=True)
-            step = -(inverse @ ((weighted.T @ system.residual + pull) / scale)) / scale
+            step = -(inverse @ ((weighted.T @ system.residual + prior_gradient) / scale)) / scale
             left = system.residual + matrix @ step
-            spreads = system.spreads(left)
-            now = system.misfit_of(spreads) + float(system.prior_costs(places, step[:own]).sum())
-            weight = system.weights(spreads)
+            reduced_chi2 = system.reduced_chi2(left)
+            now = system.deviance_of(reduced_chi2) + float(
+                system.prior_costs(places, step[:own]).sum()
+            )
+            weight = system.weights(reduced_chi2)
             if abs(before - now) < system.policy.fit.settled:
                 break
             before = now
@@ -221,8 +223,8 @@ def _judged(pursuit: Pursuit, groups: Sequence[Group]) -> tuple[float, list[Grou
     refined = _refined(pursuit, groups)
     terms = [t for group in refined for t in group]
     free = sum(1 + len(t.free) for t in terms)
-    misfit = pursuit.fit(pursuit.curves(terms))[3]
-    return misfit + free * pursuit.price, refined
+    deviance = pursuit.fit(pursuit.curves(terms))[3]
+    return deviance + free * pursuit.penalty, refined
 
 
 def _refined(pursuit: Pursuit, groups: Sequence[Group]) -> list[Group]:
@@ -305,7 +307,7 @@ def _shapes(variable: Variable, carrier: int, policy: Discovery) -> Iterator[Gro
 
 def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expression:
     terms = tuple(t for group in chosen for t in group)
-    own, amplitudes, left, misfit = pursuit.fit(pursuit.curves(terms))
+    own, amplitudes, left, deviance = pursuit.fit(pursuit.curves(terms))
     directions = tuple((n, name) for n, t in enumerate(terms) for name in ("amplitude", *t.free))
     columns = [
         _hat_direction(pursuit, terms[n], float(amplitudes[n]), name) for n, name in directions
@@ -313,7 +315,7 @@ def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expres
     width = pursuit.system.matrix.shape[1] - pursuit.own
     slopes = np.column_stack([np.empty((width, 0)), *columns])
     covariance = _inverse(slopes.T @ pursuit.gram @ slopes)
-    return Expression(terms, amplitudes, directions, covariance, start - misfit, left, own)
+    return Expression(terms, amplitudes, directions, covariance, start - deviance, left, own)
 
 
 def _hat_direction(pursuit: Pursuit, term: Term, amplitude: float, name: str) -> Array:
@@ -342,7 +344,7 @@ def curve_about(
     where the expression put them, since else a curve and a constant of one shape cannot be parted.
     """
     hats = pursuit.system.matrix[:, pursuit.own :] @ coarse
-    weight = pursuit.system.weights(pursuit.system.spreads(found.left))
+    weight = pursuit.system.weights(pursuit.system.reduced_chi2(found.left))
     live = np.any(hats != 0.0, axis=0)
     normal = hats[:, live].T @ (weight[:, None] * hats[:, live])
     covariance = _inverse(normal)

@@ -15,7 +15,7 @@ from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import told_groups
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column, effect_columns
 from pipeline.records.diagnosis import UnknownStructure
@@ -26,7 +26,7 @@ SHAFT = ("torque_shaft_nm", "omega_mech_rad_s")
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A port with the misfit it removes less its price, in sample and held out.
+    """A port with the deviance it removes less its penalty, in sample and held out.
 
     `left` [R] is the residual after it, `step` [k] the model's constants and its coefficients,
     `place` where it stands in the list of ports.
@@ -49,10 +49,10 @@ def unknown_structure(
     """What the structure left in `signals`, the worst first, depends on, as curve, expression and
     effect file.
 
-    Ports are compared by the misfit they remove from whole captures that they were not fitted to.
+    Ports are compared by the deviance they remove from whole captures that they were not fitted to.
     Of those that do as well, the one of fewest variables is told, and the others are named beside
     it. The result is None if the best takes less than a tenth of what is over the floor:
-    instruments that wander follow no state of the machine. Also returns the misfit (−2 log
+    instruments that wander follow no state of the machine. Also returns the deviance (−2 log
     likelihood) that the port removes.
     `name`: of the effect.
     `in_parts`: captures that miss the floor are held out a twelfth at a time, for a heat run that
@@ -74,7 +74,7 @@ def unknown_structure(
     # a drag over an inertia is a product: the expression is sought around the inertia found
     near = fit.moved(wide.columns[:own], best.step[:own])
     fine = linear_system(near, effect_columns(port.effect, near.model), wide)
-    weight = fine.weights(fine.spreads(best.left))
+    weight = fine.weights(fine.reduced_chi2(best.left))
     pursuit = Pursuit(fine, own, port, weight)
     sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
@@ -94,19 +94,19 @@ def _hooks(signals: Sequence[str]) -> tuple[str, ...]:
 def _ranked(
     before: LinearSystem, hooks: Sequence[str], in_parts: bool
 ) -> tuple[list[Found], LinearSystem]:
-    """Every port that is worth its price and helps where it was not fitted, the best first."""
+    """Every port that is worth its penalty and helps where it was not fitted, the best first."""
     fit = before.fit
     offered = ports(fit.model.machine, fit.policy.discovery, hooks)
     columns = [effect_columns(port.effect, fit.model) for port in offered]
     wide = linear_system(fit, [c for some in columns for c in some], before)
     own = wide.own
-    none = wide.grams(own).best()
-    left, base = wide.after(own, none.step), none.misfit
+    none = wide.normal_equations(own).best()
+    left, base = wide.after(own, none.step), none.deviance
     missed = _missed(wide) if in_parts else None
     units = _units(wide, own, left, missed)
     reference = _held_out(wide, own, left, np.zeros(own.size), units)
-    excess = float(wide.counts @ np.log(np.maximum(wide.spreads(left), 1.0)))
-    price = math.log(wide.size)
+    excess = float(wide.counts @ np.log(np.maximum(wide.reduced_chi2(left), 1.0)))
+    penalty = math.log(wide.size)
     least = max(fit.policy.selection.tie, fit.policy.selection.least_share * excess)
     found = []
     first = own.size
@@ -117,15 +117,17 @@ def _ranked(
         if live.size == 0:
             continue
         chosen = np.concatenate([own, live])
-        end = wide.grams(chosen).best(*fit.policy.selection.thorough)
+        end = wide.normal_equations(chosen).best(*fit.policy.selection.thorough)
         after = wide.after(chosen, end.step)
-        gain = base - end.misfit - live.size * price
+        gain = base - end.deviance - live.size * penalty
         if gain <= 0.0:
             continue
         ridge = np.concatenate([np.zeros(own.size), _ridge(wide.columns, live, fit)])
         held = reference - _held_out(wide, chosen, after, ridge, units)
         if held > least:
-            found.append(Found(port, gain, held, after, _calm(wide, chosen, after, ridge), place))
+            found.append(
+                Found(port, gain, held, after, _ridge_step(wide, chosen, after, ridge), place)
+            )
     return sorted(found, key=lambda f: (-f.held, f.port.effect.name)), wide
 
 
@@ -156,7 +158,7 @@ def _simplest(found: Sequence[Found], policy: Policy) -> Found:
 
 def _missed(system: LinearSystem) -> NDArray[np.int64]:
     """Numbers of the segments in which a fit leaves something that is told."""
-    told = np.flatnonzero(told_groups(system))
+    told = np.flatnonzero(significant_groups(system))
     return np.unique([system.labels[place][0] for place in told])
 
 
@@ -186,10 +188,10 @@ def _carrying(
 ) -> list[int]:
     """Units without which some constant of the model is lost."""
     policy = system.policy.goodness
-    weight = system.weights(system.spreads(left))
+    weight = system.weights(system.reduced_chi2(left))
     live = own[np.any(system.matrix[:, own] != 0.0, axis=0)]
     matrix = system.matrix[:, live]
-    normal = (matrix * weight[:, None]).T @ matrix + np.diag(system.penalty[live])
+    normal = (matrix * weight[:, None]).T @ matrix + np.diag(system.prior_precision[live])
     scale = np.sqrt(np.diag(normal))
     spread = np.diag(np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True))
     carrying = []
@@ -205,14 +207,16 @@ def _carrying(
     return carrying
 
 
-def _calm(system: LinearSystem, places: NDArray[np.int64], left: Array, ridge: Array) -> Array:
-    """Step [k] of least misfit; by `ridge`, a curve and a constant of one shape do not run away."""
-    weight = system.weights(system.spreads(left))
+def _ridge_step(
+    system: LinearSystem, places: NDArray[np.int64], left: Array, ridge: Array
+) -> Array:
+    """Step [k] of least deviance; by `ridge`, curve and constant of one shape do not run away."""
+    weight = system.weights(system.reduced_chi2(left))
     matrix = system.matrix[:, places]
     weighted = matrix * weight[:, None]
-    normal = weighted.T @ matrix + np.diag(system.penalty[places] + ridge)
+    normal = weighted.T @ matrix + np.diag(system.prior_precision[places] + ridge)
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    slope = (weighted.T @ system.residual + system.pull[places]) / scale
+    slope = (weighted.T @ system.residual + system.prior_gradient[places]) / scale
     step: Array = -np.linalg.lstsq(normal / np.outer(scale, scale), slope, rcond=1e-12)[0] / scale
     return step
 
@@ -224,17 +228,17 @@ def _held_out(
     ridge: Array,
     units: NDArray[np.int64],
 ) -> float:
-    """Misfit of every unit as predicted without it, by the columns at `places`.
+    """Deviance of every unit as predicted without it, by the columns at `places`.
 
     `left` [R] is the residual at their best fit, and gives the weights; rows of unit -1 keep it. A
     coefficient that no other unit tells of stays at zero, by `ridge`.
     """
-    weight = system.weights(system.spreads(left))
+    weight = system.weights(system.reduced_chi2(left))
     matrix = system.matrix[:, places]
     weighted = matrix * weight[:, None]
-    penalty = np.diag(system.penalty[places] + ridge)
-    normal = weighted.T @ matrix + penalty
-    slope = weighted.T @ system.residual + system.pull[places]
+    prior_precision = np.diag(system.prior_precision[places] + ridge)
+    normal = weighted.T @ matrix + prior_precision
+    slope = weighted.T @ system.residual + system.prior_gradient[places]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     predicted = left.copy()
     for number in np.unique(units[units >= 0]).tolist():
@@ -245,4 +249,4 @@ def _held_out(
         right = (slope - weighted[mine].T @ system.residual[mine]) / scale
         step = -np.linalg.lstsq(less, right, rcond=1e-12)[0] / scale
         predicted[mine] = system.residual[mine] + matrix[mine] @ step
-    return system.misfit_of(system.spreads(predicted))
+    return system.deviance_of(system.reduced_chi2(predicted))

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.two_masses import closer, far_drag, passed_on, side_of, spring_twist
+from pipeline.criticism.machine.two_masses import (
+    discriminator,
+    far_drag,
+    passed_on,
+    side_of,
+    spring_twist,
+)
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -40,5 +46,5 @@ EFFECT = Effect(
         "presliding": "an angle on the load side: friction moves no far mass",
     },
     torque=_torque,
-    closer=closer,
+    discriminator=discriminator,
 )

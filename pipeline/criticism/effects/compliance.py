@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.two_masses import closer, far_drag, passed_on, spring_twist
+from pipeline.criticism.machine.two_masses import discriminator, far_drag, passed_on, spring_twist
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -35,5 +35,5 @@ EFFECT = Effect(
         "backlash": "a drive log whose torque changes its sign: only a gap opens then",
     },
     torque=_torque,
-    closer=closer,
+    discriminator=discriminator,
 )

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Operating, Told, Values, Whole
+from pipeline.criticism.effect import Array, Discrimination, FullLog, Operating, Values
 from pipeline.criticism.machine.torsion import Shaft, law_of_twist
 
 _BLOCK_S = 0.5e-3
@@ -105,31 +105,31 @@ def side_of(through_nm: Array, least_nm: float) -> Array:
     return side
 
 
-def closer(wholes: Sequence[Whole], q: Values) -> Told | None:
+def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     """Backlash or compliance, from drive logs in which the torque changes its sign.
 
     It is a gap if the gap is surely there, and wider than the spring's twist at the torque passed
     on. It is a spring if such a gap is surely not there. Else neither is told.
     """
     between, share = q["between"] > 0.0, q["share"]
-    if share <= 0.0 or not wholes:
+    if share <= 0.0 or not logs:
         return None
-    law = law_of_twist(_shaft(one, between, share) for one in wholes)
+    law = law_of_twist(_shaft(one, between, share) for one in logs)
     if law is None or law.windows < _FEW:
         return None
     part = 1.0 if between else share
     gap, u_gap = law.gap_rad / part, law.u_gap_rad / part
-    torque = wholes[0].x.machine.scales["torque_nm"] / part
+    torque = logs[0].x.machine.scales["torque_nm"] / part
     values = {"twist_rad": (torque * law.softness, torque * law.u_softness)}
     if law.softness < _SURE * law.u_softness:
         values.clear()
     matters = max(_NO_GAP_RAD, law.softness / part * law.torque_nm)
     if gap > max(matters, _SURE * u_gap):
-        return Told("backlash", {**values, "gap_rad": (gap, u_gap)})
-    return Told("compliance", {}) if gap + _SURE * u_gap < matters else None
+        return Discrimination("backlash", {**values, "gap_rad": (gap, u_gap)})
+    return Discrimination("compliance", {}) if gap + _SURE * u_gap < matters else None
 
 
-def _shaft(one: Whole, between: bool, share: float) -> Shaft:
+def _shaft(one: FullLog, between: bool, share: float) -> Shaft:
     """A log as `law_of_twist` takes it: the coupling's torque, or the momentum of both parts."""
     x, inertia = one.x, one.x.base["j_kgm2"]
     driving = x.torque_nm - one.drag_nm

@@ -49,10 +49,10 @@ def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
     for _ in range(policy.iterations):
         fit = system.fit
         step = bounded_step(_damped(system), system.columns, fit.model, fit.values)
-        if system.misfit - system.foreseen(step) >= policy.converged:
+        if system.deviance - system.foreseen(step) >= policy.converged:
             halvings = policy.halvings if fresh else 1
             tried, promised = _tried(system, step, halvings)
-            gain = system.misfit - tried.misfit
+            gain = system.deviance - tried.deviance
             if gain > 0:
                 system = tried
             fresh = fresh and gain <= 0
@@ -72,8 +72,8 @@ def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSyst
     for _ in range(halvings):
         moved = system.fit.moved(system.columns, step)
         tried = linear_system(moved, before=system, chord=True)
-        promised = system.misfit - system.foreseen(step)
-        if tried.misfit < system.misfit + policy.converged:
+        promised = system.deviance - system.foreseen(step)
+        if tried.deviance < system.deviance + policy.converged:
             break
         step = policy.shortening * step
     return tried, promised
@@ -82,8 +82,10 @@ def _tried(system: LinearSystem, step: Array, halvings: int) -> tuple[LinearSyst
 def _damped(system: LinearSystem) -> Best:
     """The best step along some of the columns, none of them far."""
     ridge = _ridge(system.fit, system.columns)
-    grams = replace(system, penalty=system.penalty + ridge).grams()
-    return lambda live: grams.along(live).best()
+    normal_equations = replace(
+        system, prior_precision=system.prior_precision + ridge
+    ).normal_equations()
+    return lambda live: normal_equations.along(live).best()
 
 
 def _ridge(fit: Fit, columns: Sequence[Column]) -> Array:
@@ -128,7 +130,7 @@ def first_fit(near: Fit) -> LinearSystem:
     ends = [gauss_newton(begun)]
     if len(near.segments) <= near.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
-    return min(ends, key=lambda end: end.misfit)
+    return min(ends, key=lambda end: end.deviance)
 
 
 def rough_anew(fit: Fit) -> Fit:

@@ -61,12 +61,12 @@ def leave_out(system: LinearSystem) -> HeldOut:
     """
     policy, own = system.policy.goodness, system.own.size
     places = np.flatnonzero(np.any(system.matrix[:, :own] != 0.0, axis=0))
-    weight = system.weights(system.spreads(system.residual))
+    weight = system.weights(system.reduced_chi2(system.residual))
     matrix = system.matrix[:, places]
     unit = _units(system)
     weighted = matrix * weight[:, None]
-    normal = weighted.T @ matrix + np.diag(system.penalty[places])
-    slope = weighted.T @ system.residual + system.pull[places]
+    normal = weighted.T @ matrix + np.diag(system.prior_precision[places])
+    slope = weighted.T @ system.residual + system.prior_gradient[places]
     spread = np.diag(np.linalg.pinv(_unit(normal), hermitian=True))
     left = np.full(system.size, np.nan)
     steps: dict[int, Array] = {}
@@ -87,7 +87,7 @@ def leave_out(system: LinearSystem) -> HeldOut:
         steps[number] = np.zeros(own)
         steps[number][places] = step
     predicted = np.isfinite(left)
-    told = np.where(predicted, left, system.residual) / system.soft
+    told = np.where(predicted, left, system.residual) / system.noise_ratio
     told = told[predicted] if predicted.any() else told
     return HeldOut(left, math.sqrt(float((told**2).mean())), steps)
 
@@ -103,14 +103,14 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
     made = []
     for system, one in zip(fits, held, strict=True):
         residual = np.where(shared, one.residual, np.nan)
-        errors = (np.where(shared, one.residual, system.residual) / system.soft)[told]
+        errors = (np.where(shared, one.residual, system.residual) / system.noise_ratio)[told]
         made.append(replace(one, residual=residual, total=math.sqrt(float((errors**2).mean()))))
     return tuple(made)
 
 
-def predicted_spreads(system: LinearSystem, held: HeldOut) -> Array:
+def predicted_chi2(system: LinearSystem, held: HeldOut) -> Array:
     """χ²/n [G] of every group as `held` out; captures that are always in the fit as fitted."""
-    return system.spreads(held.or_fit(system))
+    return system.reduced_chi2(held.or_fit(system))
 
 
 def _units(system: LinearSystem) -> NDArray[np.int64]:
@@ -173,7 +173,7 @@ def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ..
     They say where a held-out error over the floor comes from when `remainder` is empty.
     """
     found = []
-    for place, chi2_per_n, size, matters in _over(system, system.soft, large):
+    for place, chi2_per_n, size, matters in _over(system, system.noise_ratio, large):
         number, channel, order = system.labels[place]
         capture = system.segments[number].capture
         found.append(Remainder(capture, channel, order, chi2_per_n, size, matters))
@@ -182,7 +182,7 @@ def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ..
     )
 
 
-def told_groups(system: LinearSystem) -> NDArray[np.bool_]:
+def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
     """Groups [G] that a fit leaves over their floor, judged as `remainder` does, but with the
     tolerance of form of the effects found in that floor.
     """
@@ -194,19 +194,19 @@ def told_groups(system: LinearSystem) -> NDArray[np.bool_]:
 
 
 def _over(
-    system: LinearSystem, soft: Array, large: bool = False
+    system: LinearSystem, noise_ratio: Array, large: bool = False
 ) -> Iterator[tuple[int, float, float, bool]]:
     """Place, χ²/n, size of every group over its floor, and whether that size matters; the floor is
-    `soft` [R] of the scale that rows are divided by.
+    `noise_ratio` [R] of the scale that rows are divided by.
     """
     policy, residual = system.policy.goodness, system.residual
-    spreads, counts = system.spreads(residual / soft), system.counts
+    reduced_chi2, counts = system.reduced_chi2(residual / noise_ratio), system.counts
     for place, (number, channel, _) in enumerate(system.labels):
-        n, q = counts[place], spreads[place]
+        n, q = counts[place], reduced_chi2[place]
         if n == 0 or q <= max(1.0 + policy.over, _highest_by_chance(n, policy.chance)):
             continue
         mine = system.group == place
-        unit = float(((system.unit * soft)[mine] ** 2).mean())
+        unit = float(((system.unit * noise_ratio)[mine] ** 2).mean())
         more = float(((residual[mine] * system.unit[mine]) ** 2).mean()) - unit
         size = math.sqrt(max(more, 0.0))
         matters = size > material_size(system.segments[number], channel, system.fit, large)

@@ -81,11 +81,11 @@ def known(system: LinearSystem, held: HeldOut) -> Known:
 def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
     """The same with the parameters' `sizes` [own] given."""
     own = system.own.size
-    weight = system.weights(system.spreads(system.residual))
-    matrix, penalty = system.matrix[:, :own], system.penalty[:own]
-    rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(penalty))])
+    weight = system.weights(system.reduced_chi2(system.residual))
+    matrix, prior_precision = system.matrix[:, :own], system.prior_precision[:own]
+    rows = np.vstack([matrix * np.sqrt(weight)[:, None], np.diag(np.sqrt(prior_precision))])
     found = identify(rows, sizes)
-    slope = matrix.T @ (weight * system.residual) + system.pull[:own]
+    slope = matrix.T @ (weight * system.residual) + system.prior_gradient[:own]
     steps = np.array(list(held.steps.values())).reshape(-1, own)
     return Known(found, steps, -found.root @ (found.root.T @ slope))
 
@@ -118,18 +118,18 @@ def _over(values: Array, one: int, other: int) -> Array:
     return gradient
 
 
-def parameters_told(system: LinearSystem, held: HeldOut) -> dict[str, ModelParameter]:
+def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelParameter]:
     """Every physical parameter of a fit by name; without a value where it is not determined.
 
     Determined is what is known better than to its own size. A constant that no motor is without
     must have an interval without zero, and no bound that holds it; another parameter's interval
     must be narrower than sizes that are seen on real benches. A number that was chosen of a few, or
-    told by a closer look, is determined where an amplitude of its effect is.
+    told by a discriminator, is determined where an amplitude of its effect is.
     """
     fit, model, own = system.fit, system.fit.model, system.columns[: system.own.size]
     sure_of = known(system, held)
     u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
-    beyond = _beyond(sure_of.u, system.penalty[: len(own)], fit.policy.fit)
+    beyond = _beyond(sure_of.u, system.prior_precision[: len(own)], fit.policy.fit)
     told = within(beyond, sure_of.found.sizes)
     sized = dict(zip(u, told.tolist(), strict=True))
     limits = limits_of(model)
@@ -149,12 +149,13 @@ def parameters_told(system: LinearSystem, held: HeldOut) -> dict[str, ModelParam
     return made
 
 
-def _beyond(u: Array, penalty: Array, policy: GaussNewton) -> Array:
-    """Standard uncertainties [P] without the priors of inverse variance `penalty` [P], infinite
+def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
+    """Standard uncertainties [P] without the priors of inverse variance `prior_precision` [P],
+    infinite
     where nothing else tells: what handbooks say is not measured.
     """
-    information = np.maximum(u, 1e-300) ** -2.0 - penalty
-    told = information > policy.least_information * penalty
+    information = np.maximum(u, 1e-300) ** -2.0 - prior_precision
+    told = information > policy.least_information * prior_precision
     alone: Array = np.where(told, np.maximum(information, 1e-300) ** -0.5, math.inf)
     return alone
 
@@ -170,7 +171,7 @@ def _at(value: float, limits: tuple[float, float] | None) -> bool:
     )
 
 
-def combinations_told(system: LinearSystem, held: HeldOut) -> tuple[KnownCombination, ...]:
+def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCombination, ...]:
     """What the captures tell of parameters that they do not determine one by one.
 
     A matrix speaks of where the fit stands. So the directions without information are walked: what
@@ -182,16 +183,16 @@ def combinations_told(system: LinearSystem, held: HeldOut) -> tuple[KnownCombina
     found = sure_of.found
     values = np.array([fit.values[name] for name in names])
     physical = {**dict.fromkeys(PHYSICAL), **fit.model.parameters()}
-    heard = np.any(system.matrix[:, : len(names)] != 0.0, axis=0)
+    observed = np.any(system.matrix[:, : len(names)] != 0.0, axis=0)
     open_ = np.isinf(found.u) | ~found.determined
-    places = [n for n, name in enumerate(names) if name in physical and heard[n] and open_[n]]
+    places = [n for n, name in enumerate(names) if name in physical and observed[n] and open_[n]]
     positive = [names.index(name) for name in POSITIVE if fit.values[name] > 0.0]
     made = known_combinations(found, values, places, positive)
     moving = np.zeros(len(names), dtype=bool)
     for moved, there in walked(found, values, made, math.log(policy.walk_factor)) if made else ():
         at = replace(fit, values=fit.values | dict(zip(names, there.tolist(), strict=True)))
-        misfit = linear_system(at, before=system, chord=True).misfit
-        if not abs(misfit - system.misfit) < policy.walk_rise:
+        deviance = linear_system(at, before=system, chord=True).deviance
+        if not abs(deviance - system.deviance) < policy.walk_rise:
             moving |= moved
     wide = [(one, sure_of.u_of(one.gradient, bent=one.product)) for one in made]
     return tuple(

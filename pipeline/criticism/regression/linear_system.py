@@ -23,7 +23,11 @@ from pipeline.criticism.regression.linearise import (
     linearise,
     whitened_anew,
 )
-from pipeline.criticism.regression.normal_equations import Grams, misfit_of, pseudo_inverse
+from pipeline.criticism.regression.normal_equations import (
+    NormalEquations,
+    deviance_of,
+    pseudo_inverse,
+)
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.channels import of_acceleration
 
@@ -37,14 +41,14 @@ class LinearSystem:
     """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
 
     `group` [R] numbers the groups of (segment, channel, order), `labels` names them. `unit` [R] is
-    a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by `whiten`
-    [R]; `soft` [R] is the noise floor over the scale that a row is divided by, below 1 where a
-    tolerance of form was added. Rows of a group that misses its noise floor, χ²/n = q > 1, count
-    1/q: the likelihood of a group whose scatter is at least the floor but otherwise unknown. So an
-    equation that lacks an effect does not move constants that sound equations know. `penalty` [P]
-    is the inverse prior variance of nuisances, `pull` [P] the penalty's slope. Columns of the
-    model's own parameters come first, `own_count` of them; `made_at` holds the values at which each
-    column was computed.
+    a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by
+    `row_weight` [R]; `noise_ratio` [R] is the noise floor over the scale that a row is divided by,
+    below 1 where a tolerance of form was added. Rows of a group that misses its noise floor, χ²/n =
+    q > 1, count 1/q: the likelihood of a group whose scatter is at least the floor but otherwise
+    unknown. So an equation that lacks an effect does not move constants that sound equations know.
+    `prior_precision` [P] is the inverse prior variance of nuisances, `prior_gradient` [P] the
+    penalty's slope. Columns of the model's own parameters come first, `own_count` of them;
+    `made_at` holds the values at which each column was computed.
     """
 
     columns: tuple[Column, ...]
@@ -53,11 +57,11 @@ class LinearSystem:
     group: NDArray[np.int64]
     window: NDArray[np.int64]
     unit: Array
-    soft: Array
-    whiten: Array
+    noise_ratio: Array
+    row_weight: Array
     labels: tuple[tuple[int, str, int], ...]
-    penalty: Array
-    pull: Array
+    prior_precision: Array
+    prior_gradient: Array
     fit: Fit
     own_count: int
     made_at: Mapping[ColumnKey, Values]
@@ -98,15 +102,15 @@ class LinearSystem:
         return float(self.residual @ self.residual)
 
     @property
-    def misfit(self) -> float:
+    def deviance(self) -> float:
         """−2 log likelihood, less constants, and the cost of the priors."""
         cost = float(self.prior_costs().sum())
-        return self.misfit_of(self.spreads(self.residual)) + cost
+        return self.deviance_of(self.reduced_chi2(self.residual)) + cost
 
     @property
     def excess(self) -> float:
         """The part of the deviance that is over noise floors and priors."""
-        over = np.log(np.maximum(self.spreads(self.residual), 1.0))
+        over = np.log(np.maximum(self.reduced_chi2(self.residual), 1.0))
         return float(self.counts @ over) + float(self.prior_costs().sum())
 
     def prior_costs(
@@ -115,50 +119,52 @@ class LinearSystem:
         """Squared distance [P] of every parameter from its prior's centre, in its standard
         uncertainties, after a step along `places`; 0 where there is no prior.
         """
-        pull = self.pull.copy()
+        prior_gradient = self.prior_gradient.copy()
         if places is not None and step is not None:
-            pull[places] += self.penalty[places] * step
-        costs: Array = pull**2 / np.where(self.penalty > 0, self.penalty, np.inf)
+            prior_gradient[places] += self.prior_precision[places] * step
+        costs: Array = prior_gradient**2 / np.where(
+            self.prior_precision > 0, self.prior_precision, np.inf
+        )
         return costs
 
-    def weights(self, spreads: Array) -> Array:
+    def weights(self, reduced_chi2: Array) -> Array:
         """How much each weak sample [R] counts where groups have these χ²/n."""
-        each: Array = 1.0 / np.maximum(spreads, 1.0)
+        each: Array = 1.0 / np.maximum(reduced_chi2, 1.0)
         return each[self.group]
 
     def foreseen(self, step: Array) -> float:
         """Deviance after a step along the first columns, to first order."""
         places = np.arange(step.size)
         cost = float(self.prior_costs(places, step).sum())
-        return self.misfit_of(self.spreads(self.after(places, step))) + cost
+        return self.deviance_of(self.reduced_chi2(self.after(places, step))) + cost
 
-    def spreads(self, residual: Array) -> Array:
+    def reduced_chi2(self, residual: Array) -> Array:
         """χ²/n [G] of each group, 1 where empty."""
         counts = self.counts
         total = np.bincount(self.group, residual**2, minlength=counts.size)
         return np.where(counts > 0, total / np.maximum(counts, 1.0), 1.0)
 
-    def misfit_of(self, spreads: Array) -> float:
+    def deviance_of(self, reduced_chi2: Array) -> float:
         """−2 log likelihood of groups with these χ²/n [G]."""
-        return misfit_of(self.counts, spreads)
+        return deviance_of(self.counts, reduced_chi2)
 
     def place(self, names: Iterable[str]) -> NDArray[np.int64]:
         """Indices of columns by name."""
         wanted = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
 
-    def grams(self, places: NDArray[np.int64] | None = None) -> Grams:
+    def normal_equations(self, places: NDArray[np.int64] | None = None) -> NormalEquations:
         """Normal matrices by group of the columns at `places`, of all without."""
         along = np.arange(len(self.columns)) if places is None else places
         elsewhere = self.prior_costs()
         elsewhere[along] = 0.0
-        return Grams.of(
+        return NormalEquations.of(
             self.matrix[:, along],
             self.residual,
             self.group,
             len(self.labels),
-            self.penalty[along],
-            self.pull[along],
+            self.prior_precision[along],
+            self.prior_gradient[along],
             float(elsewhere.sum()),
             self.policy.fit,
         )
@@ -166,9 +172,15 @@ class LinearSystem:
     def along(self, places: NDArray[np.int64]) -> LinearSystem:
         """The same system with some of its columns."""
         columns = tuple(self.columns[n] for n in places.tolist())
-        penalty, pull = self.penalty[places], self.pull[places]
+        prior_precision, prior_gradient = self.prior_precision[places], self.prior_gradient[places]
         matrix = self.matrix[:, places]
-        return replace(self, columns=columns, matrix=matrix, penalty=penalty, pull=pull)
+        return replace(
+            self,
+            columns=columns,
+            matrix=matrix,
+            prior_precision=prior_precision,
+            prior_gradient=prior_gradient,
+        )
 
     def after(self, places: NDArray[np.int64], step: Array) -> Array:
         """The residual [R] after a step along some columns, to first order."""
@@ -177,9 +189,9 @@ class LinearSystem:
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
         """Covariance [k, k] of the parameters at `places` when they are fitted together."""
-        weight = self.weights(self.spreads(self.residual))
+        weight = self.weights(self.reduced_chi2(self.residual))
         matrix = self.matrix[:, places]
-        normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.penalty[places])
+        normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.prior_precision[places])
         return pseudo_inverse(normal)
 
 
@@ -202,7 +214,7 @@ def linear_system(
     each = [(model, values, new, *both, fit.near) for both in fit.floors]
     rows = on_each(linearise, fit.segments, each)
     group, labels = _numbered(rows)
-    penalty, pull = _priors(model, columns, values)
+    prior_precision, prior_gradient = _priors(model, columns, values)
     made = LinearSystem(
         columns=tuple(columns),
         residual=np.concatenate([r.residual for r in rows]),
@@ -210,11 +222,11 @@ def linear_system(
         group=group,
         window=np.concatenate([r.window for r in rows]),
         unit=np.concatenate([r.unit for r in rows]),
-        soft=np.concatenate([r.soft for r in rows]),
-        whiten=np.concatenate([r.whiten for r in rows]),
+        noise_ratio=np.concatenate([r.noise_ratio for r in rows]),
+        row_weight=np.concatenate([r.row_weight for r in rows]),
         labels=labels,
-        penalty=penalty,
-        pull=pull,
+        prior_precision=prior_precision,
+        prior_gradient=prior_gradient,
         fit=fit,
         own_count=len(own),
         made_at={column.key: values for column in new},
@@ -260,7 +272,7 @@ def _with_known(
     kept = np.column_stack([known[now.columns[n].key] for n in places]) * lighter[:, None]
     counts = np.bincount(now.segment, minlength=len(segments)).tolist()
     now.matrix[:, places] = _over(
-        segments, kept, (before.whiten, now.whiten), counts, now.policy.noise_floors
+        segments, kept, (before.row_weight, now.row_weight), counts, now.policy.noise_floors
     )
     made_at = {**now.made_at, **{key: before.made_at[key] for key in known}}
     return replace(now, made_at=made_at)
@@ -348,14 +360,14 @@ def _linear(column: Column, model: Model) -> bool:
 
 
 def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Array, Array]:
-    penalty, pull = np.zeros(len(columns)), np.zeros(len(columns))
+    prior_precision, prior_gradient = np.zeros(len(columns)), np.zeros(len(columns))
     priors = model.priors()
     for place, column in enumerate(columns):
         if column.name in priors:
             center, u = priors[column.name]
-            penalty[place] = u**-2
-            pull[place] = (values[column.name] - center) * u**-2
-    return penalty, pull
+            prior_precision[place] = u**-2
+            prior_gradient[place] = (values[column.name] - center) * u**-2
+    return prior_precision, prior_gradient
 
 
 def own_columns(model: Model) -> list[Column]:

@@ -1,6 +1,6 @@
 """Weak residuals and their columns: one model against all segments, whitened by sensor noise.
 
-Each segment is projected once for all parameters together; what remains of it is its Gram matrix
+Each segment is projected once for all parameters together; what remains of it is its normal matrix
 a group of (channel, order), so that any subset of effects or captures is then small algebra.
 """
 
@@ -71,8 +71,8 @@ class Rows:
 
     `group` [R] numbers (channel, order) pairs listed in `groups`, `window` [R] the window. `unit`
     [R] is a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by
-    `whiten` [R]; `soft` [R] is the noise floor over the scale that a row is divided by, below 1
-    where a tolerance of form was added.
+    `row_weight` [R]; `noise_ratio` [R] is the noise floor over the scale that a row is divided by,
+    below 1 where a tolerance of form was added.
     """
 
     residual: Array
@@ -80,8 +80,8 @@ class Rows:
     group: NDArray[np.int64]
     window: NDArray[np.int64]
     unit: Array
-    soft: Array
-    whiten: Array
+    noise_ratio: Array
+    row_weight: Array
     groups: tuple[tuple[str, int], ...]
 
 
@@ -98,13 +98,15 @@ def linearise(
     group, window, valid, groups = row_index(segment)
     sampler = _Sampler(segment, model, dict(values))
     floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near, sampler.x)[valid])
-    whiten = 1.0 / np.hypot(floor, tolerance[group[valid]])
+    row_weight = 1.0 / np.hypot(floor, tolerance[group[valid]])
     kept = _weak_columns(segment, sampler, columns, valid)
-    both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * whiten[:, None]
-    absorb(both, offsets(segment, valid, whiten, model.policy.noise_floors))
-    unit = reported_unit(segment, values) / (whiten * window_gain(segment))
-    soft = floor * whiten
-    return Rows(both[:, 0], both[:, 1:], group[valid], window[valid], unit, soft, whiten, groups)
+    both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * row_weight[:, None]
+    absorb(both, offsets(segment, valid, row_weight, model.policy.noise_floors))
+    unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
+    noise_ratio = floor * row_weight
+    return Rows(
+        both[:, 0], both[:, 1:], group[valid], window[valid], unit, noise_ratio, row_weight, groups
+    )
 
 
 def _weak_columns(
@@ -115,14 +117,14 @@ def _weak_columns(
     for first in range(0, len(columns), _CHUNK):
         some = enumerate(columns[first : first + _CHUNK], first)
         changes = {place: sampler.change(column) for place, column in some}
-        heard = {place: change for place, change in changes.items() if change is not None}
-        if not heard:
+        observed = {place: change for place, change in changes.items() if change is not None}
+        if not observed:
             continue
-        stacked = np.concatenate(list(heard.values()))
+        stacked = np.concatenate(list(observed.values()))
         moving = stacked.any(axis=1)
         weak = np.zeros((stacked.shape[0], *valid.shape[1:]))
         weak[moving] = projected(segment, stacked[moving])
-        for place, one in zip(heard, weak.reshape(len(heard), *valid.shape), strict=True):
+        for place, one in zip(observed, weak.reshape(len(observed), *valid.shape), strict=True):
             kept[:, place] = one[valid]
     return kept
 
@@ -223,7 +225,7 @@ class _Sampler:
 
     def _gain(self, column: Column) -> Array | None:
         """Along a gain of the station: of the prediction, or what it does to current and heat."""
-        heard = {
+        observed = {
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
@@ -231,7 +233,7 @@ class _Sampler:
             self.segment.meter: observes_sensor(self.segment, "voltage"),
             self.segment.ammeter: observes_sensor(self.segment, "current"),
         }
-        if not heard.get(column.name, False):
+        if not observed.get(column.name, False):
             return None
         if column.name == "gain_clock":
             return self._along_time(column.step)

@@ -90,30 +90,30 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
 
 
 def with_hum(
-    segments: Sequence[Segment], heard: Sequence[Hum], model: Model, values: Values
+    segments: Sequence[Segment], hums: Sequence[Hum], model: Model, values: Values
 ) -> tuple[Segment, ...]:
     """The segments, each knowing the lines that its channels may have.
 
     A sensor of current may pick up as much as one of voltage, both in multiples of their noise. The
     model says what that does: its share of a torque grows with the current.
     """
-    return tuple(_humming(segment, heard, model, values) for segment in segments)
+    return tuple(_humming(segment, hums, model, values) for segment in segments)
 
 
-def told_hum(heard: Sequence[Hum]) -> tuple[str, ...]:
+def hum_notes(hums: Sequence[Hum]) -> tuple[str, ...]:
     """A note on every signal with mains hum in it."""
     notes = []
-    for signal in dict.fromkeys(hum.signal for hum in heard):
-        mine = [hum for hum in heard if hum.signal == signal]
+    for signal in dict.fromkeys(hum.signal for hum in hums):
+        mine = [hum for hum in hums if hum.signal == signal]
         lines = ", ".join(f"{freq:g}" for freq in sorted({hum.freq_hz for hum in mine}))
         rms = max(hum.rms for hum in mine)
         notes.append(f"mains hum in {signal} at {lines} Hz, {rms:.2g} rms: taken as noise")
     return tuple(notes)
 
 
-def _humming(segment: Segment, heard: Sequence[Hum], model: Model, values: Values) -> Segment:
+def _humming(segment: Segment, hums: Sequence[Hum], model: Model, values: Values) -> Segment:
     weak = segment.weak
-    mine = [h for h in heard if h.kind == segment.kind and h.signal in _sensors(segment)]
+    mine = [h for h in hums if h.kind == segment.kind and h.signal in _sensors(segment)]
     if weak is None or not mine:
         return segment
     lines = []

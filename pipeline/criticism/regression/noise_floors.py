@@ -239,14 +239,14 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
 
 
 def offsets(
-    segment: Segment, valid: NDArray[np.bool_], whiten: Array, policy: NoiseFloors
+    segment: Segment, valid: NDArray[np.bool_], row_weight: Array, policy: NoiseFloors
 ) -> list[Array]:
     """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
     offset of each channel's sensor, mains lines and wander.
     """
-    made = [] if segment.lines is None else [line[valid] * whiten for line in segment.lines]
+    made = [] if segment.lines is None else [line[valid] * row_weight for line in segment.lines]
     if segment.offsets is not None:
-        own = [projected(segment, one[None])[valid] * whiten for one in segment.offsets]
+        own = [projected(segment, one[None])[valid] * row_weight for one in segment.offsets]
         return own + made
     if segment.weak is None:
         return []
@@ -259,7 +259,7 @@ def offsets(
             continue
         constant = np.zeros((len(segment.channels), segment.size))
         constant[place] = prior
-        made.append(projected(segment, constant)[valid] * whiten)
+        made.append(projected(segment, constant)[valid] * row_weight)
     return made
 
 

@@ -27,26 +27,26 @@ class Descent:
     """
 
     step: Array
-    spreads: Array
-    misfit: float
+    reduced_chi2: Array
+    deviance: float
 
 
 @dataclass(frozen=True, slots=True)
-class Grams:
+class NormalEquations:
     """What a fit along k columns needs of the rows of G groups.
 
     `counts` [G] are their weak samples, `power` [G] the residuals' sums of squares, `slope` [G, k]
-    the columns times the residual and `normal` [G, k, k] the columns times each other. `penalty`
-    [k] is the inverse prior variance, `pull` [k] its slope, `elsewhere` what the priors of other
-    columns cost.
+    the columns times the residual and `normal` [G, k, k] the columns times each other.
+    `prior_precision` [k] is the inverse prior variance, `prior_gradient` [k] its slope, `elsewhere`
+    what the priors of other columns cost.
     """
 
     counts: Array
     power: Array
     slope: Array
     normal: Array
-    penalty: Array
-    pull: Array
+    prior_precision: Array
+    prior_gradient: Array
     elsewhere: float
     policy: GaussNewton
 
@@ -57,11 +57,11 @@ class Grams:
         residual: Array,
         group: NDArray[np.int64],
         count: int,
-        penalty: Array,
-        pull: Array,
+        prior_precision: Array,
+        prior_gradient: Array,
         elsewhere: float,
         policy: GaussNewton,
-    ) -> Grams:
+    ) -> NormalEquations:
         """From columns [R, k] and residual [R] of rows whose groups are numbered below `count`."""
         order = np.argsort(group, kind="stable")
         both = np.column_stack([residual, matrix])[order]
@@ -76,36 +76,37 @@ class Grams:
             normal[:, 0, 0].copy(),
             normal[:, 0, 1:].copy(),
             normal[:, 1:, 1:],
-            penalty,
-            pull,
+            prior_precision,
+            prior_gradient,
             elsewhere,
             policy,
         )
 
-    def along(self, places: NDArray[np.int64]) -> Grams:
+    def along(self, places: NDArray[np.int64]) -> NormalEquations:
         """The same for some of the columns."""
-        out = np.setdiff1d(np.arange(self.penalty.size), places)
-        return Grams(
+        out = np.setdiff1d(np.arange(self.prior_precision.size), places)
+        return NormalEquations(
             self.counts,
             self.power,
             self.slope[:, places],
             self.normal[:, places[:, None], places],
-            self.penalty[places],
-            self.pull[places],
-            self.elsewhere + float(_costs(self.pull[out], self.penalty[out]).sum()),
+            self.prior_precision[places],
+            self.prior_gradient[places],
+            self.elsewhere
+            + float(_costs(self.prior_gradient[out], self.prior_precision[out]).sum()),
             self.policy,
         )
 
-    def moved(self, places: NDArray[np.int64], step: Array) -> Grams:
+    def moved(self, places: NDArray[np.int64], step: Array) -> NormalEquations:
         """The same around where a step along some columns leads; priors stay where they were."""
         rows = self.normal[:, places]
         power = _after(self.power, self.slope[:, places], rows[:, :, places], step)
         return replace(self, power=power, slope=self.slope + step @ rows)
 
-    def misfit(self) -> float:
+    def deviance(self) -> float:
         """−2 log likelihood where the fit stands, and what the priors cost."""
-        cost = float(_costs(self.pull, self.penalty).sum()) + self.elsewhere
-        return misfit_of(self.counts, self._spreads(self.power)) + cost
+        cost = float(_costs(self.prior_gradient, self.prior_precision).sum()) + self.elsewhere
+        return deviance_of(self.counts, self._spreads(self.power)) + cost
 
     def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int | None = None) -> Descent:
         """The step of least deviance.
@@ -116,29 +117,33 @@ class Grams:
         """
         now = np.maximum(self._spreads(self.power), 1.0)
         ends = [self._descended(now**power, rounds or self.policy.most_rounds) for power in starts]
-        return min(ends, key=lambda end: end.misfit)
+        return min(ends, key=lambda end: end.deviance)
 
-    def _descended(self, spreads: Array, rounds: int) -> Descent:
-        step, now, before = np.zeros(self.penalty.size), np.inf, np.inf
+    def _descended(self, reduced_chi2: Array, rounds: int) -> Descent:
+        step, now, before = np.zeros(self.prior_precision.size), np.inf, np.inf
         for _ in range(rounds):
-            weight = 1.0 / np.maximum(spreads, 1.0)
-            normal = np.einsum("g,gkl->kl", weight, self.normal) + np.diag(self.penalty)
-            step = -pseudo_inverse(normal) @ (weight @ self.slope + self.pull)
-            spreads = self._spreads(_after(self.power, self.slope, self.normal, step))
-            cost = float(_costs(self.pull + self.penalty * step, self.penalty).sum())
-            now = misfit_of(self.counts, spreads) + cost + self.elsewhere
+            weight = 1.0 / np.maximum(reduced_chi2, 1.0)
+            normal = np.einsum("g,gkl->kl", weight, self.normal) + np.diag(self.prior_precision)
+            step = -pseudo_inverse(normal) @ (weight @ self.slope + self.prior_gradient)
+            reduced_chi2 = self._spreads(_after(self.power, self.slope, self.normal, step))
+            cost = float(
+                _costs(
+                    self.prior_gradient + self.prior_precision * step, self.prior_precision
+                ).sum()
+            )
+            now = deviance_of(self.counts, reduced_chi2) + cost + self.elsewhere
             if abs(before - now) < self.policy.settled:
                 break
             before = now
-        return Descent(step, spreads, now)
+        return Descent(step, reduced_chi2, now)
 
     def _spreads(self, power: Array) -> Array:
         return np.where(self.counts > 0, power / np.maximum(self.counts, 1.0), 1.0)
 
 
-def misfit_of(counts: Array, spreads: Array) -> float:
+def deviance_of(counts: Array, reduced_chi2: Array) -> float:
     """Σ n [log max(1, q) + min(1, q) − 1]: −2 log likelihood of groups with χ²/n = q."""
-    each = np.log(np.maximum(spreads, 1.0)) + np.minimum(spreads, 1.0) - 1.0
+    each = np.log(np.maximum(reduced_chi2, 1.0)) + np.minimum(reduced_chi2, 1.0) - 1.0
     return float((counts * each).sum())
 
 
@@ -161,7 +166,7 @@ def _after(power: Array, slope: Array, normal: Array, step: Array) -> Array:
     return after
 
 
-def _costs(pull: Array, penalty: Array) -> Array:
+def _costs(prior_gradient: Array, prior_precision: Array) -> Array:
     """Squared distances [k] from the priors' centres in standard uncertainties."""
-    costs: Array = pull**2 / np.where(penalty > 0, penalty, np.inf)
+    costs: Array = prior_gradient**2 / np.where(prior_precision > 0, prior_precision, np.inf)
     return costs

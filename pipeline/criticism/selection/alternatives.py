@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.criticism.effect import Effect
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.selection.discrimination import kin, told_by_wholes
+from pipeline.criticism.selection.discrimination import discriminate, sharing_discriminator
 from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.criticism.selection.stepwise import loss_without, shaped
 
@@ -25,19 +25,19 @@ def rivals_of(
     much of it that is over noise floors and priors).
 
     Refitted in its place are those that to first order keep half of what it explains, and those
-    that were `passed_over` for it. Effects that share its closer look are
+    that were `passed_over` for it. Effects that share its discriminator are
     alternatives if that look does not discriminate them.
     """
     policy, effect = wide.policy.selection, wide.fit.effect(name)
-    alike = kin(effect, {one.effect.name: one.effect for one in offered})
-    ties = [] if told_by_wholes(wide.fit, effect) else list(alike)
-    grams = wide.grams()
-    most = policy.alternative_share * loss_without(wide, (name,), grams=grams)
+    alike = sharing_discriminator(effect, {one.effect.name: one.effect for one in offered})
+    ties = [] if discriminate(wide.fit, effect) else list(alike)
+    normal_equations = wide.normal_equations()
+    most = policy.alternative_share * loss_without(wide, (name,), normal_equations=normal_equations)
     near: dict[str, tuple[float, Candidate]] = {}
     for candidate, places in placed(wide, offered):
         if candidate.effect.name in alike or not _meet(effect, candidate.effect):
             continue
-        rise = loss_without(wide, (name,), places, grams)
+        rise = loss_without(wide, (name,), places, normal_equations)
         other = candidate.effect.name
         if rise < most and rise < near.get(other, (np.inf, candidate))[0]:
             near[other] = rise, candidate
@@ -50,7 +50,7 @@ def rivals_of(
         swapped = _refitted(name, candidate, wide)
         if (
             swapped is not None
-            and swapped.misfit < wide.misfit + policy.tie
+            and swapped.deviance < wide.deviance + policy.tie
             and swapped.excess < wide.excess + policy.tie
         ):
             ties.append(candidate.effect.name)

@@ -9,7 +9,7 @@ from itertools import product
 from pipeline.criticism.effect import Effect, Values
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
-from pipeline.criticism.regression.goodness import told_groups
+from pipeline.criticism.regression.goodness import significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
 
 
@@ -21,14 +21,14 @@ def reconsidered(system: LinearSystem) -> LinearSystem:
     not pass on the torque's ripple, which so seemed not to reach the shaft.
     """
     for effect in system.fit.model.effects:
-        if not told_groups(system).any():
+        if not significant_groups(system).any():
             break
-        if effect.closer is not None:
+        if effect.discriminator is not None:
             continue
         for other in _others(effect, system.fit):
             fit = system.fit
             tried = gauss_newton(replace(fit, values={**fit.values, **other}))
-            if tried.misfit < system.misfit - fit.policy.selection.tie:
+            if tried.deviance < system.deviance - fit.policy.selection.tie:
                 system = tried
     return system
 

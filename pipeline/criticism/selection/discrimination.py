@@ -1,4 +1,4 @@
-"""Effects that windows hardly part, told apart by a closer look at whole drive logs."""
+"""Effects that windows hardly part, discriminated on full drive logs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Effect, Parameter, Told, Values, Whole
+from pipeline.criticism.effect import Array, Discrimination, Effect, FullLog, Parameter, Values
 from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -17,16 +17,16 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import measured, operate
 
 
-def told_by_wholes(fit: Fit, effect: Effect) -> Told | None:
-    """What the closer look of an effect in the model says; None where it has none, or no logs."""
-    if effect.closer is None:
+def discriminate(fit: Fit, effect: Effect) -> Discrimination | None:
+    """What the discriminator of an effect in the model says; None where it has none, or no logs."""
+    if effect.discriminator is None:
         return None
     model, values = fit.model.without(effect.name), fit.values
-    wholes = [_whole(s, model, fit) for s in fit.segments if s.whole is not None]
-    return effect.closer(wholes, values_of(effect, model.machine, values))
+    logs = [_whole(s, model, fit) for s in fit.segments if s.whole is not None]
+    return effect.discriminator(logs, values_of(effect, model.machine, values))
 
 
-def _whole(segment: Segment, model: Model, fit: Fit) -> Whole:
+def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
     """One log at full rate, as a model without the effect sees it."""
     signals = dict(segment.whole or {})
     good = signals.pop("good") > 0
@@ -38,7 +38,9 @@ def _whole(segment: Segment, model: Model, fit: Fit) -> Whole:
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     noise = segment.noise
     u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
-    return Whole(x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap)
+    return FullLog(
+        x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap
+    )
 
 
 def _undone(recorded: Array, model: Model, values: Values) -> Array:
@@ -52,19 +54,23 @@ def _undone(recorded: Array, model: Model, values: Values) -> Array:
     return torque
 
 
-def kin(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
-    """The other effects that share an effect's closer look."""
-    if effect.closer is None:
+def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tuple[str, ...]:
+    """The other effects that share an effect's discriminator."""
+    if effect.discriminator is None:
         return ()
-    return tuple(n for n, e in library.items() if e.closer is effect.closer and n != effect.name)
+    return tuple(
+        n
+        for n, e in library.items()
+        if e.discriminator is effect.discriminator and n != effect.name
+    )
 
 
-def settled(effect: Effect, told: Told) -> Effect:
+def settled(effect: Effect, told: Discrimination) -> Effect:
     """The effect with the shapes that whole logs tell: they are known, and no fit moves them."""
     return replace(effect, parameters=tuple(_known(p, told) for p in effect.parameters))
 
 
-def _known(p: Parameter, told: Told) -> Parameter:
+def _known(p: Parameter, told: Discrimination) -> Parameter:
     if p.name not in told.values or p.amplitude:
         return p
     return replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1])
@@ -72,12 +78,12 @@ def _known(p: Parameter, told: Told) -> Parameter:
 
 def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
     """The fit with the effect `name` exchanged for the one that whole logs tell, of those that
-    share its closer look, and with the numbers that these logs tell.
+    share its discriminator, and with the numbers that these logs tell.
     """
     fit = system.fit
     effect = fit.effect(name)
-    told = told_by_wholes(fit, effect)
-    if told is None or told.name not in (name, *kin(effect, library)):
+    told = discriminate(fit, effect)
+    if told is None or told.name not in (name, *sharing_discriminator(effect, library)):
         return system
     truth = settled(library[told.name], told)
     effects = tuple(truth if e.name == name else e for e in fit.model.effects)

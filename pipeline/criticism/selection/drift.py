@@ -30,7 +30,7 @@ _WANDERS = ("v", "i", "torque")
 """Beginnings of the names of signals that drift: voltages, currents and torque."""
 
 
-def wandering(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...] | None:
+def drifting_segments(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...] | None:
     """The segments, knowing the drift that their instruments may have.
 
     None if a fit with that drift leaves anything over the floor. None as well if what is `left` is
@@ -41,17 +41,13 @@ def wandering(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...] | None
     tests = {segment.test for segment in fit.segments if segment.capture in captures}
     if len(tests) < fit.policy.selection.drift_tests:
         return None
-    told = with_wander(fit.segments, fit.model, fit.values)
+    each = [(fit.model, fit.values)] * len(fit.segments)
+    told = on_each(with_drift, fit.segments, each)
     system = gauss_newton(replace(fit, segments=told))
     return None if remainder(system, large=True) else told
 
 
-def with_wander(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Segment, ...]:
-    """The segments, each knowing what a drift of its sensors does to its residuals."""
-    return on_each(wanders, segments, [(model, values)] * len(segments))
-
-
-def wanders(segment: Segment, model: Model, values: Values) -> Segment:
+def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
     """A segment with the slowest sines of a random walk of each of its sensors."""
     if segment.weak is None:
         return segment

@@ -49,14 +49,14 @@ def with_starts(
     best = {score.candidate.effect.name: score for score in scores}
     thorough = wide.policy.selection.thorough
     own = wide.along(wide.own)
-    before = Standing.of(own, np.arange(len(own.columns)), own.grams().best(*thorough))
-    price = searched(offered)
+    before = Standing.of(own, np.arange(len(own.columns)), own.normal_equations().best(*thorough))
+    penalty = searched(offered)
     for candidate in offered:
         for parameter in candidate.effect.parameters_of(wide.fit.machine):
             for score in _tried(own, candidate, parameter, before, told):
                 known = best.get(candidate.effect.name)
                 if known is None or score.fall > known.fall:
-                    best[candidate.effect.name] = replace(score, price=score.price + price)
+                    best[candidate.effect.name] = replace(score, penalty=score.penalty + penalty)
     return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
@@ -75,8 +75,8 @@ def _tried(
 
     def at(start: float) -> tuple[float, float, LinearSystem, Descent]:
         moved = _moved(own, candidate, {name: start * scale})
-        end = moved.grams().best(*policy.thorough)
-        return end.misfit, start, moved, end
+        end = moved.normal_equations().best(*policy.thorough)
+        return end.deviance, start, moved, end
 
     nearest = min((at(start) for start in parameter.starts), key=lambda one: one[:2])
     beside = [at(factor * nearest[1]) for factor in policy.finer_starts]
@@ -85,19 +85,19 @@ def _tried(
     after = Standing.of(moved, places, end)
     found = Score(
         candidate,
-        before.misfit - after.misfit,
+        before.deviance - after.deviance,
         0.0,
         {name: start * scale},
         dict(zip((c.name for c in own.columns), end.step.tolist(), strict=True)),
         share_of(own, candidate.effect, before, after),
         abs(start) / parameter.negligible,
-        quiet_fall(own, before.spreads, after.spreads),
-        clears(own, told, before.spreads, after.spreads),
+        quiet_fall(own, before.reduced_chi2, after.reduced_chi2),
+        clears(own, told, before.reduced_chi2, after.reduced_chi2),
         policy=policy,
     )
     dof = paid_for(candidate.effect, own.fit.machine, found)
     search = 2.0 * math.log(len(parameter.starts) + len(policy.finer_starts))
-    return (replace(found, price=dof * math.log(own.size) + search),)
+    return (replace(found, penalty=dof * math.log(own.size) + search),)
 
 
 def _moved(own: LinearSystem, candidate: Candidate, start: Values) -> LinearSystem:
@@ -108,11 +108,11 @@ def _moved(own: LinearSystem, candidate: Candidate, start: Values) -> LinearSyst
     model = fit.model.with_effects(effect)
     values = {**fit.values, **candidate.values, **start}
     segments, floors = fit.segments, tuple(fit.floors)
-    heard = [number for number, segment in enumerate(segments) if observes(segment, effect)]
-    each = [(model, values, *floors[number], fit.near) for number in heard]
-    rows = on_each(_residual, [segments[number] for number in heard], each)
+    observed = [number for number, segment in enumerate(segments) if observes(segment, effect)]
+    each = [(model, values, *floors[number], fit.near) for number in observed]
+    rows = on_each(_residual, [segments[number] for number in observed], each)
     residual = own.residual.copy()
-    for number, row in zip(heard, rows, strict=True):
+    for number, row in zip(observed, rows, strict=True):
         residual[own.segment == number] = row
     return replace(own, residual=residual)
 

@@ -11,7 +11,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.segments import known_tests
 from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
-from pipeline.criticism.selection.stepwise import Rung
+from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.capture import Campaign
 from pipeline.records.diagnosis import Unexcited
 
@@ -40,7 +40,10 @@ def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
 
 
 def unexcited(
-    campaign: Campaign, library: Mapping[str, Effect], last: Rung, offered: Sequence[Candidate]
+    campaign: Campaign,
+    library: Mapping[str, Effect],
+    last: LadderStep,
+    offered: Sequence[Candidate],
 ) -> tuple[Unexcited, ...]:
     """Effects that no capture here would show at typical size, for want of their first test or of
     a signal in it; each with the tests that are not there.

@@ -16,7 +16,7 @@ from pipeline.criticism.machine.model import zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.regression.normal_equations import Grams
+from pipeline.criticism.regression.normal_equations import NormalEquations
 
 
 def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
@@ -26,19 +26,19 @@ def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
     not pay are left out in one refit. If that loses too much, they are tried one by one, and with
     them the terms that to first order pay less than twenty penalties. One amplitude always stays.
     """
-    price = math.log(max(system.size, 2))
+    penalty = math.log(max(system.size, 2))
     for name in names:
         effect = system.fit.effect(name)
-        spare = _spare(system, effect, price)
+        spare = _spare(system, effect, penalty)
         if not spare:
             continue
-        less = _unless_worth(system, name, spare, price)
+        less = _unless_worth(system, name, spare, penalty)
         if less is not None:
             system = less
             continue
         alone = spare if len(spare) > 1 else ()
-        for term in (*alone, *_doubtful(system, effect, spare, price)):
-            system = _unless_worth(system, name, (term,), price) or system
+        for term in (*alone, *_doubtful(system, effect, spare, penalty)):
+            system = _unless_worth(system, name, (term,), penalty) or system
     return system
 
 
@@ -57,7 +57,7 @@ def whole(fit: Fit) -> Fit:
 
 
 def _unless_worth(
-    system: LinearSystem, name: str, terms: tuple[int, ...], price: float
+    system: LinearSystem, name: str, terms: tuple[int, ...], penalty: float
 ) -> LinearSystem | None:
     """The refit without some terms of an effect; None where these were worth their penalty, or no
     amplitude would stay.
@@ -67,8 +67,8 @@ def _unless_worth(
     if not any(p.amplitude and p.optional not in terms for p in mine):
         return None
     tried = _without(system, effect, terms)
-    worth = price * len(_parameters(fit, effect, terms))
-    return tried if tried.misfit - system.misfit < worth else None
+    worth = penalty * len(_parameters(fit, effect, terms))
+    return tried if tried.deviance - system.deviance < worth else None
 
 
 def _parameters(fit: Fit, effect: Effect, terms: Sequence[int]) -> tuple[str, ...]:
@@ -77,18 +77,18 @@ def _parameters(fit: Fit, effect: Effect, terms: Sequence[int]) -> tuple[str, ..
     return tuple(f"{effect.name}.{p.name}" for p in mine if p.optional in terms)
 
 
-def _spare(system: LinearSystem, effect: Effect, price: float) -> tuple[int, ...]:
+def _spare(system: LinearSystem, effect: Effect, penalty: float) -> tuple[int, ...]:
     """The optional terms that do not pay to first order, the cheapest first."""
     parameters = effect.parameters_of(system.fit.machine)
     left = sorted({p.optional for p in parameters} - {0})
-    known = system.grams()
+    known = system.normal_equations()
     gone: list[int] = []
     while True:
         costs = []
         for term in left:
             if any(p.amplitude and p.optional not in (*gone, term) for p in parameters):
                 names = _parameters(system.fit, effect, (*gone, term))
-                more = len(names) * price
+                more = len(names) * penalty
                 costs.append((_loss(system, known, names) - more, term))
         cheapest = min(costs, default=(0.0, 0))
         if cheapest[0] >= 0.0:
@@ -97,25 +97,25 @@ def _spare(system: LinearSystem, effect: Effect, price: float) -> tuple[int, ...
         left.remove(cheapest[1])
 
 
-def _loss(system: LinearSystem, known: Grams, names: Sequence[str]) -> float:
+def _loss(system: LinearSystem, known: NormalEquations, names: Sequence[str]) -> float:
     """Rise of deviance, to first order, when these parameters go to zero and the rest refits."""
     own = system.own
     out = np.array([n for n in own if system.columns[n].name in names], dtype=int)
     move = np.array([-system.fit.values[system.columns[n].name] for n in out])
-    return known.moved(out, move).along(np.setdiff1d(own, out)).best().misfit - known.misfit()
+    return known.moved(out, move).along(np.setdiff1d(own, out)).best().deviance - known.deviance()
 
 
 def _doubtful(
-    system: LinearSystem, effect: Effect, spare: Sequence[int], price: float
+    system: LinearSystem, effect: Effect, spare: Sequence[int], penalty: float
 ) -> tuple[int, ...]:
     """The optional terms that are not `spare` and that the tangent may be wrong about."""
-    fit, known = system.fit, system.grams()
+    fit, known = system.fit, system.normal_equations()
     terms = {p.optional for p in effect.parameters_of(fit.model.machine)} - {0, *spare}
     return tuple(
         term
         for term in sorted(terms)
         if _loss(system, known, names := _parameters(fit, effect, (term,)))
-        < fit.policy.selection.tangent_penalties * price * len(names)
+        < fit.policy.selection.tangent_penalties * penalty * len(names)
     )
 
 

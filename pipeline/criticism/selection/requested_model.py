@@ -38,8 +38,8 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     }
     near = rough_fit(segments, model.without(*shaped))
     hum = hum_of(segments, near.model, near.values)
-    heard = with_hum(segments, hum, near.model, near.values)
-    system = first_fit(replace(near, segments=heard))
+    humming = with_hum(segments, hum, near.model, near.values)
+    system = first_fit(replace(near, segments=humming))
     if not shaped:
         return Begun(system, hum)
     while shaped:

@@ -1,7 +1,7 @@
 """What candidates would do for a fit, to first order.
 
 References: [1] Rao, Math. Proc. Camb. Phil. Soc. 44 (1948), score test; [2] Schwarz, Ann. Stat.
-6 (1978), the price of a parameter; [3] Benjamini & Foster, Biometrika 109 (2022), price of a
+6 (1978), the penalty of a parameter; [3] Benjamini & Foster, Biometrika 109 (2022), penalty of a
 search over candidates.
 """
 
@@ -21,7 +21,7 @@ from pipeline.criticism.policy.selection import Selection
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system, own_columns
 from pipeline.criticism.regression.linearise import Column, effect_columns
-from pipeline.criticism.regression.normal_equations import Descent, Grams, misfit_of
+from pipeline.criticism.regression.normal_equations import Descent, NormalEquations, deviance_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,25 +37,25 @@ class Candidate:
 class Score:
     """What a candidate would do, to first order.
 
-    `fall` is the fall of misfit, `price` what its parameters and the search cost, `step` its own
-    parameters, `moves` how the model's own move with it, `share` the part of the removable excess
-    of the channel it helps most, `size` the largest of its amplitudes over its negligible size,
-    `quiet` the part of the fall in signals that have nothing over their floor to take a share of.
-    `clears`: it takes most of what would be told as a remainder without it, and so matters at any
-    size; no coupling, which noise of an encoder in a speed loop looks like. `shadow` names an
-    effect that explains the same better, but is too small to matter.
+    `fall` is the fall of deviance, `penalty` what its parameters and the search cost, `step` its
+    own parameters, `moves` how the model's own move with it, `share` the part of the removable
+    excess of the channel it helps most, `size` the largest of its amplitudes over its negligible
+    size, `quiet` the part of the fall in signals that have nothing over their floor to take a share
+    of. `clears`: it takes most of what would be told as a remainder without it, and so matters at
+    any size; no coupling, which noise of an encoder in a speed loop looks like. `confounder` names
+    an effect that explains the same better, but is too small to matter.
     """
 
     candidate: Candidate
     fall: float
-    price: float
+    penalty: float
     step: Mapping[str, float]
     moves: Mapping[str, float]
     share: float
     size: float
     quiet: float = 0.0
     clears: bool = False
-    shadow: str | None = None
+    confounder: str | None = None
     policy: Selection = field(kw_only=True)
 
     @property
@@ -65,31 +65,31 @@ class Score:
 
     @property
     def passes(self) -> bool:
-        """Whether it is worth its price, large enough to matter and helps enough.
+        """Whether it is worth its penalty, large enough to matter and helps enough.
 
         Below the floor only what the machine itself does is named. A sensor's error is a common
         factor of which any form that is a little wrong elsewhere asks for some; and an effect of a
-        closer look is not told from noise of the angle's sensor, which runs through a drive's speed
-        loop and so is in torque and angle alike.
+        discriminator is not told from noise of the angle's sensor, which runs through a drive's
+        speed loop and so is in torque and angle alike.
         """
         effect = self.candidate.effect
-        below = self._below_floor and effect.hook != "sensor" and effect.closer is None
+        below = self._below_floor and effect.hook != "sensor" and effect.discriminator is None
         helps = self.share >= self.policy.least_share or below
-        return self.fall > self.price and self.matters and helps and self.shadow is None
+        return self.fall > self.penalty and self.matters and helps and self.confounder is None
 
     @property
     def _below_floor(self) -> bool:
-        return self.quiet > self.policy.below_floor_penalties * self.price
+        return self.quiet > self.policy.below_floor_penalties * self.penalty
 
     @property
     def shortfall(self) -> str:
         """What it lacks to be named; of one that passes, that a refit did not bear it out."""
-        if self.fall <= self.price:
+        if self.fall <= self.penalty:
             return "not worth its parameters"
         if not self.matters:
             return f"seen, at {self.size:.2g} of the least size that matters"
-        if self.shadow is not None:
-            return f"{self.shadow} explains it better, and is too small to matter"
+        if self.confounder is not None:
+            return f"{self.confounder} explains it better, and is too small to matter"
         if self.passes:
             return "refitted, it does not hold on captures held out, or may be zero"
         if self._below_floor:
@@ -99,17 +99,17 @@ class Score:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How well a fit stands: misfit, χ²/n [G] of every group, cost of the priors."""
+    """How well a fit stands: deviance, χ²/n [G] of every group, cost of the priors."""
 
-    misfit: float
-    spreads: Array
+    deviance: float
+    reduced_chi2: Array
     prior_cost: float
 
     @classmethod
     def of(cls, system: LinearSystem, places: NDArray[np.int64], end: Descent) -> Standing:
         """Where a descent along `places` left the system."""
         cost = float(system.prior_costs(places, end.step).sum())
-        return cls(end.misfit, end.spreads, cost)
+        return cls(end.deviance, end.reduced_chi2, cost)
 
 
 def candidates(library: Mapping[str, Effect], model: Model) -> tuple[Candidate, ...]:
@@ -157,18 +157,18 @@ def score_all(
     `told` [G] are groups that would be told as a remainder if nothing were added.
     """
     by, policy = _Scoring.of(system, told), system.policy.selection
-    price = math.log(float(system.size))
-    search_price = searched(offered)
+    penalty = math.log(float(system.size))
+    search_penalty = searched(offered)
     best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
     for candidate, places in placed(system, offered):
         score = by.score(candidate, places, policy.quick)
-        cost = paid_for(candidate.effect, system.fit.machine, score) * price + search_price
+        cost = paid_for(candidate.effect, system.fit.machine, score) * penalty + search_penalty
         if score is not None and score.fall > policy.quick_penalties * cost:
             score = by.score(candidate, places, policy.thorough)
         known = best.get(candidate.effect.name)
         if score is not None and (known is None or score.fall > known[0].fall):
-            best[candidate.effect.name] = replace(score, price=cost), places
-    found = [replace(one, shadow=by.shadow(one, best)) for one, _ in best.values()]
+            best[candidate.effect.name] = replace(score, penalty=cost), places
+    found = [replace(one, confounder=by.confounder(one, best)) for one, _ in best.values()]
     return tuple(sorted(found, key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
@@ -204,17 +204,17 @@ class _Scoring:
     """
 
     system: LinearSystem
-    grams: Grams
+    normal_equations: NormalEquations
     own: NDArray[np.int64]
     before: Standing
     told: NDArray[np.bool_]
 
     @classmethod
     def of(cls, system: LinearSystem, told: NDArray[np.bool_] | None) -> _Scoring:
-        own, grams = system.own, system.grams()
-        before = Standing.of(system, own, grams.along(own).best())
+        own, normal_equations = system.own, system.normal_equations()
+        before = Standing.of(system, own, normal_equations.along(own).best())
         left = np.zeros(len(system.labels), dtype=bool) if told is None else told
-        return cls(system, grams, own, before, left)
+        return cls(system, normal_equations, own, before, left)
 
     def score(
         self,
@@ -230,7 +230,7 @@ class _Scoring:
         }
         live = places
         while live.size:
-            end = self.grams.along(np.concatenate([self.own, live])).best(*effort)
+            end = self.normal_equations.along(np.concatenate([self.own, live])).best(*effort)
             steps = end.step[self.own.size :].tolist()
             mine = dict(zip((system.columns[n].name for n in live), steps, strict=True))
             wrong = [
@@ -252,23 +252,23 @@ class _Scoring:
         names = (system.columns[n].name for n in self.own)
         return Score(
             candidate,
-            self.before.misfit - after.misfit,
+            self.before.deviance - after.deviance,
             0.0,
             mine,
             dict(zip(names, end.step[: self.own.size].tolist(), strict=True)),
             share_of(system, candidate.effect, self.before, after),
             max(sizes, default=math.inf),
-            quiet_fall(system, self.before.spreads, after.spreads),
-            candidate.effect.closer is None
-            and clears(system, self.told, self.before.spreads, after.spreads),
+            quiet_fall(system, self.before.reduced_chi2, after.reduced_chi2),
+            candidate.effect.discriminator is None
+            and clears(system, self.told, self.before.reduced_chi2, after.reduced_chi2),
             policy=system.policy.selection,
         )
 
-    def shadow(
+    def confounder(
         self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
     ) -> str | None:
         """The clearest effect that explains what a candidate does better, at a size too small to
-        matter, and beside which the candidate is not worth its price.
+        matter, and beside which the candidate is not worth its penalty.
 
         A loss that is too small to be told must not be told under a wrong name.
         """
@@ -278,18 +278,18 @@ class _Scoring:
             (other, places)
             for other, places in best.values()
             if not other.matters
-            and other.fall > other.price
+            and other.fall > other.penalty
             and other.fall > score.fall + score.policy.tie
-            and other.candidate.effect.closer is None
+            and other.candidate.effect.discriminator is None
         ]
         if not small:
             return None
         clearest, beside = max(small, key=lambda pair: pair[0].fall)
         thorough = self.system.policy.selection.thorough
         _, mine = best[score.candidate.effect.name]
-        without = self.grams.along(np.concatenate([self.own, beside])).best(*thorough)
-        both = self.grams.along(np.concatenate([self.own, beside, mine])).best(*thorough)
-        worth = without.misfit - both.misfit > score.price
+        without = self.normal_equations.along(np.concatenate([self.own, beside])).best(*thorough)
+        both = self.normal_equations.along(np.concatenate([self.own, beside, mine])).best(*thorough)
+        worth = without.deviance - both.deviance > score.penalty
         return None if worth else clearest.candidate.effect.name
 
 
@@ -307,7 +307,7 @@ def _outside(value: float, parameter: Parameter) -> bool:
 
 
 def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Standing) -> float:
-    """Largest share of the removable misfit that went away: of one recorded signal, of the
+    """Largest share of the removable deviance that went away: of one recorded signal, of the
     captures of the tests that excite the effect, or of what the priors of the station cost; but of
     a signal's error no more than the share of its power, at one order, that went with it.
 
@@ -315,8 +315,8 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
     deviance that many candidates partly absorb.
     """
     policy = system.policy.selection
-    excess = system.counts * np.log(np.maximum(before.spreads, 1.0))
-    left = system.counts * np.log(np.maximum(after.spreads, 1.0))
+    excess = system.counts * np.log(np.maximum(before.reduced_chi2, 1.0))
+    left = system.counts * np.log(np.maximum(after.reduced_chi2, 1.0))
     channel = np.array([name for _, name, _ in system.labels])
     places = [channel == name for name in dict.fromkeys(channel.tolist())]
     places.append(np.array([system.segments[n].test in effect.tests for n, _, _ in system.labels]))
@@ -325,13 +325,13 @@ def share_of(system: LinearSystem, effect: Effect, before: Standing, after: Stan
         had = float(excess[place].sum())
         if had > min(policy.excess, policy.excess_a_sample * float(system.counts[place].sum())):
             shares.append(1.0 - float(left[place].sum()) / had)
-    error = min(max(shares), power_share(system, before.spreads, after.spreads))
+    error = min(max(shares), power_share(system, before.reduced_chi2, after.reduced_chi2))
     cost = before.prior_cost
     return max(error, 1.0 - after.prior_cost / cost if cost > policy.excess else 0.0)
 
 
 def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
-    """Fall of misfit between two sets of χ²/n [G], in signals without an excess that counts."""
+    """Fall of deviance between two sets of χ²/n [G], in signals without an excess that counts."""
     fall, policy = 0.0, system.policy.selection
     channel = np.array([name for _, name, _ in system.labels])
     for name in dict.fromkeys(channel.tolist()):
@@ -339,7 +339,7 @@ def quiet_fall(system: LinearSystem, before: Array, after: Array) -> float:
         counts = system.counts[mine]
         excess = float(counts @ np.log(np.maximum(before[mine], 1.0)))
         if excess <= min(policy.excess, policy.excess_a_sample * float(counts.sum())):
-            fall += misfit_of(counts, before[mine]) - misfit_of(counts, after[mine])
+            fall += deviance_of(counts, before[mine]) - deviance_of(counts, after[mine])
     return fall
 
 
@@ -352,8 +352,8 @@ def power_share(system: LinearSystem, before: Array, after: Array) -> float:
     count = np.bincount(pool, system.counts)
     nats = np.bincount(pool, system.counts * np.log(np.maximum(before, 1.0)))
     had, has = (
-        np.bincount(pool, system.counts * np.maximum(spreads - 1.0, 0.0))
-        for spreads in (before, after)
+        np.bincount(pool, system.counts * np.maximum(reduced_chi2 - 1.0, 0.0))
+        for reduced_chi2 in (before, after)
     )
     policy = system.policy.selection
     worth = nats > np.minimum(policy.excess, policy.excess_a_sample * count)

@@ -15,13 +15,13 @@ from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, 
 from pipeline.criticism.regression.goodness import (
     in_common,
     leave_out,
-    predicted_spreads,
-    told_groups,
+    predicted_chi2,
+    significant_groups,
 )
 from pipeline.criticism.regression.identifiability import surely_there
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.noise_floors import form_tolerance
-from pipeline.criticism.regression.normal_equations import Grams
+from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
@@ -38,7 +38,7 @@ from pipeline.criticism.selection.score_test import (
 
 
 @dataclass(frozen=True, slots=True)
-class Rung:
+class LadderStep:
     """One step of the ladder: the fit with these effects and every candidate's score on it."""
 
     added: tuple[str, ...]
@@ -51,25 +51,25 @@ class Rung:
         return self.system.fit
 
 
-def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[Rung, ...]:
+def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     """The ladder: adds the best effect, refits, checks backwards, until nothing passes or five
     effects are in.
     """
-    rungs: list[Rung] = []
+    steps: list[LadderStep] = []
     policy = fit.policy.selection
     base = len(fit.model.effects)
     for _ in range(policy.most_steps):
         offered = candidates(library, fit.model)
-        wide = widened(fit, offered, rungs[-1].system if rungs else None)
-        told = told_groups(wide)
+        wide = widened(fit, offered, steps[-1].system if steps else None)
+        told = significant_groups(wide)
         scores = score_all(wide, offered, told)
         scores = with_starts(wide, offered, scores, told)
         added = tuple(e.name for e in fit.model.effects[base:])
-        rungs.append(Rung(added, wide, scores))
-        if len(rungs) == policy.most_steps:
+        steps.append(LadderStep(added, wide, scores))
+        if len(steps) == policy.most_steps:
             break
-        inside = {e.closer for e in fit.model.effects} - {None}
-        passing = [s for s in scores if s.passes and s.candidate.effect.closer not in inside]
+        inside = {e.discriminator for e in fit.model.effects} - {None}
+        passing = [s for s in scores if s.passes and s.candidate.effect.discriminator not in inside]
         chosen = _chosen(wide, passing, fit.model.effects[base:])
         if chosen is None:
             break
@@ -77,11 +77,11 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[Rung, ...]:
         fit = reconsidered(_backward(chosen, base)).fit
         found = fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, found))
-        if found and (found[-1].hook == "sensor" or found[-1].closer is not None):
+        if found and (found[-1].hook == "sensor" or found[-1].discriminator is not None):
             fit = _floored_anew(fit)
-        if tuple(e.name for e in found) in {r.added for r in rungs}:
+        if tuple(e.name for e in found) in {r.added for r in steps}:
             break
-    return tuple(rungs)
+    return tuple(steps)
 
 
 def _floored_anew(fit: Fit) -> Fit:
@@ -100,13 +100,13 @@ def _floored_anew(fit: Fit) -> Fit:
         ended = gauss_newton(fit)
     else:
         ended = linear_system(fit)
-        if not told_groups(ended).any():
+        if not significant_groups(ended).any():
             return fit
     near = rough_anew(fit)
     lighter, heavier = sorted(fit.values["j_kgm2"] for fit in (near, fit))
     if heavier < policy.inertia_ratio * lighter:
         return ended.fit
-    return min(ended, first_fit(near), key=lambda end: end.misfit).fit
+    return min(ended, first_fit(near), key=lambda end: end.deviance).fit
 
 
 def _chosen(
@@ -145,7 +145,7 @@ def _refit_best(
     """
     policy = wide.policy.selection
     before, shrunk = leave_out(wide), _shrunk(wide)
-    any_wrong, told = _doubt(wide, found), told_groups(wide)
+    any_wrong, told = _doubt(wide, found), significant_groups(wide)
     tests = {segment.test for segment in wide.segments}
     close = [s for s in passing if s.fall >= policy.close_share * passing[0].fall]
     best: LinearSystem | None = None
@@ -155,16 +155,16 @@ def _refit_best(
         tried = _refitted(wide, score)
         # of two that tie, the one that some capture here was made to show
         unsought = policy.tie if set(effect.tests).isdisjoint(tests) else 0.0
-        cost = tried.misfit + score.price + unsought
-        if not _matters(tried, wide, told) or cost >= min(least, wide.misfit):
+        cost = tried.deviance + score.penalty + unsought
+        if not _matters(tried, wide, told) or cost >= min(least, wide.deviance):
             continue
-        kin = _kin(effect, found)
-        doubts = _doubt(wide, kin), any_wrong
-        below = policy.same_hook_penalties if kin else policy.held_out_penalties
-        promised = policy.held_out_penalties * score.price, below * score.price
+        same_hook = _same_hook(effect, found)
+        doubts = _doubt(wide, same_hook), any_wrong
+        below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
+        promised = policy.held_out_penalties * score.penalty, below * score.penalty
         one, other = in_common((wide, tried), (before, leave_out(tried)))
-        without = predicted_spreads(wide, one) * shrunk
-        after = predicted_spreads(tried, other) * _shrunk(tried)
+        without = predicted_chi2(wide, one) * shrunk
+        after = predicted_chi2(tried, other) * _shrunk(tried)
         if _holds(wide, without, tried, after, promised, doubts):
             best, least = tried, cost
     return best
@@ -177,10 +177,10 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     where they are: along a bent valley the tangent goes astray.
     """
     tried = gauss_newton(begun(wide.fit, score), before=wide)
-    if tried.misfit + score.price < wide.misfit:
+    if tried.deviance + score.penalty < wide.deviance:
         return tried
     again = gauss_newton(begun(wide.fit, replace(score, moves={})), before=wide)
-    return min(tried, again, key=lambda end: end.misfit)
+    return min(tried, again, key=lambda end: end.deviance)
 
 
 def _matters(system: LinearSystem, before: LinearSystem, told: NDArray[np.bool_]) -> bool:
@@ -190,8 +190,8 @@ def _matters(system: LinearSystem, before: LinearSystem, told: NDArray[np.bool_]
     fit, effect = system.fit, system.fit.model.effects[-1]
     if material(fit, effect):
         return True
-    was, now = before.spreads(before.residual), system.spreads(system.residual)
-    most = effect.closer is None and clears(system, told, was, now)
+    was, now = before.reduced_chi2(before.residual), system.reduced_chi2(system.residual)
+    most = effect.discriminator is None and clears(system, told, was, now)
     return most and shaped(fit, effect)
 
 
@@ -207,11 +207,11 @@ def _sure(system: LinearSystem) -> bool:
     known = effect.parameters_of(system.fit.machine)
     told = [p for p in known if f"{effect.name}.{p.name}" in sure]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]
-    coupled = effect.closer is None or not twists or any(p in told for p in twists)
+    coupled = effect.discriminator is None or not twists or any(p in told for p in twists)
     return coupled and any(p.amplitude for p in told)
 
 
-def _kin(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
+def _same_hook(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
     """The found effects of an effect's own kind: flux, drop or drag."""
     return [one for one in found if one.hook == effect.hook != "sensor"]
 
@@ -226,7 +226,7 @@ def _doubt(wide: LinearSystem, found: Sequence[Effect]) -> Array:
     model, values = wide.fit.model, wide.fit.values
     share = wide.policy.selection.form_error
     wrong = np.concatenate([form_tolerance(s, model, values, found, share) for s in wide.segments])
-    noise = np.bincount(wide.group, wide.whiten**-2, len(wide.labels)) / np.maximum(
+    noise = np.bincount(wide.group, wide.row_weight**-2, len(wide.labels)) / np.maximum(
         wide.counts, 1.0
     )
     left: Array = noise / np.maximum(noise + wrong**2, 1e-300)
@@ -249,11 +249,11 @@ def _holds(
     `doubts` [G]; below the floor, the smaller fall with and without the second counts.
     """
     policy = wide.policy.selection
-    kin, below = doubts
+    same_hook, below = doubts
     cost, left = (float(one.prior_costs().sum()) for one in (wide, tried))
-    fall = wide.misfit_of(kin * before) + cost - tried.misfit_of(kin * after) - left
+    fall = wide.deviance_of(same_hook * before) + cost - tried.deviance_of(same_hook * after) - left
     priors = cost > policy.excess and left < (1.0 - policy.least_share) * cost
-    helps = priors or power_share(wide, kin * before, kin * after) >= policy.least_share
+    helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
     quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
     return fall > least[0] and (helps or quiet > least[1])
 
@@ -266,7 +266,7 @@ def _shrunk(tried: LinearSystem) -> Array:
     """
     was = np.concatenate(tried.fit.sigma)[tried.group]
     now = was * np.concatenate(floors_grown(tried.fit))[tried.group]
-    power = tried.whiten**-2
+    power = tried.row_weight**-2
     by_end = np.bincount(tried.group, power + now**2 - was**2, len(tried.labels))
     factors: Array = np.bincount(tried.group, power, len(tried.labels)) / np.maximum(by_end, 1e-300)
     return np.where(tried.counts > 0, factors, 1.0)
@@ -312,11 +312,11 @@ def _backward(system: LinearSystem, base: int) -> LinearSystem:
     """Takes out effects that later ones have made superfluous."""
     most = system.policy.selection.most_penalties
     for effect in system.fit.model.effects[base:-1]:
-        price = effect.dof(system.fit.machine) * math.log(system.size)
-        if material(system.fit, effect) and loss_without(system, (effect.name,)) > most * price:
+        penalty = effect.dof(system.fit.machine) * math.log(system.size)
+        if material(system.fit, effect) and loss_without(system, (effect.name,)) > most * penalty:
             continue
         tried = gauss_newton(system.fit.without(effect.name), before=system)
-        if tried.misfit - system.misfit < price:
+        if tried.deviance - system.deviance < penalty:
             system = tried
     return system
 
@@ -325,12 +325,12 @@ def loss_without(
     system: LinearSystem,
     names: Iterable[str],
     instead: NDArray[np.int64] | None = None,
-    grams: Grams | None = None,
+    normal_equations: NormalEquations | None = None,
 ) -> float:
     """Rise of deviance when effects go to zero amplitude and the rest, with `instead`, refits.
 
-    The model is taken as linear between here and there. `grams` are those of all columns, where
-    they are there already.
+    The model is taken as linear between here and there. `normal_equations` are those of all
+    columns, where they are there already.
     """
     gone = tuple(f"{name}." for name in names)
     fit, own = system.fit, system.own
@@ -346,6 +346,6 @@ def loss_without(
     }
     names_out = [system.columns[n].name for n in out]
     move = np.array([-fit.values[n] if amplitude[n] else 0.0 for n in names_out])
-    known = system.grams() if grams is None else grams
+    known = system.normal_equations() if normal_equations is None else normal_equations
     end = known.moved(out, move).along(stay).best(*fit.policy.selection.thorough)
-    return end.misfit - known.misfit()
+    return end.deviance - known.deviance()

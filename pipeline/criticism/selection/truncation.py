@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.criticism.machine.model import values_of
-from pipeline.criticism.regression.goodness import HeldOut, remainder, told_groups
+from pipeline.criticism.regression.goodness import HeldOut, remainder, significant_groups
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.selection.stepwise import Rung
+from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.records.diagnosis import Remainder
 
 
-def trusted(
-    rungs: Sequence[Rung], held: Sequence[HeldOut]
-) -> tuple[tuple[Rung, ...], tuple[Remainder, ...]]:
+def truncated(
+    steps: Sequence[LadderStep], held: Sequence[HeldOut]
+) -> tuple[tuple[LadderStep, ...], tuple[Remainder, ...]]:
     """The ladder without unsupported trailing steps, and what is left over the floor at its end.
 
     While anything is left, trailing steps are dropped that
@@ -25,34 +25,34 @@ def trusted(
        the step cleared a signal of all waves of the angle;
     3. came after the first effect and lowered the held-out error by less than `little_share`.
     """
-    policy = rungs[0].fit.policy.selection
-    for count in range(len(rungs), 0, -1):
-        kept, system = tuple(rungs[:count]), rungs[count - 1].system
+    policy = steps[0].fit.policy.selection
+    for count in range(len(steps), 0, -1):
+        kept, system = tuple(steps[:count]), steps[count - 1].system
         left = remainder(system)
         most = (1.0 - policy.little_share) * held[count - 2].total
         worse = count > 2 and held[count - 1].total > most
         if count == 1 or not left or (explained(kept, held, left) and not worse):
             break
-        if denied(rungs[count - 1]):
+        if contradiction(steps[count - 1]):
             continue
         if held[count - 1].total < (1.0 - policy.guess_share) * held[count - 2].total:
             break
-        if not worse and _clears_orders(rungs[count - 2].system, system):
+        if not worse and _clears_orders(steps[count - 2].system, system):
             break
     return kept, left
 
 
-def denied(rung: Rung) -> str:
+def contradiction(step: LadderStep) -> str:
     """What captures say against the effect that a step added, nothing where they don't: that an
     amplitude of it that they know is not half of the one that it should come to
     (`Parameter.at_least`).
     """
-    system, model = rung.system, rung.fit.model
-    share = rung.fit.policy.selection.companion_share
+    system, model = step.system, step.fit.model
+    share = step.fit.policy.selection.companion_share
     for effect in model.effects:
-        if effect.name not in rung.added[-1:]:
+        if effect.name not in step.added[-1:]:
             continue
-        values = values_of(effect, model.machine, rung.fit.values)
+        values = values_of(effect, model.machine, step.fit.values)
         for p in effect.parameters_of(model.machine):
             known = np.any(system.matrix[:, system.place([f"{effect.name}.{p.name}"])])
             if p.at_least and known and values[p.name] < share * values[p.at_least]:
@@ -75,11 +75,13 @@ def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
 
 def _waved(system: LinearSystem) -> set[str]:
     """Signals with waves of the angle that are reported."""
-    told = told_groups(system)
+    told = significant_groups(system)
     return {c for (_, c, order), over in zip(system.labels, told, strict=True) if over and order}
 
 
-def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Remainder]) -> bool:
+def explained(
+    steps: Sequence[LadderStep], held: Sequence[HeldOut], left: Sequence[Remainder]
+) -> bool:
     """Whether the effects found took most of the deviance of signals that still miss, a tenth at
     least of each one's own, and most of the power that held-out errors have over the floor.
 
@@ -88,13 +90,13 @@ def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Rem
     logarithmic: of an equation that is given up at a million floors it takes half to come to a
     thousand.
     """
-    policy = rungs[0].fit.policy.selection
-    first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(rungs) - 1))
+    policy = steps[0].fit.policy.selection
+    first, last = (max(held[n].total ** 2 - 1.0, 0.0) for n in (0, len(steps) - 1))
     if last > policy.unexplained_share * first:
         return not left
     signals = sorted({r.signal for r in left})
     before, after = (
-        np.array([_excess(rung, {name}) for name in signals]) for rung in (rungs[0], rungs[-1])
+        np.array([_excess(step, {name}) for name in signals]) for step in (steps[0], steps[-1])
     )
     large = before > policy.least_share * before.sum()
     taken = bool((after[large] <= (1.0 - policy.least_share) * before[large]).all())
@@ -102,8 +104,8 @@ def explained(rungs: Sequence[Rung], held: Sequence[HeldOut], left: Sequence[Rem
     return not left or (taken and float(after.sum()) < most)
 
 
-def _excess(rung: Rung, channels: set[str]) -> float:
-    system = rung.system
-    spreads = system.grams(system.own).best().spreads
+def _excess(step: LadderStep, channels: set[str]) -> float:
+    system = step.system
+    reduced_chi2 = system.normal_equations(system.own).best().reduced_chi2
     inside = np.array([channel in channels for _, channel, _ in system.labels])
-    return float((system.counts * np.log(np.maximum(spreads, 1.0)))[inside].sum())
+    return float((system.counts * np.log(np.maximum(reduced_chi2, 1.0)))[inside].sum())

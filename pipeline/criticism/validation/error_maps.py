@@ -79,7 +79,7 @@ def _errors_of(
     whitened: Array,
 ) -> Errors:
     unit = np.concatenate([system.unit[mine] for _, mine in groups])
-    soft = np.concatenate([system.soft[mine] for _, mine in groups])
+    noise_ratio = np.concatenate([system.noise_ratio[mine] for _, mine in groups])
 
     def variable(name: str, number: int, mine: NDArray[np.bool_]) -> Array:
         values = told[number].get(name, np.full(system.segments[number].size, np.nan))
@@ -90,7 +90,7 @@ def _errors_of(
     return Errors(
         signal,
         np.concatenate([whitened[mine] for _, mine in groups]) * unit,
-        unit * soft,
+        unit * noise_ratio,
         np.concatenate([np.full(int(mine.sum()), number) for number, mine in groups]),
         np.concatenate([system.window[mine] for _, mine in groups]),
         {name: np.concatenate([variable(name, *group) for group in groups]) for name in names},

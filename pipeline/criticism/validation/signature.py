@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
-from pipeline.criticism.selection.stepwise import Rung
+from pipeline.criticism.selection.stepwise import LadderStep
 from pipeline.criticism.validation.error_maps import Errors, unit_of, window_errors
 from pipeline.records.diagnosis import LadderRung, Signature
 from pipeline.records.error_map import ErrorMap
@@ -60,17 +60,17 @@ class _Curve:
 
 
 def signature(
-    rungs: tuple[Rung, Rung],
+    steps: tuple[LadderStep, LadderStep],
     records: tuple[LadderRung, LadderRung],
 ) -> Signature | None:
-    """The curve in which two neighbouring rungs differ most clearly; None where none has cells.
+    """The curve in which two neighbouring steps differ most clearly; None where none has cells.
 
     Parameters
     ----------
-    rungs : pair of Rung
+    steps : pair of LadderStep
         Without and with what came.
     records : pair of LadderRung
-        The same rungs as records, whose maps over the angle of a turn are candidates too.
+        The same steps as records, whose maps over the angle of a turn are candidates too.
 
     Returns
     -------
@@ -78,13 +78,13 @@ def signature(
         An error of acceleration is told as torque, by the inertia that was fitted.
 
     """
-    curves = [*_window_curves(rungs), *_turn_curves(records)]
+    curves = [*_window_curves(steps), *_turn_curves(records)]
     if not curves:
         return None
     best = max(curves, key=lambda one: one.contrast)
     scale, signal = 1.0, best.signal
     if signal == _ACCELERATION:
-        scale, signal = rungs[1].fit.values["j_kgm2"], _TORQUE
+        scale, signal = steps[1].fit.values["j_kgm2"], _TORQUE
     return Signature(
         signal,
         unit_of(signal),
@@ -97,11 +97,11 @@ def signature(
     )
 
 
-def _window_curves(rungs: tuple[Rung, Rung]) -> Iterator[_Curve]:
+def _window_curves(steps: tuple[LadderStep, LadderStep]) -> Iterator[_Curve]:
     """Window errors of every signal of every capture over every variable that was recorded."""
     told = [
-        {one.signal: one for one in window_errors(rung.system, rung.system.residual)}
-        for rung in rungs
+        {one.signal: one for one in window_errors(step.system, step.system.residual)}
+        for step in steps
     ]
     for signal, before in told[0].items():
         after = told[1].get(signal)
@@ -109,7 +109,7 @@ def _window_curves(rungs: tuple[Rung, Rung]) -> Iterator[_Curve]:
             continue
         for number in np.unique(before.segment).tolist():
             mine = before.segment == number
-            yield from _of_capture(rungs[0].system.segments[number], before, after, mine)
+            yield from _of_capture(steps[0].system.segments[number], before, after, mine)
 
 
 def _of_capture(

@@ -107,7 +107,7 @@ def test_the_search_is_spared_only_where_its_end_is_sure(monkeypatch: pytest.Mon
     campaign = only(*FEW)
     assert judged(campaign, STANDARD).missing == {}
     assert asked == []
-    monkeypatch.setattr(adequacy, "wandering", lambda fit, *_: fit.segments)
+    monkeypatch.setattr(adequacy, "drifting_segments", lambda fit, *_: fit.segments)
     found = judged(campaign, STANDARD)
     assert len(asked) == 1
     assert (found.verdict, list(found.missing)) == ("missing", ["cogging"])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.effect import Told
+from pipeline.criticism.effect import Discrimination
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.selection.alternatives import rivals_of
 from pipeline.criticism.selection.score_test import candidates, widened
@@ -48,9 +48,9 @@ def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
 
     def look(wholes, q):
         assert set(q) == {"drag_nm"}
-        return None if told is None else Told(told, {"drag_nm": (0.029, 0.001)})
+        return None if told is None else Discrimination(told, {"drag_nm": (0.029, 0.001)})
 
-    windage = replace(LIBRARY["windage"], closer=look)
+    windage = replace(LIBRARY["windage"], discriminator=look)
     library = {**LIBRARY, "windage": windage, "brake": replace(windage, name="brake")}
 
     def drag(omega, _):

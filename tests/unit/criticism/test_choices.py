@@ -43,7 +43,7 @@ def test_a_choice_that_no_longer_holds_is_made_again(chosen, moved):
     ended = gauss_newton(Fit(segments, MODEL, start, floors(segments, MODEL, start), start))
     system = reconsidered(ended)
     assert system.fit.values["bemf_harmonics.ripple_share"] == 1.0
-    assert (system.misfit < ended.misfit - 12.0) is moved
+    assert (system.deviance < ended.deviance - 12.0) is moved
     assert (system is ended) is not moved
 
 

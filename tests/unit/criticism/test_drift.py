@@ -14,7 +14,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.selection.drift import slowest, wandering, wanders
+from pipeline.criticism.selection.drift import drifting_segments, slowest, with_drift
 from tests.unit.criticism.machines import BASE, log, machine
 
 
@@ -54,7 +54,7 @@ def test_a_walk_of_its_size_is_all_but_noise_once_it_is_known():
     for seed in range(20):
         segment = walked(seed, "drive", 4.0)
         sigma = floors((segment,), model, BASE)[0]
-        for one, found in ((segment, over), (wanders(segment, model, BASE), known)):
+        for one, found in ((segment, over), (with_drift(segment, model, BASE), known)):
             rows = linearise(one, model, BASE, [], sigma, np.zeros(sigma.size), BASE)
             mine = [n for n, (channel, k) in enumerate(rows.groups) if channel[0] == "t" and k == 0]
             found.append(float((rows.residual[np.isin(rows.group, mine)] ** 2).mean()))
@@ -66,7 +66,7 @@ def test_wander_in_captures_of_two_tests_leaves_nothing():
     segments = (walked(5, "torque_map"), walked(6, "drive"))
     system, left = fitted(segments)
     assert len({one.capture for one in left}) == 2
-    told = wandering(system.fit, left)
+    told = drifting_segments(system.fit, left)
     assert told is not None
     assert told[0].lines.shape[0] == 5 * 8
 
@@ -75,7 +75,7 @@ def test_in_captures_of_one_test_it_may_be_the_machine():
     segments = (walked(5, "drive"), replace(walked(6, "drive"), capture="drive_1.mcap"))
     system, left = fitted(segments)
     assert left
-    assert wandering(system.fit, left) is None
+    assert drifting_segments(system.fit, left) is None
 
 
 def test_wander_follows_no_state_of_the_machine_and_a_drag_does():
@@ -100,7 +100,7 @@ def test_a_walk_far_beyond_the_noise_stays_a_remainder():
     size = DEFAULT.selection.drift_size
     segments = (walked(5, "torque_map", 60 * size), walked(6, "drive", 60 * size))
     system, left = fitted(segments)
-    assert wandering(system.fit, left) is None
+    assert drifting_segments(system.fit, left) is None
 
 
 @pytest.mark.parametrize(("large", "noise"), [(False, True), (True, False)])
@@ -113,4 +113,4 @@ def test_what_is_small_for_the_machine_stops_no_wander(large: bool, noise: bool,
         return left if large or not asked.get("large") else ()
 
     monkeypatch.setattr("pipeline.criticism.selection.drift.remainder", still_left)
-    assert (wandering(system.fit, left) is not None) is noise
+    assert (drifting_segments(system.fit, left) is not None) is noise

@@ -113,7 +113,7 @@ def test_reading_errors_do_not_grow_while_a_fit_makes_the_inertia_small():
     sigma = floors((shaft,), model, BASE)
     light = {**BASE, "j_kgm2": 0.01 * BASE["j_kgm2"]}
     system = [linear_system(Fit((shaft,), model, v, sigma, BASE)) for v in (BASE, light)]
-    assert system[1].whiten == pytest.approx(system[0].whiten)
+    assert system[1].row_weight == pytest.approx(system[0].row_weight)
 
 
 @pytest.mark.parametrize("off", [0.95, 1.03])

@@ -38,11 +38,11 @@ def captures(levels: list[float], seed: int = 4) -> LinearSystem:
         group=group,
         window=np.tile(np.arange(ROWS), len(levels)),
         unit=np.ones(group.size),
-        soft=np.ones(group.size),
-        whiten=np.ones(group.size),
+        noise_ratio=np.ones(group.size),
+        row_weight=np.ones(group.size),
         labels=tuple((n, "vq_v", 0) for n in range(len(levels))),
-        penalty=np.zeros(1),
-        pull=np.zeros(1),
+        prior_precision=np.zeros(1),
+        prior_gradient=np.zeros(1),
         fit=Fit((log(),) * len(levels), Model(machine(), ()), {}, (), {}),
         own_count=1,
         made_at={},
@@ -86,8 +86,8 @@ def test_a_column_that_one_capture_carries_predicts_nothing_better():
         system,
         columns=(*system.columns, Column("psi_wb", 1.0)),
         matrix=np.column_stack([system.matrix, own]),
-        penalty=np.zeros(2),
-        pull=np.zeros(2),
+        prior_precision=np.zeros(2),
+        prior_gradient=np.zeros(2),
         own_count=2,
     )
     alone = leave_out(system), leave_out(wider)
@@ -160,7 +160,7 @@ def test_few_samples_are_over_their_floor_by_chance_far_more_often(count, q, tol
         system,
         group=group,
         residual=np.full(count, np.sqrt(q)),
-        soft=np.ones(count),
+        noise_ratio=np.ones(count),
         unit=np.ones(count),
     )
     assert bool(over_floor(few)) == told
@@ -173,7 +173,7 @@ def test_a_capture_left_out_is_predicted_from_the_others():
     system = linear_system(start)
     held = leave_out(system)
     assert np.isfinite(held.residual).all()
-    in_sample = np.sqrt(np.mean((system.residual / system.soft) ** 2))
+    in_sample = np.sqrt(np.mean((system.residual / system.noise_ratio) ** 2))
     assert in_sample < held.total < 1.2
     capture = system.segment
     for number in range(3):
@@ -197,7 +197,7 @@ def test_one_capture_alone_has_the_error_of_its_fit_and_says_so():
     system = linear_system(start)
     held = leave_out(system)
     assert not np.isfinite(held.residual).any()
-    rms = np.sqrt(np.mean((system.residual / system.soft) ** 2))
+    rms = np.sqrt(np.mean((system.residual / system.noise_ratio) ** 2))
     assert held.total == pytest.approx(rms, rel=1e-12)
     assert "of the fit" in held.notes[0]
     two = tuple(log(noise=1.0, seed=n) for n in (5, 6))

@@ -89,7 +89,7 @@ def test_two_ammeters_may_disagree_by_what_they_state_and_the_better_one_counts(
     assert system.fit.values["r_ohm"] == pytest.approx(R_OHM, rel=3e-4)
     apart = system.fit.values["gain_current_bench_2"] - system.fit.values["gain_current_bench"]
     assert apart == pytest.approx(off, rel=0.05)
-    assert system.spreads(system.residual).max() < 1.3
+    assert system.reduced_chi2(system.residual).max() < 1.3
     costs = dict(zip((c.name for c in system.columns), system.prior_costs(), strict=True))
     assert costs["gain_current_bench_2"] == pytest.approx((off / 0.003) ** 2, rel=0.15)
     assert costs["gain_current"] == pytest.approx(0.0, abs=1e-6)

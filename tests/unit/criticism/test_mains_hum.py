@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linearise import absorb, linearise
-from pipeline.criticism.regression.mains_hum import Hum, hum_of, told_hum, with_hum
+from pipeline.criticism.regression.mains_hum import Hum, hum_notes, hum_of, with_hum
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
@@ -38,7 +38,7 @@ def test_a_line_is_heard_with_its_size_in_the_signal_that_has_it():
     (hum,) = hum_of(logs(rms=0.02), PLAIN, BASE)
     assert (hum.kind, hum.signal, hum.freq_hz) == ("dq", "vq_v", 50.0)
     assert hum.rms == pytest.approx(0.02, rel=0.15)
-    assert told_hum([hum]) == ("mains hum in vq_v at 50 Hz, 0.02 rms: taken as noise",)
+    assert hum_notes([hum]) == ("mains hum in vq_v at 50 Hz, 0.02 rms: taken as noise",)
 
 
 @pytest.mark.parametrize("freq", [40.0, 73.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.normal_equations import Grams
+from pipeline.criticism.regression.normal_equations import NormalEquations
 
 GROUP = np.repeat([0, 1, 2], [40, 60, 30])
 NOTHING = np.zeros(4)
@@ -18,17 +18,19 @@ def rows(bad=1.0):
     return matrix, residual + np.where(GROUP == 2, bad, 0.0)
 
 
-def grams(matrix, residual, penalty=NOTHING, pull=NOTHING):
-    return Grams.of(matrix, residual, GROUP, 3, penalty, pull, 0.0, DEFAULT.fit)
+def normal_equations(matrix, residual, prior_precision=NOTHING, prior_gradient=NOTHING):
+    return NormalEquations.of(
+        matrix, residual, GROUP, 3, prior_precision, prior_gradient, 0.0, DEFAULT.fit
+    )
 
 
 def test_groups_at_their_floor_make_an_ordinary_least_squares_fit():
     matrix, residual = rows(bad=0.0)
-    end = grams(matrix, residual).best()
+    end = normal_equations(matrix, residual).best()
     expected = np.linalg.lstsq(matrix, -residual, rcond=None)[0]
     assert end.step == pytest.approx(expected, rel=1e-9)
     left = (residual + matrix @ expected) ** 2
-    assert end.spreads == pytest.approx(
+    assert end.reduced_chi2 == pytest.approx(
         [left[place].mean() for place in (n == GROUP for n in range(3))], rel=1e-9
     )
 
@@ -36,7 +38,7 @@ def test_groups_at_their_floor_make_an_ordinary_least_squares_fit():
 def test_a_group_that_misses_its_floor_counts_less():
     """Its weight is one over its own mean square, so that the others keep their answer."""
     matrix, residual = rows(bad=1000.0)
-    end = grams(matrix, residual).best()
+    end = normal_equations(matrix, residual).best()
     sound = GROUP != 2
     alone = np.linalg.lstsq(matrix[sound], -residual[sound], rcond=None)[0]
     everything = np.linalg.lstsq(matrix, -residual, rcond=None)[0]
@@ -47,20 +49,20 @@ def test_a_group_that_misses_its_floor_counts_less():
 def test_a_prior_holds_what_the_rows_do_not_know():
     matrix, residual = rows(bad=0.0)
     matrix[:, 3] = 0.0
-    penalty, pull = np.array([0.0, 0.0, 0.0, 4.0]), np.array([0.0, 0.0, 0.0, 2.0])
-    end = grams(matrix, residual, penalty, pull).best()
+    prior_precision, prior_gradient = np.array([0.0, 0.0, 0.0, 4.0]), np.array([0.0, 0.0, 0.0, 2.0])
+    end = normal_equations(matrix, residual, prior_precision, prior_gradient).best()
     # a nuisance of standard uncertainty 0.5 that stands at 0.5 goes back to its centre
     assert end.step[3] == pytest.approx(-0.5)
 
 
 def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
     matrix, residual = rows()
-    there = grams(matrix, residual).moved(np.array([1, 3]), np.array([0.7, -0.2]))
-    direct = grams(matrix, residual + matrix[:, [1, 3]] @ [0.7, -0.2])
+    there = normal_equations(matrix, residual).moved(np.array([1, 3]), np.array([0.7, -0.2]))
+    direct = normal_equations(matrix, residual + matrix[:, [1, 3]] @ [0.7, -0.2])
     assert there.power == pytest.approx(direct.power)
     assert there.slope == pytest.approx(direct.slope)
     some = there.along(np.array([0, 2])).best()
-    again = Grams.of(
+    again = NormalEquations.of(
         matrix[:, [0, 2]],
         residual + matrix[:, [1, 3]] @ [0.7, -0.2],
         GROUP,
@@ -71,4 +73,4 @@ def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
         DEFAULT.fit,
     ).best()
     assert some.step == pytest.approx(again.step)
-    assert some.misfit == pytest.approx(again.misfit)
+    assert some.deviance == pytest.approx(again.deviance)

@@ -40,7 +40,7 @@ def test_a_fit_goes_by_it():
     stayed = system.fit
     assert stayed.values == start.values != plain.values
     assert system.policy == once.policy == policy_of(CHANGES)
-    assert linear_system(once).grams().policy.settled == 0.1
+    assert linear_system(once).normal_equations().policy.settled == 0.1
 
 
 def test_a_kept_verdict_of_another_policy_does_not_count():

@@ -26,8 +26,8 @@ class Known:
 
     size = 40
 
-    def __init__(self, fit: Fit, misfit: float) -> None:
-        self.fit, self.misfit = fit, misfit
+    def __init__(self, fit: Fit, deviance: float) -> None:
+        self.fit, self.deviance = fit, deviance
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_the_terms_that_pay_stay_whatever_the_tangent_says(tangent, refits, monk
         gone = tuple(sorted({*effect.left_out, *terms}))
         less = Model(machine(), (replace(effect, left_out=gone),))
         fit = Fit((), less, system.fit.values, (), BASE)
-        return Known(fit, system.misfit + sum(NEEDED[term] for term in terms))
+        return Known(fit, system.deviance + sum(NEEDED[term] for term in terms))
 
     monkeypatch.setattr(pruning, "_spare", lambda *_: tangent)
     monkeypatch.setattr(pruning, "_without", without)
@@ -59,7 +59,7 @@ def test_the_terms_that_pay_stay_whatever_the_tangent_says(tangent, refits, monk
     assert len(tried) == refits
     gone = set(system.fit.model.effects[0].left_out)
     assert gone == ({*NEEDED} - {D_ODD} if tangent else set())
-    assert system.misfit == pytest.approx(sum(NEEDED[term] for term in gone))
+    assert system.deviance == pytest.approx(sum(NEEDED[term] for term in gone))
     assert np.log(Known.size) < NEEDED[D_ODD]
 
 
@@ -77,10 +77,10 @@ def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
 @pytest.mark.parametrize(("loss", "asked"), [(19.0, True), (21.0, False)])
 def test_what_clearly_pays_is_not_asked_for_by_a_refit(loss, asked, monkeypatch):
     """In prices of a parameter: the tangent is not wrong about as much as that."""
-    price = 5.0
-    monkeypatch.setattr(pruning, "_loss", lambda _s, _k, names: loss * price * len(names))
+    penalty = 5.0
+    monkeypatch.setattr(pruning, "_loss", lambda _s, _k, names: loss * penalty * len(names))
     model = Model(machine(), (SATURATION,))
     fit = Fit((), model, {**BASE, **zero(SATURATION, model)}, (), BASE)
-    system = SimpleNamespace(grams=lambda: None, fit=fit)
-    found = pruning._doubtful(system, SATURATION, (Q_BEND,), price)
+    system = SimpleNamespace(normal_equations=lambda: None, fit=fit)
+    found = pruning._doubtful(system, SATURATION, (Q_BEND,), penalty)
     assert found == (tuple(sorted({*NEEDED} - {Q_BEND})) if asked else ())

@@ -27,8 +27,8 @@ def in_sample(made):
 
 def parameters(made):
     """Names of the constants and effect parameters that the captures tell of, gains aside."""
-    heard = np.any(made.system.matrix != 0.0, axis=0)
-    names = [c.name for n, c in enumerate(made.system.columns) if heard[n]]
+    observed = np.any(made.system.matrix != 0.0, axis=0)
+    names = [c.name for n, c in enumerate(made.system.columns) if observed[n]]
     return [name for name in names if not name.startswith("gain_")]
 
 

@@ -44,7 +44,7 @@ def test_what_an_effect_lacks_is_said(what, told):
     effect = effects()[what.pop("effect", "windage")]
     known = {"fall": 60.0, "share": 0.0, "size": 2.0, "quiet": 0.0, **what}
     score = Score(
-        Candidate(effect, ()), price=15.0, step={}, moves={}, policy=DEFAULT.selection, **known
+        Candidate(effect, ()), penalty=15.0, step={}, moves={}, policy=DEFAULT.selection, **known
     )
     assert score.shortfall == told
     assert score.passes == (
@@ -65,7 +65,7 @@ def test_a_fits_own_columns_are_made_where_it_stands():
     off = np.abs(system.matrix[:, :own] - fresh.matrix[:, :own]).max(axis=0)
     assert (off <= 1e-13 * np.abs(fresh.matrix[:, :own]).max(axis=0)).all()
     assert not np.allclose(system.matrix[:, :own], before.matrix[:, :own], rtol=1e-3, atol=0.0)
-    kept, made = (s.matrix[:, own:] / s.whiten[:, None] for s in (system, before))
+    kept, made = (s.matrix[:, own:] / s.row_weight[:, None] for s in (system, before))
     assert kept == pytest.approx(made, rel=1e-9, abs=1e-12 * np.abs(made).max())
 
 
@@ -120,17 +120,17 @@ def test_an_effect_helps_by_its_share_of_power_not_of_groups(other, expected):
         group=np.repeat([0, 1], 100),
         window=np.tile(np.arange(100), 2),
         unit=np.ones(200),
-        soft=np.ones(200),
-        whiten=np.ones(200),
+        noise_ratio=np.ones(200),
+        row_weight=np.ones(200),
         labels=((0, "torque_shaft_nm", 0), (1, "torque_shaft_nm", 0)),
-        penalty=np.zeros(1 + len(own_columns(model))),
-        pull=np.zeros(1 + len(own_columns(model))),
+        prior_precision=np.zeros(1 + len(own_columns(model))),
+        prior_gradient=np.zeros(1 + len(own_columns(model))),
         fit=Fit((log(), log()), model, dict(BASE), (), BASE),
         own_count=len(own_columns(model)),
         made_at={},
     )
     (score,) = score_all(system, [Candidate(effect, (column,))])
-    assert score.fall > score.price
+    assert score.fall > score.penalty
     assert score.share == pytest.approx(expected, abs=0.2 * expected)
 
 

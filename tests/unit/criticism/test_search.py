@@ -34,21 +34,21 @@ def climbs(monkeypatch):
         looked = begun if isinstance(begun, tuple) else "calm"
         made.orders.append(looked)
         fit = Fit((), Model(machine(), ()), {}, (), {})
-        rung = SimpleNamespace(system=None, fit=fit)
+        step = SimpleNamespace(system=None, fit=fit)
         inside = SimpleNamespace(system=SimpleNamespace(fit=fit), hum=())
-        return Ladder(looked=looked, left=(looked,), rungs=(rung,), begun=inside)
+        return Ladder(looked=looked, left=(looked,), steps=(step,), begun=inside)
 
     def sketched(ladder, left, name, in_parts=False):
         what = ladder.looked, in_parts
         return (what, made.gains.get(what, 1.0)) if what in made.sketched else (None, 0.0)
 
-    monkeypatch.setattr(search, "climbed", climbed)
+    monkeypatch.setattr(search, "ladder_from", climbed)
     monkeypatch.setattr(search, "_sketched", sketched)
     monkeypatch.setattr(search, "segments", lambda _, of: of.load_orders)
     monkeypatch.setattr(search, "fit_of", lambda found, _: tuple(found))
     monkeypatch.setattr(search, "model_of", lambda *_: None)
     monkeypatch.setattr(search, "orders_left", lambda *_: made.seen)
-    monkeypatch.setattr(search, "wandering", lambda *_: () if made.wanders else None)
+    monkeypatch.setattr(search, "drifting_segments", lambda *_: () if made.wanders else None)
     monkeypatch.setattr(search, "gauss_newton", lambda *_: None)
     return made
 

@@ -38,8 +38,8 @@ def errors(signal: str, shape: np.ndarray, of: int = 0, seed: int = 1) -> Errors
 def twice(*captures: str, fit: Any = None) -> tuple[Any, Any]:
     """Two equal rungs of segments of these captures."""
     segments = tuple(segment(name) for name in captures)
-    rung = SimpleNamespace(system=SimpleNamespace(residual=np.empty(0), segments=segments), fit=fit)
-    return rung, rung
+    step = SimpleNamespace(system=SimpleNamespace(residual=np.empty(0), segments=segments), fit=fit)
+    return step, step
 
 
 def found_in(

@@ -10,7 +10,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.criticism.selection.stepwise import _doubt, _kin, material, search, size_of
+from pipeline.criticism.selection.stepwise import _doubt, _same_hook, material, search, size_of
 from tests.unit.criticism.machines import (
     BASE,
     LIBRARY,
@@ -26,9 +26,9 @@ from tests.unit.criticism.machines import (
 
 def test_a_sound_machine_is_left_alone():
     segments = (log(noise=1.0), log(noise=1.0, seed=6))
-    rungs = search(fitted(segments), LIBRARY)
-    assert [rung.added for rung in rungs] == [()]
-    assert rungs[0].fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+    steps = search(fitted(segments), LIBRARY)
+    assert [step.added for step in steps] == [()]
+    assert steps[0].fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
 
 
 def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none():
@@ -36,9 +36,9 @@ def test_windage_below_a_cautious_floor_is_named_and_nothing_where_there_is_none
         return 0.02 * omega * np.abs(omega) / 250.0**2
 
     hidden, none = ((with_drag(one), with_drag(one, 6)) for one in (drag, lambda *_: 0.0))
-    rungs = search(cautious(hidden, 3.0), LIBRARY)
-    assert rungs[0].system.spreads(rungs[0].system.residual).max() < 1.0
-    assert rungs[-1].added == ("windage",)
+    steps = search(cautious(hidden, 3.0), LIBRARY)
+    assert steps[0].system.reduced_chi2(steps[0].system.residual).max() < 1.0
+    assert steps[-1].added == ("windage",)
     assert search(cautious(none, 3.0), LIBRARY)[-1].added == ()
 
 
@@ -75,10 +75,10 @@ def test_a_small_effect_matters_where_it_takes_what_would_be_told_as_a_remainder
     """
     segments = (with_drag(curved(0.1)), with_drag(curved(0.1), 6))
     library = asking_for(0.3)
-    rungs = search(fitted(segments), library)
-    assert remainder(rungs[0].system)
-    assert rungs[-1].added == ("windage",)
-    assert size_of(rungs[-1].fit, library["windage"], "negligible") < 0.3
+    steps = search(fitted(segments), library)
+    assert remainder(steps[0].system)
+    assert steps[-1].added == ("windage",)
+    assert size_of(steps[-1].fit, library["windage"], "negligible") < 0.3
     few = (with_drag(curved(0.03)), with_drag(curved(0.03), 6))
     for captured, times in ((few, 1.0), (segments, 10.0)):
         last = search(cautious(captured, times), library)[-1]
@@ -97,7 +97,7 @@ def test_what_a_small_effect_explains_is_not_named_after_another():
     last = search(start, asking_for(0.1))[-1]
     assert last.added == ()
     shadowed = next(s for s in last.scores if s.candidate.effect.name == other[0])
-    assert shadowed.fall > shadowed.price
+    assert shadowed.fall > shadowed.penalty
     assert shadowed.shortfall == "windage explains it better, and is too small to matter"
 
 
@@ -106,9 +106,9 @@ def test_windage_is_found_with_its_size():
         return 0.03 * omega * np.abs(omega) / 250.0**2
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    rungs = search(fitted(segments), LIBRARY)
-    assert rungs[-1].added == ("windage",)
-    assert rungs[-1].fit.values["windage.drag_nm"] == pytest.approx(0.03, rel=0.05)
+    steps = search(fitted(segments), LIBRARY)
+    assert steps[-1].added == ("windage",)
+    assert steps[-1].fit.values["windage.drag_nm"] == pytest.approx(0.03, rel=0.05)
 
 
 def test_two_effects_are_found_whatever_their_order():
@@ -116,9 +116,9 @@ def test_two_effects_are_found_whatever_their_order():
         return 0.02 * np.sign(omega) + 0.02 * np.sin(theta + 0.4)
 
     segments = (with_drag(drag), with_drag(drag, 6))
-    rungs = search(fitted(segments), LIBRARY)
-    assert set(rungs[-1].added) == {"coulomb_friction", "unbalance"}
-    values = rungs[-1].fit.values
+    steps = search(fitted(segments), LIBRARY)
+    assert set(steps[-1].added) == {"coulomb_friction", "unbalance"}
+    values = steps[-1].fit.values
     assert np.hypot(values["unbalance.sin_nm"], values["unbalance.cos_nm"]) == pytest.approx(
         0.02, rel=0.03
     )
@@ -139,13 +139,13 @@ def test_beside_an_effect_of_its_kind_another_must_stand_for_more_than_its_error
     mine = last.system.group == place
     plain = segments[0].weak.project(drag(omega, 0.0)[None])[0, :, 0]
     wrong = 0.05 * np.sqrt(np.mean(plain[last.system.window[mine]] ** 2))
-    noise = np.mean(last.system.whiten[mine] ** -2.0)
+    noise = np.mean(last.system.row_weight[mine] ** -2.0)
     assert doubt[place] == pytest.approx(noise / (noise + wrong**2), rel=0.1)
     assert doubt[place] < 0.9
     assert doubt[last.system.labels.index((0, "vd_v", 0))] == 1.0
     delay = effects()["sample_delay"]
-    assert _kin(effects()["iron_eddy"], (windage, delay)) == [windage]
-    assert _kin(delay, (windage, delay)) == []
+    assert _same_hook(effects()["iron_eddy"], (windage, delay)) == [windage]
+    assert _same_hook(delay, (windage, delay)) == []
     assert (_doubt(last.system, ()) == 1.0).all()
 
 

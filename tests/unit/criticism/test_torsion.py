@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numba import njit
 
-from pipeline.criticism.effect import Told, Whole
+from pipeline.criticism.effect import Discrimination, FullLog
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
-from pipeline.criticism.machine.two_masses import closer, side_of
+from pipeline.criticism.machine.two_masses import discriminator, side_of
 from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.discrimination import settled
 from tests.unit.criticism.machines import BASE, machine, operating
@@ -102,7 +102,7 @@ def told(gap: float, softness: float, between: bool, seed: int = 1) -> Law | Non
     )
 
 
-def whole(gap: float, softness: float, between: bool, seed: int = 1) -> Whole:
+def whole(gap: float, softness: float, between: bool, seed: int = 1) -> FullLog:
     rng = np.random.default_rng(seed)
     angle, through = shaft(gap, softness)
     t = TS * np.arange(angle.size)
@@ -111,7 +111,7 @@ def whole(gap: float, softness: float, between: bool, seed: int = 1) -> Whole:
     x = replace(operating(t.size), theta_rad=theta, torque_em_nm=driving(t))
     good = np.ones(t.size, dtype=bool)
     u_theta = ENCODER_RAD / math.sqrt(12)
-    return Whole(x, np.zeros(t.size), told, good, u_theta, U_TORQUE_NM, 0.0)
+    return FullLog(x, np.zeros(t.size), told, good, u_theta, U_TORQUE_NM, 0.0)
 
 
 @pytest.mark.parametrize("between", [False, True])
@@ -152,7 +152,7 @@ def test_bad_samples_are_not_looked_at():
 @pytest.mark.parametrize(("gap", "name"), [(0.003, "backlash"), (0.0, "compliance")])
 def test_the_closer_look_names_the_form(gap: float, name: str, between: float):
     one = whole(gap, 0.004, between > 0)
-    found = closer([one, one], {"share": SHARE, "between": between})
+    found = discriminator([one, one], {"share": SHARE, "between": between})
     assert found is not None and found.name == name
     if gap:
         assert found.values["gap_rad"][0] == pytest.approx(gap, rel=0.15)
@@ -164,9 +164,9 @@ def test_a_torque_of_one_sign_parts_nothing():
     """A gap stays closed: what the log shows is a spring, or a spring behind a gap."""
     one = whole(0.003, 0.004, True)
     pressed = replace(one, shaft_nm=np.abs(one.shaft_nm) + 0.01)
-    assert closer([pressed], {"share": SHARE, "between": 1.0}) is None
-    assert closer([], {"share": SHARE, "between": 1.0}) is None
-    assert closer([one], {"share": 0.0, "between": 1.0}) is None
+    assert discriminator([pressed], {"share": SHARE, "between": 1.0}) is None
+    assert discriminator([], {"share": SHARE, "between": 1.0}) is None
+    assert discriminator([one], {"share": 0.0, "between": 1.0}) is None
 
 
 def test_a_gap_too_small_to_be_surely_there_or_not_is_left_open():
@@ -180,17 +180,17 @@ def test_a_gap_too_small_to_be_surely_there_or_not_is_left_open():
         )
         for n in (3, 4)
     ]
-    assert closer(blurred, {"share": SHARE, "between": 0.0}) is None
+    assert discriminator(blurred, {"share": SHARE, "between": 0.0}) is None
 
 
 def test_the_two_share_one_look():
     library = effects()
-    assert library["backlash"].closer is library["compliance"].closer is closer
-    assert sum(effect.closer is not None for effect in library.values()) == 2
+    assert library["backlash"].discriminator is library["compliance"].discriminator is discriminator
+    assert sum(effect.discriminator is not None for effect in library.values()) == 2
 
 
 def test_a_fit_leaves_the_shape_that_a_look_told_and_its_uncertainty():
-    known = settled(effects()["backlash"], Told("backlash", {"gap_rad": (0.003, 1e-4)}))
+    known = settled(effects()["backlash"], Discrimination("backlash", {"gap_rad": (0.003, 1e-4)}))
     gap = next(p for p in known.parameters if p.name == "gap_rad")
     assert gap.choice and gap.u == 1e-4
     columns = effect_columns(known, Model(machine(), (known,)))

@@ -10,14 +10,14 @@ import pytest
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Effect, Operating, Parameter, Told, Values
+from pipeline.criticism.effect import Discrimination, Effect, Operating, Parameter, Values
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import base_columns
 from pipeline.criticism.residuals.residual import operate, residual
-from pipeline.criticism.selection.discrimination import told_by_wholes
+from pipeline.criticism.selection.discrimination import discriminate
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine, operating
 
@@ -167,14 +167,14 @@ def test_a_closer_look_sees_the_torque_without_the_transducer_s_offset():
 
     def look(wholes, q):
         seen.append(wholes[0].shaft_nm)
-        return Told("compliance", {})
+        return Discrimination("compliance", {})
 
-    offset, coupled = LIBRARY["torque_offset"], replace(LIBRARY["compliance"], closer=look)
+    offset, coupled = LIBRARY["torque_offset"], replace(LIBRARY["compliance"], discriminator=look)
     drive = log()
     whole = {**drive.recorded, "good": np.ones(drive.size)}
     model = Model(machine(), (offset, coupled))
     values = {**BASE, "torque_offset.offset_nm": 0.2, **zero(coupled, model)}
-    told_by_wholes(Fit((replace(drive, whole=whole),), model, values, (), BASE), coupled)
+    discriminate(Fit((replace(drive, whole=whole),), model, values, (), BASE), coupled)
     assert seen[0] == pytest.approx(drive.recorded["torque_shaft_nm"] - 0.2)
 
 

@@ -16,52 +16,52 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem, own_columns
 from pipeline.criticism.regression.linearise import Column
-from pipeline.criticism.search import Ladder, climbed
+from pipeline.criticism.search import Ladder, ladder_from
 from pipeline.criticism.selection.requested_model import Begun
 from pipeline.criticism.selection.score_test import Candidate, Score
-from pipeline.criticism.selection.stepwise import Rung, _holds, _refitted, _sure, search
-from pipeline.criticism.selection.truncation import denied, explained, trusted
+from pipeline.criticism.selection.stepwise import LadderStep, _holds, _refitted, _sure, search
+from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.diagnosis import Remainder
 from tests.unit.criticism.machines import BASE, fitted, log, machine, with_drag
 
 
-def missing_by(**spreads):
+def missing_by(**reduced_chi2):
     """A rung around which signals have these χ²/n in a hundred samples each, and no columns."""
     model = Model(machine(), ())
     none = np.zeros(len(own_columns(model)))
     system = LinearSystem(
         columns=tuple(own_columns(model)),
-        residual=np.repeat(np.sqrt(list(spreads.values())), 100),
-        matrix=np.zeros((100 * len(spreads), none.size)),
-        group=np.repeat(np.arange(len(spreads)), 100),
-        window=np.tile(np.arange(100), len(spreads)),
-        unit=np.ones(100 * len(spreads)),
-        soft=np.ones(100 * len(spreads)),
-        whiten=np.ones(100 * len(spreads)),
-        labels=tuple((0, name, 0) for name in spreads),
-        penalty=none,
-        pull=none,
+        residual=np.repeat(np.sqrt(list(reduced_chi2.values())), 100),
+        matrix=np.zeros((100 * len(reduced_chi2), none.size)),
+        group=np.repeat(np.arange(len(reduced_chi2)), 100),
+        window=np.tile(np.arange(100), len(reduced_chi2)),
+        unit=np.ones(100 * len(reduced_chi2)),
+        noise_ratio=np.ones(100 * len(reduced_chi2)),
+        row_weight=np.ones(100 * len(reduced_chi2)),
+        labels=tuple((0, name, 0) for name in reduced_chi2),
+        prior_precision=none,
+        prior_gradient=none,
         fit=Fit((log(),) * 3, model, dict(BASE), (), BASE),
         own_count=none.size,
         made_at={},
     )
-    return Rung((), system, ())
+    return LadderStep((), system, ())
 
 
 @pytest.mark.parametrize(("after", "kept"), [(5.5, 2), (4.97, 2), (4.9, 3)])
 def test_a_further_effect_must_not_predict_worse_while_something_is_left(after, kept, monkeypatch):
-    rungs = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
+    steps = tuple(missing_by(torque_shaft_nm=q) for q in (1e6, 20.0, 10.0))
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
-    totals = [HeldOut(rungs[0].system.residual, total) for total in (10.0, 5.0, after)]
-    assert len(trusted(rungs, totals)[0]) == kept
+    totals = [HeldOut(steps[0].system.residual, total) for total in (10.0, 5.0, after)]
+    assert len(truncated(steps, totals)[0]) == kept
 
 
 @pytest.mark.parametrize(
-    ("meter_rise", "heard", "kept"), [(0.0, True, 1), (0.3, True, 2), (0.0, False, 2)]
+    ("meter_rise", "observed", "kept"), [(0.0, True, 1), (0.3, True, 2), (0.0, False, 2)]
 )
 def test_what_captures_speak_against_is_no_name_beside_an_unknown(
-    meter_rise, heard, kept, monkeypatch
+    meter_rise, observed, kept, monkeypatch
 ):
     """A supply that sags with power looks like a resistance that grows with speed; but a meter of a
     higher frequency than any drive's would show that too, where there is one.
@@ -71,26 +71,26 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     model = first.fit.model.with_effects(skin)
     columns = own_columns(model)
     matrix = np.zeros((100, len(columns)))
-    matrix[:, [c.name == "skin_effect.meter_rise" for c in columns]] = float(heard)
+    matrix[:, [c.name == "skin_effect.meter_rise" for c in columns]] = float(observed)
     found = {"rise": 0.5, "meter_rise": meter_rise, "inner": 0.0, "bend": 0.0}
     values = {**BASE, **{f"skin_effect.{name}": value for name, value in found.items()}}
-    rung = missing_by(vq_v=1e3)
+    step = missing_by(vq_v=1e3)
     fit = Fit((log(),), model, values, (), BASE)
     system = replace(
-        rung.system, columns=tuple(columns), matrix=matrix, fit=fit, own_count=len(columns)
+        step.system, columns=tuple(columns), matrix=matrix, fit=fit, own_count=len(columns)
     )
-    second = Rung(("skin_effect",), system, ())
+    second = LadderStep(("skin_effect",), system, ())
     over = (Remainder("one", "vq_v", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
     held = [HeldOut(first.system.residual, total) for total in (10.0, 5.0)]
-    assert len(trusted((first, second), held)[0]) == kept
-    assert ("meter_rise of 0" in denied(second)) is (kept == 1)
+    assert len(truncated((first, second), held)[0]) == kept
+    assert ("meter_rise of 0" in contradiction(second)) is (kept == 1)
     found, totals = (first, second), iter(held)
     monkeypatch.setattr("pipeline.criticism.search.search", lambda *_: found)
     monkeypatch.setattr("pipeline.criticism.search.leave_out", lambda *_: next(totals))
     monkeypatch.setattr("pipeline.criticism.search.in_common", lambda _, alone: list(alone))
-    cut = climbed(Begun(first.system, ()), {}).cut
+    cut = ladder_from(Begun(first.system, ()), {}).cut
     assert list(cut) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0, policy=DEFAULT.selection)
     ladder = Ladder(Begun(first.system, ()), (replace(first, scores=(score,)),), held[:1], (), cut)
@@ -98,12 +98,12 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     assert ("speak against" in ranked.shortfall) is (kept == 1)
 
 
-def with_waves(*spreads: float) -> Rung:
+def with_waves(*reduced_chi2: float) -> LadderStep:
     """A rung that misses the torque by these χ²/n at the orders 0, 7 and 84 of a turn."""
     names = ("plain", "seventh", "cogging")
-    rung = missing_by(**dict(zip(names, spreads, strict=True)))
+    step = missing_by(**dict(zip(names, reduced_chi2, strict=True)))
     labels = tuple((0, "torque_shaft_nm", order) for order in (0, 7, 84))
-    return replace(rung, system=replace(rung.system, labels=labels))
+    return replace(step, system=replace(step.system, labels=labels))
 
 
 @pytest.mark.parametrize(
@@ -111,12 +111,12 @@ def with_waves(*spreads: float) -> Rung:
 )
 def test_what_clears_all_waves_is_no_guess_beside_an_unknown(left, kept, monkeypatch):
     """Cogging beside a brake of nobody's library, which is nearly all of the error."""
-    rungs = with_waves(1e6, 20.0, 5e3), with_waves(*left)
+    steps = with_waves(1e6, 20.0, 5e3), with_waves(*left)
     over = (Remainder("one", "torque_shaft_nm", 0, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
-    held = [HeldOut(rungs[0].system.residual, total) for total in (97.0, 98.0)]
-    assert len(trusted(rungs, held)[0]) == kept
+    held = [HeldOut(steps[0].system.residual, total) for total in (97.0, 98.0)]
+    assert len(truncated(steps, held)[0]) == kept
 
 
 @pytest.mark.parametrize(("after", "kept"), [(0.5, 2), (20.0, 1)])
@@ -125,15 +125,15 @@ def test_waves_that_another_signal_keeps_do_not_make_a_guess_of_what_clears_one(
 ):
     """An open winding whose magnet's temperature was not logged, beside cogging in a slow turn."""
     labels = ((0, "torque_shaft_nm", 84), (1, "vd_v", 42))
-    rungs = [
-        replace(rung, system=replace(rung.system, labels=labels))
-        for rung in (missing_by(cogging=5e3, winding=1e6), missing_by(cogging=after, winding=1e6))
+    steps = [
+        replace(step, system=replace(step.system, labels=labels))
+        for step in (missing_by(cogging=5e3, winding=1e6), missing_by(cogging=after, winding=1e6))
     ]
     over = (Remainder("one", "vd_v", 42, 9.0, 1.0),)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.remainder", lambda *_: over)
     monkeypatch.setattr("pipeline.criticism.selection.truncation.explained", lambda *_: False)
-    held = [HeldOut(rungs[0].system.residual, total) for total in (97.0, 97.0)]
-    assert len(trusted(rungs, held)[0]) == kept
+    held = [HeldOut(steps[0].system.residual, total) for total in (97.0, 97.0)]
+    assert len(truncated(steps, held)[0]) == kept
 
 
 @pytest.mark.parametrize(("speed", "said"), [(90.0, False), (3.0, True)])
@@ -164,7 +164,7 @@ def test_what_a_doubted_form_brings_below_the_floor_was_not_below_it(doubt, kept
     nor one above says that an effect is there.
     """
     wide, tried = (missing_by(torque_shaft_nm=q).system for q in (3.0, 0.2))
-    after = tried.spreads(tried.residual)
+    after = tried.reduced_chi2(tried.residual)
     doubts = np.array([doubt]), np.array([doubt])
     assert _holds(wide, np.array([3.0]), tried, after, (10.0, 10.0), doubts) is kept
 
@@ -191,8 +191,8 @@ def test_an_effect_is_named_only_where_it_is_surely_there(name, values, apart, s
         plain,
         columns=tuple(Column(key, 1e-3) for key in full),
         matrix=random.normal(0.0, 1e5, (plain.size, len(full))),
-        penalty=np.zeros(len(full)),
-        pull=np.zeros(len(full)),
+        prior_precision=np.zeros(len(full)),
+        prior_gradient=np.zeros(len(full)),
         fit=fit,
         own_count=len(full),
     )
@@ -224,26 +224,26 @@ def test_a_refit_begins_again_where_the_tangent_goes_astray(
 
     def gauss_newton(start, before):
         asked.append(round(start.values["r_ohm"], 6))
-        misfit = foreseen if asked[-1] == 0.4 else near
-        return replace(before, fit=start, residual=np.full(before.size, misfit))
+        deviance = foreseen if asked[-1] == 0.4 else near
+        return replace(before, fit=start, residual=np.full(before.size, deviance))
 
     monkeypatch.setattr("pipeline.criticism.selection.stepwise.gauss_newton", gauss_newton)
-    monkeypatch.setattr(LinearSystem, "misfit", property(lambda one: float(one.residual[0])))
+    monkeypatch.setattr(LinearSystem, "deviance", property(lambda one: float(one.residual[0])))
     fit = Fit((log(),), Model(machine(), ()), {**BASE, "r_ohm": 0.3}, (), BASE)
     wide = replace(missing_by(torque_shaft_nm=100.0**2).system, fit=fit)
-    assert _refitted(wide, score).misfit == end
+    assert _refitted(wide, score).deviance == end
     assert asked == begun
 
 
 def test_an_effect_s_drop_is_that_of_the_rung_it_came_with():
     """A removal on the way leaves rungs and names of different counts."""
-    rungs = [
-        Rung(added, None, ())  # type: ignore[arg-type]
+    steps = [
+        LadderStep(added, None, ())  # type: ignore[arg-type]
         for added in ((), ("cogging",), ("saturation",), ("saturation", "windage"))
     ]
     held = [HeldOut(np.zeros(1), total) for total in (math.e**4, math.e**3, math.e, math.e**1.5)]
-    assert _drop(rungs, held, "saturation") == pytest.approx(2.0 / 2.5)
-    assert _drop(rungs, held, "windage") == 0.0
+    assert _drop(steps, held, "saturation") == pytest.approx(2.0 / 2.5)
+    assert _drop(steps, held, "windage") == 0.0
 
 
 @pytest.mark.parametrize(("after", "kept"), [(9.5, 1), (8.5, 1), (5.0, 2)])
@@ -252,6 +252,6 @@ def test_beside_an_unknown_a_name_must_take_a_fifth_of_the_error(after, kept):
     (first,) = search(fitted(segments), {})
     second = replace(first, added=("windage",))
     totals = [HeldOut(first.system.residual, total) for total in (10.0, after)]
-    rungs, left = trusted((first, second), totals)
-    assert len(rungs) == kept
+    steps, left = truncated((first, second), totals)
+    assert len(steps) == kept
     assert {one.signal for one in left} >= {"torque_shaft_nm"}
