@@ -74,6 +74,9 @@ lock:
 	uv pip compile pyproject.toml --group dev --group docs --universal --python-version 3.11 \
 	  --fork-strategy fewest --generate-hashes --no-annotate --no-header \
 	  --output-file requirements.lock --quiet
+	uv pip compile --group worlds --constraint requirements.lock --universal \
+	  --python-version 3.11 --fork-strategy fewest --generate-hashes --no-annotate --no-header \
+	  --output-file tests/benchmark/worlds/requirements.lock --quiet
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

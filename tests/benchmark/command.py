@@ -29,7 +29,8 @@ class Options:
     double the chosen numbers `fields`, on `count` cases). `output`: folder
     of sealed truths and results. `subset`: small, of minutes, or full, of hours. `shard`: which
     part of the cases to work on, i/n with i from 1. `seed`: of every random draw. `docs`: Markdown
-    page to put the table into, between its marks. `date`: date to write over the table.
+    page to put the table into, between its marks. `date`: date to write over the table. `world`:
+    somebody else's plant to record in place of the project's simulator.
     """
 
     action: str = "run"
@@ -39,6 +40,7 @@ class Options:
     seed: int = 1
     docs: str = ""
     date: str = ""
+    world: str = ""
     fields: str = ""
     count: int = 8
 
@@ -70,6 +72,8 @@ def main(chosen: Options) -> str:
         measure_all(output)
         return f"sensitivities of every motor in {output}\n"
     book = Book(output, code_digest())
+    if chosen.world:
+        return _world(chosen, book)
     drawn = list(cases(chosen.seed, output / "sensitivity"))
     wanted = small(iter(drawn)) if chosen.subset == "small" else drawn
     if chosen.action == "policy":
@@ -85,6 +89,29 @@ def main(chosen: Options) -> str:
     if chosen.docs:
         _into_page(Path(chosen.docs), text)
     return f"{done} cases diagnosed\n\n{text}"
+
+
+def _world(chosen: Options, book: Book) -> str:
+    """Diagnoses the cases of somebody else's plant; recorded many at once, so in chunks."""
+    from tests.benchmark.worlds.recording import WORLDS, Recorder
+    from tests.benchmark.worlds.table import cases as world_cases
+    from tests.benchmark.worlds.table import table as world_table
+
+    if chosen.world not in WORLDS:
+        raise UsageError(f"no world {chosen.world!r}", f"known are {', '.join(WORLDS)}")
+    try:
+        drawn = world_cases(chosen.world)
+    except ImportError as error:
+        remedy = f"install {WORLDS[chosen.world]}: docs/benchmark.md says how"
+        raise UsageError(f"world={chosen.world} needs {error.name}", remedy) from error
+    wanted = share_of(drawn, chosen.shard)
+    done = 0
+    if chosen.action == "run":
+        due = [case for case in wanted if book.document(case) is None]
+        done = run(wanted, book, product, record=Recorder(due))
+    found = [(case, document) for case in drawn if (document := book.document(case)) is not None]
+    heading = f"{len(found)} of {len(drawn)} cases of world {chosen.world}, code {book.code}\n\n"
+    return f"{done} cases diagnosed\n\n{heading}{world_table(found)}"
 
 
 def _policy(chosen: Options, some: list[Case], book: Book) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from pipeline.io.storage.code_version import closure_digest
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.io.storage.syntax import syntax_of
+from pipeline.records.capture import Campaign
 from tests.benchmark.blind import Diagnose, attempted, blind_process
 from tests.benchmark.cases import Case, case_from
 from tests.benchmark.sealing import blind_campaign
@@ -71,7 +73,14 @@ def share_of(cases: list[Case], shard: str) -> list[Case]:
     return cases[i - 1 :: n]
 
 
-def run(cases: list[Case], book: Book, diagnose: Diagnose, *, blind: bool = True) -> int:
+def run(
+    cases: Sequence[Case],
+    book: Book,
+    diagnose: Diagnose,
+    *,
+    blind: bool = True,
+    record: Callable[[Case], Campaign] = blind_campaign,
+) -> int:
     """Diagnoses every case that has no result yet; returns how many it did.
 
     The next campaign is recorded while the last one is being diagnosed. `blind` False diagnoses
@@ -83,12 +92,12 @@ def run(cases: list[Case], book: Book, diagnose: Diagnose, *, blind: bool = True
             write_whole(book.sealed(case), canonical_json(case.document()))
     if not blind:
         for case in due:
-            _keep(book, case, attempted(diagnose, blind_campaign(case), case.model))
+            _keep(book, case, attempted(diagnose, record(case), case.model))
         return len(due)
     with blind_process() as worker:
         waiting = None
         for case in due:
-            campaign = blind_campaign(case)
+            campaign = record(case)
             if waiting is not None:
                 _keep(book, waiting[0], waiting[1].result())
             waiting = case, worker.submit(attempted, diagnose, campaign, case.model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +29,12 @@ def blind_campaign(case: Case) -> Campaign:
     made = recorded(motor, place.bench, place.plan, case.seed, case.keep)
     rng = np.random.default_rng([case.seed, 1])
     made = corrupted(made, case.corruption, motor, place.bench, rng)
-    return Campaign(motor.motor_id, tuple(sorted(map(_capture, made), key=lambda c: c.path)))
+    return Campaign(motor.motor_id, captures(made))
+
+
+def captures(made: Iterable[Recording]) -> tuple[Capture, ...]:
+    """Recordings as the reader would hand them on, by path."""
+    return tuple(sorted(map(_capture, made), key=lambda capture: capture.path))
 
 
 def blind_name(case: Case) -> str:

@@ -1,0 +1,54 @@
+"""The cases of a world, and the table of what their diagnoses are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tests.benchmark.worlds.case import MARKS, WorldCase, marked
+from tests.benchmark.worlds.recording import world
+
+LINES = ("nothing", "typical", "third", "pair", "outside")
+SEEDS = (1, 2, 3)
+THIRD = 0.3
+Found = Sequence[tuple[WorldCase, Mapping[str, Any]]]
+
+
+def cases(name: str) -> list[WorldCase]:
+    """Every case of a world: nulls, each effect at two sizes, pairs, and what no library has."""
+    place = world(name)
+    found = []
+    for programme, effects in place.EFFECTS.items():
+        found += [WorldCase(name, programme, seed) for seed in SEEDS]
+        for k, effect in enumerate(effects):
+            for size in (1.0, THIRD):
+                found.append(WorldCase(name, programme, 1 + k % 3, {effect: size}))
+    lab = "laboratory"
+    for k, (one, other) in enumerate(place.PAIRS):
+        found.append(WorldCase(name, lab, 1 + k % 3, {one: 1.0, other: 0.5}))
+    for effect in place.OUTSIDE:
+        found += [WorldCase(name, lab, seed, {effect: 1.0}, outside=True) for seed in SEEDS]
+    return found
+
+
+def table(found: Found) -> str:
+    """Marks by line, and each answer that is not right on a line of its own."""
+    rows = ["| hidden | cases | " + " | ".join(MARKS) + " |", "|---" * (2 + len(MARKS)) + "|"]
+    for line in (*LINES, "all"):
+        marks = [marked(case, document) for case, document in found if line in (case.line, "all")]
+        counts = " | ".join(str(marks.count(mark)) for mark in MARKS)
+        rows.append(f"| {line} | {len(marks)} | {counts} |")
+    rows += [
+        "",
+        "| programme | motor | hidden | mark | verdict | named |",
+        "|---|---|---|---|---|---|",
+    ]
+    for case, document in found:
+        mark = marked(case, document)
+        if mark in ("right", "abstained right"):
+            continue
+        hidden = ", ".join(f"{size:g} {name}" for name, size in case.effects.items()) or "nothing"
+        named = ", ".join(document.get("missing", ())) or document.get("failure", "nothing")
+        verdict = document.get("verdict", "none")
+        rows.append(f"| {case.programme} | {case.seed} | {hidden} | {mark} | {verdict} | {named} |")
+    return "\n".join(rows) + "\n"

@@ -1,0 +1,171 @@
+"""Plants of others: what an answer is worth, and that their captures keep the contract."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.records.errors import UsageError
+from tests.benchmark.command import main, options
+from tests.benchmark.worlds.case import WorldCase, marked
+from tests.benchmark.worlds.lanes import Lane, run
+from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner
+from tests.benchmark.worlds.table import table
+
+NULL = WorldCase("motulator", "laboratory", 1)
+COGGING = WorldCase("motulator", "laboratory", 1, {"cogging": 1.0})
+PAIR = WorldCase("motulator", "laboratory", 1, {"cogging": 1.0, "windage": 0.5})
+OUTSIDE = WorldCase("motulator", "laboratory", 1, {"belt": 1.0}, outside=True)
+
+
+def answer(verdict: str, *names: str, confused: str = "", matters: bool = False) -> dict[str, Any]:
+    ranking = [{"effect": n, "confused_with": [confused] if confused else []} for n in names]
+    remainder = [{"matters": matters}]
+    return {"verdict": verdict, "missing": names, "ranking": ranking, "remainder": remainder}
+
+
+@pytest.mark.parametrize(
+    ("case", "document", "mark"),
+    [
+        (NULL, answer("adequate"), "right"),
+        (NULL, answer("insufficient"), "right"),
+        (NULL, answer("missing", "cogging"), "wrong"),
+        (NULL, answer("unknown"), "unsure"),
+        (COGGING, answer("missing", "cogging"), "right"),
+        (COGGING, answer("missing", "unbalance", confused="cogging"), "right"),
+        (COGGING, answer("missing", "cogging", "windage"), "half"),
+        (COGGING, answer("missing", "windage"), "wrong"),
+        (COGGING, answer("unknown", "cogging"), "unsure"),
+        (COGGING, answer("adequate"), "silent"),
+        (COGGING, {"failure": "ValueError"}, "failed"),
+        (PAIR, answer("missing", "cogging"), "half"),
+        (PAIR, answer("missing", "windage", "cogging"), "right"),
+        (OUTSIDE, answer("unknown", "cogging"), "abstained right"),
+        (OUTSIDE, answer("adequate", matters=True), "abstained right"),
+        (OUTSIDE, answer("missing", "cogging"), "wrong"),
+        (OUTSIDE, answer("adequate"), "silent"),
+    ],
+)
+def test_what_an_answer_is_worth(case: WorldCase, document: dict[str, Any], mark: str) -> None:
+    assert marked(case, document) == mark
+
+
+def test_the_table_counts_marks_by_line_and_lists_what_is_not_right() -> None:
+    found = [(NULL, answer("adequate")), (COGGING, answer("missing", "windage"))]
+    text = table(found)
+    assert "| typical | 1 | 0 | 0 | 0 | 0 | 0 | 1 | 0 |" in text
+    assert "| all | 2 | 1 | 0 | 0 | 0 | 0 | 1 | 0 |" in text
+    assert "| laboratory | 1 | 1 cogging | wrong | missing | windage |" in text
+    assert text.count("| laboratory |") == 1
+
+
+def test_a_world_that_is_unknown_or_not_installed_is_a_wrong_usage(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(UsageError, match="no world"):
+        main(options(["world=mars", f"output={tmp_path}"]))
+    monkeypatch.setitem(sys.modules, "motulator.drive.model", None)
+    monkeypatch.delitem(sys.modules, "tests.benchmark.worlds.with_motulator", raising=False)
+    with pytest.raises(UsageError, match="needs motulator"):
+        main(options(["world=motulator", f"output={tmp_path}"]))
+
+
+@pytest.fixture(scope="module")
+def place() -> Any:
+    pytest.importorskip("motulator", reason="group worlds is not installed")
+    from tests.benchmark.worlds import with_motulator
+
+    return with_motulator
+
+
+def driven(place: Any, sizes: dict[str, float], omega: float, i_dq: complex, n: int = 250) -> Any:
+    """Motor and the means of the last 100 rows, by a dynamometer at a speed."""
+    motor, hidden = place.motor(3), place.Hidden(sizes)
+    session = Campaigner(place.Plant(motor, hidden), "laboratory", 5).sessions()["torque_map_0"]
+    lane = Lane(session, np.full(n, i_dq), np.zeros(n), omega, True, 0.3)
+    (rows,) = run(place.Converted([lane], [hidden]), [lane], 1.0 / PWM_HZ)
+    turn = np.exp(-1j * motor.pole_pairs * rows[:, 4])
+    current = (rows[:, 0] + 1j * rows[:, 1]) * turn / session.instruments.current
+    voltage = (rows[:, 2] + 1j * rows[:, 3]) * turn
+    return motor, current[-100:].mean(), voltage[-100:].mean(), rows[-100:, 6].mean()
+
+
+@pytest.mark.parametrize("omega", [60.0, -60.0])
+def test_a_machine_of_motulator_keeps_the_contract_of_frame_and_signs(
+    place: Any, omega: float
+) -> None:
+    motor, i, v, torque = driven(place, {}, omega, -1.5 + 3.0j)
+    assert i == pytest.approx(-1.5 + 3.0j, abs=0.02)
+    omega_e = motor.pole_pairs * omega
+    flux = motor.ld_h * i.real + motor.psi_pm_wb + 1j * motor.lq_h * i.imag
+    # the mean of a vector that stands while the rotor turns is a little shorter
+    short = np.sinc(omega_e / PWM_HZ / 2.0 / np.pi)
+    assert v * short == pytest.approx(motor.r_phase_ohm * i + 1j * omega_e * flux, rel=2e-3)
+    made = 1.5 * motor.pole_pairs * (np.conj(flux) * i).imag
+    drag = motor.torque_coulomb_nm * np.sign(omega) + motor.b_visc_nm_s_rad * omega
+    assert torque == pytest.approx(made - drag, rel=2e-3)
+
+
+def test_both_switches_off_cost_a_share_of_the_link_against_the_current(place: Any) -> None:
+    motor, i, v, _ = driven(place, {"dead_time": 2e-6}, 2.0, 5.0 + 0j, n=400)
+    lost = v.real - motor.r_phase_ohm * i.real
+    step = 2e-6 * PWM_HZ * motor.vdc_v
+    # each phase loses a step of the link against its current: 4/π in space, at most 4/3 in a sector
+    assert 1.1 * step < lost < 4.0 / 3.0 * step * 1.02
+
+
+def test_a_locked_rotor_answers_a_step_with_its_time_constant(place: Any) -> None:
+    motor = place.motor(3)
+    t = np.linspace(0.0, 0.05, 200)
+    along = place.Plant(motor, place.Hidden({})).locked(lambda _: 10.0, (), t, -np.pi / 2.0)
+    tau = motor.lq_h / motor.r_phase_ohm
+    assert along == pytest.approx(10.0 / motor.r_phase_ohm * -np.expm1(-t / tau), abs=1e-5)
+
+
+def test_open_terminals_show_the_magnet_in_the_order_abc(place: Any) -> None:
+    motor = place.motor(3)
+    theta = np.linspace(0.0, 0.5, 50)
+    v = place.Plant(motor, place.Hidden({})).emf(theta, np.full(50, 80.0))
+    eps = motor.pole_pairs * theta
+    height = -motor.pole_pairs * 80.0 * motor.psi_pm_wb
+    for k in range(3):
+        assert v[:, k] == pytest.approx(height * np.sin(eps - 2.0 * np.pi * k / 3.0), rel=1e-9)
+
+
+def test_a_coast_follows_coulomb_and_viscous_friction(place: Any) -> None:
+    motor = place.motor(3)
+    path = place.Plant(motor, place.Hidden({})).coast(0.3, 100.0, 100.0, 200)
+    t = np.arange(200) / 100.0
+    rate, end = motor.b_visc_nm_s_rad / motor.j_rotor_kgm2, motor.torque_coulomb_nm
+    end = end / motor.b_visc_nm_s_rad
+    assert path[:, 1] == pytest.approx((100.0 + end) * np.exp(-rate * t) - end, rel=1e-6)
+    steps = 0.005 * (path[1:, 1] + path[:-1, 1])
+    assert np.diff(path[:, 0]) == pytest.approx(steps, rel=1e-4)
+
+
+def test_current_follows_from_one_energy_when_iron_saturates(place: Any) -> None:
+    """Reciprocity: ∂i_d/∂ψ_q = ∂i_q/∂ψ_d."""
+    motor = place.motor(3)
+    sizes = place.Hidden({"saturation": 0.18, "cross_saturation": 0.1})
+    current = place._flux_to_current([motor], [sizes])
+    at, h = motor.psi_pm_wb - 0.1 + 0.2j, 1e-6
+    across = (current(np.array([at + 1j * h])) - current(np.array([at - 1j * h]))).real
+    along = (current(np.array([at + h])) - current(np.array([at - h]))).imag
+    assert across == pytest.approx(along, rel=1e-5)
+    full = current(np.array([motor.psi_pm_wb + 1j * motor.lq_h * motor.current_rated_a]))
+    assert full.imag == pytest.approx(1.18 * motor.current_rated_a)
+
+
+def test_a_programme_is_the_same_bytes_again_and_holds_the_contract(place: Any) -> None:
+    from tests.benchmark.worlds.recording import campaigns
+
+    case = WorldCase("motulator", "end of line", 2, {"windage": 1.0})
+    one, again = campaigns([case])[0], campaigns([case])[0]
+    assert [c.sha256 for c in one.captures] == [c.sha256 for c in again.captures]
+    assert [c.path for c in one.captures] == sorted(
+        f"{stem}.mcap" for stem, _, _ in PROGRAMMES["end of line"]
+    )
+    assert {c.meta.motor_type for c in one.captures} == {"unit"}
