@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.electrical.magnet_temperature import assumed_temperature, magnet_source
 from pipeline.estimation.electrical.terminals import bridged
 from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.instruments import (
     current_source,
-    temperature_source,
     torque_source,
 )
 from pipeline.estimation.uncertainty.instruments import voltage_source as source_of_voltage
@@ -78,7 +78,7 @@ class Point:
             vd_v=self.vd_v * voltage,
             vq_v=self.vq_v * voltage,
             torque_nm=self.torque_nm * torque,
-            temp_magnet_degc=self.temp_magnet_degc + shift.get(temperature_source(meta), 0.0),
+            temp_magnet_degc=self.temp_magnet_degc + shift.get(magnet_source(self.capture), 0.0),
         )
 
 
@@ -161,13 +161,6 @@ def _alike(point: Point, first: Point) -> bool:
         return point.standing and first.standing and bool(near)
     speed = first.omega_mech_rad_s
     return abs(point.omega_mech_rad_s - speed) <= policy().points.same_speed * abs(speed)
-
-
-def magnet_temperature(capture: Capture) -> tuple[float, str]:
-    """Where no magnet temperature was logged: the ambient one, or 25 degC, and a note."""
-    if capture.meta.ambient_degc is not None:
-        return capture.meta.ambient_degc, "magnet taken at ambient temperature"
-    return 25.0, "magnet temperature unknown, taken as 25 degC"
 
 
 def pole_pairs_of(known: Constants, nameplate: object) -> int | None:
@@ -273,7 +266,7 @@ def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
     u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}
     if not np.isfinite(means["temp_magnet_degc"]):
-        means["temp_magnet_degc"] = magnet_temperature(capture)[0]
+        means["temp_magnet_degc"] = assumed_temperature(capture)
     return Point(
         group=0,
         rows=t.size,

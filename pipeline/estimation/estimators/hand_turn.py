@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.back_emf import read_spin
 from pipeline.estimation.electrical.hand_turns import Turn, turns_of
-from pipeline.estimation.electrical.terminals import first_temperature
+from pipeline.estimation.electrical.magnet_temperature import (
+    assumed_temperature,
+    magnet_column,
+    magnet_source,
+    magnet_uncertainties,
+    unlogged_note,
+)
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.protocol import Estimator, Fit
@@ -104,16 +110,14 @@ def _flux(
     values, weights, excesses = [], [], []
     notes = []
     for capture, turn in turns:
-        column = first_temperature(capture, "magnet", "winding", "case")
-        ambient = capture.meta.ambient_degc
-        temp = options["temp_assumed_degc"] if ambient is None else ambient
+        column = magnet_column(capture)
+        temp = assumed_temperature(capture, options["temp_assumed_degc"])
         if column is not None:
             temp = float(np.nanmean(capture.arrays(column)[column]))
         excesses.append(temp - 25.0)
         values.append(turn.psi_wb / (1.0 + alpha * (temp - 25.0)))
         weights.append(1.0 / max(turn.u_psi_wb, 1e-12) ** 2)
-    if all(first_temperature(c, "magnet") is None for c in captures):
-        notes.append("magnets taken at ambient, no temp_magnet_degc")
+    notes.append(unlogged_note(captures))
     share = np.array(weights) / np.sum(weights)
     value = float(share @ np.array(values))
     own = tuple(
@@ -132,8 +136,9 @@ def _flux(
     for source, gain in instrument_uncertainties(captures, ("voltage",)).items():
         mine = [voltage_source(c.meta) == source for c, _ in turns]
         parts.append(Contribution(source, value * gain * float(share[mine].sum()), "B"))
-    for source, offset in instrument_uncertainties(captures, ("temperature",)).items():
-        parts.append(Contribution(source, -value * alpha * offset, "B"))
+    for source, offset in magnet_uncertainties(captures).items():
+        mine = [magnet_source(c) == source for c, _ in turns]
+        parts.append(Contribution(source, -value * alpha * offset * float(share[mine].sum()), "B"))
     notes.append(unstated_note(captures, ("voltage", "temperature")))
     at = {"temp_magnet_degc": 25.0, "temp_measured_degc": round(excess + 25.0, 2)}
     return METHOD.measured("psi_pm_wb", value, parts, captures, at, notes)

@@ -75,7 +75,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
     table = operating_points(captures, pairs)
     points = [
-        p for p in table.points if np.isfinite(p.vd_v) and np.isfinite(p.vq_v) and not p.standing
+        p
+        for p in table.points
+        if np.isfinite([p.vd_v, p.vq_v, p.omega_mech_rad_s]).all() and not p.standing
     ]
     if pairs is None or not points:
         why = "pole pairs unknown" if points else "no settled points with voltages at speed"

@@ -8,6 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.electrical.magnet_temperature import (
+    magnet_source,
+    magnet_uncertainties,
+)
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
@@ -28,7 +32,6 @@ from pipeline.estimation.uncertainty.instruments import (
     contributions,
     current_source,
     instrument_uncertainties,
-    temperature_source,
     torque_source,
     unstated_note,
 )
@@ -68,9 +71,16 @@ NUISANCES = (
 )  # fmt: skip
 
 
+RELUCTANCE = "d q current"
+"""What reluctance adds to the torque, where nothing tells how much."""
+
+
 @dataclass(frozen=True, slots=True)
 class Torque:
-    """What turns currents into torque, and whose uncertainty the inertia inherits."""
+    """What turns currents into torque, and whose uncertainty the inertia inherits.
+
+    Where `reluctance_known` is false the drives' own rows say what it adds.
+    """
 
     kt_nm_a: float
     kt_budget: Budget
@@ -79,6 +89,7 @@ class Torque:
     magnet_1_k: float
     magnet_budget: Budget
     words: str
+    reluctance_known: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +173,7 @@ def driving_torque(rows: ShaftRows, torque: Torque, shift: Mapping[str, float]) 
     metas = [capture.meta for capture in rows.captures]
     current = np.array([1.0 + shift.get(current_source(m), 0.0) for m in metas])[rows.capture]
     load = np.array([1.0 + shift.get(torque_source(m), 0.0) for m in metas])[rows.capture]
-    warmer = np.array([shift.get(temperature_source(m), 0.0) for m in metas])[rows.capture]
+    warmer = np.array([shift.get(magnet_source(c), 0.0) for c in rows.captures])[rows.capture]
     kt = torque.kt_nm_a * (1.0 + shift.get("kt", 0.0))
     reluctance = torque.reluctance_nm_a2 + shift.get("reluctance", 0.0)
     magnet = torque.magnet_1_k + shift.get("magnet", 0.0)
@@ -189,6 +200,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         note = f"{missing}; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
+    nuisances += [] if torque.reluctance_known else [RELUCTANCE]
     y, driving = rows.acceleration_rad_s2, driving_torque(rows, torque, {})
     if float(np.ptp(driving)) == 0.0:
         note = f"the drive log holds no torque; {EXPERIMENT}"
@@ -279,7 +291,8 @@ def _torque(known: Constants) -> Torque | None:
         budget = propagate([(scale, ld.budget), (-scale, lq.budget)])
         value = scale * (ld.number - lq.number)
         return Torque(kt.number, kt.budget, value, budget, *magnet, words)
-    return Torque(kt.number, kt.budget, 0.0, (), *magnet, f"{words}, reluctance torque unknown")
+    words += ", reluctance torque unknown"
+    return Torque(kt.number, kt.budget, 0.0, (), *magnet, words, reluctance_known=False)
 
 
 def _orders(known: Constants, campaign: Campaign) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -298,7 +311,8 @@ def _estimates(
     def values(shift: Mapping[str, float]) -> Array:
         return found.constants(found.refit(driving_torque(rows, torque, shift)))
 
-    gains = instrument_uncertainties(rows.captures, ("current", "torque", "temperature"))
+    gains = instrument_uncertainties(rows.captures, ("current", "torque"))
+    gains |= magnet_uncertainties(c for c in rows.captures if c.meta.test == "drive")
     type_b = contributions(values, gains)
     per_kt, per_rel, per_alpha = _slopes(values, torque)
     constants, scatter = found.constants(found.coefficients), found.scatter()
@@ -318,6 +332,7 @@ def _estimates(
         ]
         parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), logged)
+        parts += _of_a_speed(rows, float(constants[i]))
         budget = propagate(
             [
                 (1.0, (*parts, *type_b[i])),
@@ -328,6 +343,14 @@ def _estimates(
         )
         estimates.append(METHOD.measured(name, float(constants[i]), budget, paths, at, note))
     return tuple(estimates)
+
+
+def _of_a_speed(rows: ShaftRows, value: float) -> list[Contribution]:
+    """What a bench's own speed, lagging or smoothed, may make of J, T_c or B without an angle."""
+    drives = [c for c in rows.captures if c.meta.test == "drive"]
+    if all(c.has("theta_mech_rad") for c in drives):
+        return []
+    return [Contribution("assumed:speed_estimate", policy().drag.speed_share * value, "B")]
 
 
 def _slopes(
@@ -346,6 +369,8 @@ def _words(rows: ShaftRows, torque: Torque, found: DragFit) -> list[str]:
     words = [torque.words, drag_words(found)]
     words.append("what iron loss there is under the magnet's flux counts as drag")
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
+    if _of_a_speed(rows, 1.0):
+        words.append("motion by the bench's own speed, which may lag or be smoothed")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")
     unstated = unstated_note(rows.captures, ("current", "torque"))

@@ -13,15 +13,20 @@ from pipeline.estimation.electrical.back_emf import (
     read_spin,
     steady_stretches,
 )
+from pipeline.estimation.electrical.magnet_temperature import (
+    assumed_temperature,
+    magnet_column,
+    magnet_source,
+    magnet_uncertainties,
+    unlogged_note,
+)
 from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
-from pipeline.estimation.electrical.terminals import first_temperature
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import DEFAULT, policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.thermal.magnet_coefficient import SOURCE
 from pipeline.estimation.uncertainty.instruments import (
     instrument_uncertainties,
-    temperature_source,
     unstated_note,
     voltage_source,
 )
@@ -110,7 +115,7 @@ def fit_open_circuit(campaign: Campaign, known: Constants, options: Mapping[str,
         return METHOD.nothing(GIVES, "; ".join([*notes, EXPERIMENT]))
     used = tuple(c for c in captures if any(g.capture is c for g in groups))
     notes.append(unstated_note(used, ("voltage", "temperature")))
-    found = _flux_estimates(groups, used, notes, options)
+    found = _flux_estimates(_of_known_temperature(groups), notes, options)
     pairs, order = count_pole_pairs(METHOD, groups)
     found["pole_pairs"] = pairs
     found["phase_order"] = order
@@ -126,12 +131,8 @@ def _groups(
     groups: list[Group] = []
     notes: list[str] = []
     for capture in captures:
-        column = first_temperature(capture, "magnet", "winding", "case")
-        if column != "temp_magnet_degc":
-            other = column or "ambient_degc"
-            notes.append(f"{capture.path}: magnets taken at {other}, no temp_magnet_degc")
-        ambient = capture.meta.ambient_degc
-        fallback = options["temp_assumed_degc"] if ambient is None else ambient
+        column = magnet_column(capture)
+        fallback = assumed_temperature(capture, options["temp_assumed_degc"])
         try:
             spin = read_spin(capture, column)
             stretches = steady_stretches(spin, options["speed_change"])
@@ -148,12 +149,19 @@ def _groups(
     return groups, notes
 
 
+def _of_known_temperature(groups: Sequence[Group]) -> list[Group]:
+    """The groups of captures with a thermometer at the magnets; all where there is none."""
+    logged = [g for g in groups if magnet_column(g.capture) == "temp_magnet_degc"]
+    return logged or list(groups)
+
+
 def _flux_estimates(
     groups: Sequence[Group],
-    used: Sequence[Capture],
     notes: Sequence[str],
     options: Mapping[str, float],
 ) -> dict[str, Estimate]:
+    used = tuple({g.capture.path: g.capture for g in groups}.values())
+    logged = all(magnet_column(c) == "temp_magnet_degc" for c in used)
     psi = np.array([g.flux.psi_wb for g in groups])
     sigma = np.array([max(g.flux.u_psi_wb, 1e-9 * g.flux.psi_wb) for g in groups])
     design = flux_linkage(np.array([g.temp_degc for g in groups]))
@@ -161,7 +169,7 @@ def _flux_estimates(
     free = linear_fit(design, psi, sigma)
     alpha, u_alpha = _slope(free)
     wide = float(np.ptp(excess)) >= options["least_span_k"] and free.full_rank
-    measured = wide and u_alpha <= options["worst_u_alpha_1_k"]
+    measured = logged and wide and u_alpha <= options["worst_u_alpha_1_k"]
     shared = _instrument_shares(groups, used)
     at = {
         "temp_magnet_degc": 25.0,
@@ -171,7 +179,7 @@ def _flux_estimates(
         "speed_elec_high_rad_s": max(abs(g.flux.speed_elec_rad_s) for g in groups),
     }
     extra: list[Contribution] = []
-    words = [*notes]
+    words = [*notes, unlogged_note(used)]
     if measured:
         value, chosen = float(free.coefficients[0]), free
     else:
@@ -226,10 +234,12 @@ def _instrument_shares(
     weights = np.array([1.0 / max(g.flux.u_psi_wb, 1e-300) ** 2 for g in groups])
     weights = weights / weights.sum()
     shares: dict[str, list[tuple[str, float]]] = {"voltage": [], "temperature": []}
-    for kind, source_of in (("voltage", voltage_source), ("temperature", temperature_source)):
-        for source, u in instrument_uncertainties(used, (kind,)).items():
-            own = [source_of(g.capture.meta) == source for g in groups]
-            shares[kind].append((source, u * float(weights[own].sum())))
+    for source, u in instrument_uncertainties(used, ("voltage",)).items():
+        own = [voltage_source(g.capture.meta) == source for g in groups]
+        shares["voltage"].append((source, u * float(weights[own].sum())))
+    for source, u in magnet_uncertainties(used).items():
+        own = [magnet_source(g.capture) == source for g in groups]
+        shares["temperature"].append((source, u * float(weights[own].sum())))
     return shares
 
 

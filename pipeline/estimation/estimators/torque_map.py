@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from pipeline.estimation.electrical.magnet_temperature import (
+    magnet_uncertainties,
+    unlogged_note,
+)
 from pipeline.estimation.electrical.operating_points import (
     Point,
     PointTable,
@@ -206,7 +210,8 @@ def _estimates(
     alpha_parts: Budget,
     still: Budget,
 ) -> tuple[Estimate, ...]:
-    gains = instrument_uncertainties(captures, ("current", "torque", "temperature"))
+    used = {p.capture.path: p.capture for p in points}.values()
+    gains = instrument_uncertainties(used, ("current", "torque")) | magnet_uncertainties(used)
 
     def values(shift: Mapping[str, float]) -> Array:
         shifted = [p.shifted(shift) for p in points]
@@ -219,6 +224,9 @@ def _estimates(
     slope = float((values({SOURCE: 1e-4}) - values({}))[0]) / 1e-4
     type_b[0] += propagate([(slope, alpha_parts)])
     type_b[0] += [Contribution("assumed:torque_form", slope_k.form_nm_a, "B"), *still]
+    if not _d_logged(points):
+        share = policy().torque_map.unlogged_d_share
+        type_b[0].append(Contribution("assumed:id_a", share * slope_k.kt_nm_a, "B"))
     note = _note(captures, table, points, chosen)
     paths = sorted({p.capture.path for p in points})
     at = {"temp_magnet_degc": 25.0, "iq_a": float(np.max(np.abs(_column(points, "iq_a"))))}
@@ -302,6 +310,10 @@ def _untested_form(
     return (Contribution("assumed:drag_form", float(u), "B"),)
 
 
+def _d_logged(points: Sequence[Point]) -> bool:
+    return all(p.capture.has("id_a") for p in points)
+
+
 def _reluctance(model: Regression) -> float:
     return model.of("id iq")
 
@@ -343,12 +355,13 @@ def _note(
     chosen: Sequence[str],
 ) -> str:
     words = [table.note()]
+    if not _d_logged(points):
+        words.append("id_a not logged: the reluctance torque of a d current would be in it")
     if still := standstill_words(points, table.points):
         words.append(still)
     if chosen:
         words.append(allowed_for(chosen))
-    if not any(c.has("temp_magnet_degc") for c in captures):
-        words.append("magnet temperature not logged, taken as ambient or 25 degC")
+    words += [unlogged] if (unlogged := unlogged_note(captures)) else []
     if np.unique(np.sign(_column(points, "iq_a").round(6))).size < 2:
         words.append("one sign of q current only")
     unstated = unstated_note(captures, ("current", "torque"))

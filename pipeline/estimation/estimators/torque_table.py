@@ -8,6 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.electrical.magnet_temperature import (
+    assumed_temperature,
+    magnet_source,
+    magnet_uncertainties,
+    unlogged_note,
+)
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
 from pipeline.estimation.mechanical.locked_rotor import HARMONICS, RIPPLES, SOURCE, ripple_share
 from pipeline.estimation.method import Method, over_x
@@ -114,6 +120,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     ]
     sags = "; sags with current" if {"iq^3", "iq^5"} & set(chosen) else ""
     notes = [f"slope at small current{sags}", unstated_note(captures, ("current", "torque"))]
+    notes.append(unlogged_note(captures))
     at = {"iq_a": float(np.max(np.abs(rows.iq_a)))}
     estimate = METHOD.measured(GIVES[0], kt, parts, captures, at, notes)
     return Fit((estimate,), _evidence(captures, rows, rows.torque_nm - found.residuals))
@@ -166,7 +173,8 @@ def _table(capture: Capture) -> dict[str, Array]:
     names = ("iq_a", "torque_shaft_nm", "id_a", "temp_magnet_degc", "theta_mech_rad")
     data = capture.arrays(*(name for name in names if capture.has(name)))
     fine = np.isfinite(data["iq_a"]) & np.isfinite(data["torque_shaft_nm"])
-    usual = {"id_a": 0.0, "temp_magnet_degc": REFERENCE_DEGC, "theta_mech_rad": np.nan}
+    warm = assumed_temperature(capture, REFERENCE_DEGC)
+    usual = {"id_a": 0.0, "temp_magnet_degc": warm, "theta_mech_rad": np.nan}
     data = {n: data.get(n, np.full(fine.size, usual.get(n, np.nan)))[fine] for n in names}
     return {
         "iq_a": data["iq_a"],
@@ -186,19 +194,25 @@ def _solve(rows: _Rows, alpha_1_k: float, chosen: Sequence[str]) -> LinearFit:
 def _instruments(
     rows: _Rows, captures: Sequence[Capture], alpha_1_k: float, chosen: Sequence[str]
 ) -> list[Contribution]:
-    """What the gains of clamp and transducer do to Kt, by refitting with each shifted."""
+    """What clamp, transducer and thermometer do to Kt, by refitting with each shifted."""
 
     def kt(shift: Mapping[str, float]) -> Array:
         amps, force = (
             np.array([1.0 + shift.get(source(c.meta), 0.0) for c in captures])[rows.table]
             for source in (current_source, torque_source)
         )
+        warmer = np.array([shift.get(magnet_source(c), 0.0) for c in captures])[rows.table]
         moved = replace(
-            rows, iq_a=amps * rows.iq_a, id_a=amps * rows.id_a, torque_nm=force * rows.torque_nm
+            rows,
+            iq_a=amps * rows.iq_a,
+            id_a=amps * rows.id_a,
+            torque_nm=force * rows.torque_nm,
+            excess_k=rows.excess_k + warmer,
         )
         return _solve(moved, alpha_1_k, chosen).coefficients[1:2]
 
-    return contributions(kt, instrument_uncertainties(captures, ("current", "torque")))[0]
+    gains = instrument_uncertainties(captures, ("current", "torque"))
+    return contributions(kt, gains | magnet_uncertainties(captures))[0]
 
 
 def _evidence(captures: Sequence[Capture], rows: _Rows, fitted_nm: Array) -> tuple[Evidence, ...]:

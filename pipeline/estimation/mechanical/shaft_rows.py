@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.estimation.electrical.operating_points import magnet_temperature
+from pipeline.estimation.electrical.magnet_temperature import assumed_temperature
 from pipeline.estimation.policy import policy
 from pipeline.numerics.coasting import coasting_rows
 from pipeline.numerics.integrals import trapezoid
@@ -149,7 +149,7 @@ def _part(capture: Capture) -> _Part | None:
     zero = np.zeros(data["t_s"].size)
     data = {name: data.get(name, zero) for name in (*wanted, *optional)}
     if kind == DRIVE and not capture.has("temp_magnet_degc"):
-        data["temp_magnet_degc"] = zero + magnet_temperature(capture)[0]
+        data["temp_magnet_degc"] = zero + assumed_temperature(capture)
     fine = np.all([np.isfinite(column) for column in data.values()], axis=0)
     data = {name: column[fine] for name, column in data.items()}
     t, theta = data["t_s"], data[angle]
@@ -259,6 +259,7 @@ def _nuisances(part: _Part) -> dict[str, Array]:
         "offset": np.full(weak.count, driven),
         "load friction": weak.integral(torque),
         "d current": weak.integral(part.direct),
+        "d q current": weak.integral(part.direct * part.current),
         "d current cos": weak.integral(part.direct * turning.real),
         "d current sin": weak.integral(part.direct * turning.imag),
         "q current cubed": weak.integral(part.current**3),

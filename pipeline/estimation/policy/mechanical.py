@@ -78,6 +78,11 @@ class Drag:
         on="loads of a third of rated torque, which left 0.38 to 0.6 in drives of three motors; "
         "none, on a real bench, 0.006. It is twice what a transducer of unstated gain leaves open",
     )  # fmt: skip
+    speed_share: float = chosen(
+        0.02, unit="1", meaning="relative standard uncertainty of J, T_c and B where a bench's own "
+        "speed is all that tells of the motion",
+        why="what smooths or delays a speed does so to the acceleration, and does not say how much",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +114,12 @@ class TorqueMap:
     untested_form_share: float = chosen(
         0.1, unit="1", meaning="of the drag at the slowest speed that may have another form",
         why="Stribeck's, iron's or windage, where no speed is left over to test it",
+    )  # fmt: skip
+    unlogged_d_share: float = chosen(
+        0.02, unit="1", meaning="relative standard uncertainty of Kt where the d current was not "
+        "logged",
+        why="a third of the current along d, where its field is a fifth of the magnet's and the "
+        "axes' inductances differ by a third",
     )  # fmt: skip
     level: float = derived(
         0.01, unit="1", meaning="chance of offsets to count as beyond their scatter",

@@ -150,6 +150,11 @@ class Magnet:
         source="SmCo loses less than half of what NdFeB does, ferrite 0.2 %",
     )  # fmt: skip
     unlogged_k: float = chosen(
-        15.0, unit="K", meaning="standard uncertainty of a temperature that a drive did not log",
-        why="most logs lie within twice that of 25 degC",
+        20.0, unit="K", meaning="standard uncertainty of a temperature that was not logged",
+        why="most motors on a bench lie within twice that of their surroundings",
+    )  # fmt: skip
+    elsewhere_k: float = chosen(
+        5.0, unit="K", meaning="standard uncertainty of the magnets' temperature by winding or "
+        "case, without current",
+        why="what is in one housing comes within twice that in some minutes",
     )  # fmt: skip

@@ -1,0 +1,80 @@
+"""The temperature of the magnets: by their thermometer, else by what is near them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pipeline.estimation.electrical.terminals import first_temperature
+from pipeline.estimation.policy import policy
+from pipeline.estimation.uncertainty.instruments import (
+    instrument_uncertainties,
+    temperature_source,
+)
+from pipeline.records.capture import Capture
+
+UNLOGGED = "assumed:temp_magnet_degc"
+NEAR = ("winding", "case")
+"""Places that are about as warm as the magnets while no current flows."""
+UNPOWERED = ("open_circuit", "hand_turn")
+
+
+def magnet_column(capture: Capture) -> str | None:
+    """The column that tells the magnets' temperature; without current also one near them."""
+    near = NEAR if capture.meta.test in UNPOWERED else ()
+    return first_temperature(capture, "magnet", *near)
+
+
+def assumed_temperature(capture: Capture, otherwise_degc: float = 25.0) -> float:
+    """Where nothing tells the magnets' temperature: the ambient one, else `otherwise_degc`."""
+    ambient = capture.meta.ambient_degc
+    return otherwise_degc if ambient is None else ambient
+
+
+def magnet_source(capture: Capture) -> str:
+    """The source of the error of the magnets' temperature.
+
+    What stands in for a thermometer is one error in all captures of a test: they were recorded one
+    after the other.
+    """
+    column = magnet_column(capture)
+    if column == "temp_magnet_degc":
+        return temperature_source(capture.meta)
+    return f"{UNLOGGED}:{capture.meta.test}:{column or 'ambient'}"
+
+
+def magnet_uncertainties(captures: Iterable[Capture]) -> dict[str, float]:
+    """Standard uncertainty [K] of each source of `magnet_source`, sorted.
+
+    Parameters
+    ----------
+    captures
+        That a fit rests on.
+
+    Returns
+    -------
+    dict of float
+        By source: of thermometers what captures state, of what stands in for one the policy's.
+
+    """
+    captures = tuple(captures)
+    logged = [c for c in captures if magnet_column(c) == "temp_magnet_degc"]
+    found = instrument_uncertainties(logged, ("temperature",))
+    for capture in captures:
+        column = magnet_column(capture)
+        if column != "temp_magnet_degc":
+            magnet = policy().magnet
+            found[magnet_source(capture)] = magnet.elsewhere_k if column else magnet.unlogged_k
+    return dict(sorted(found.items()))
+
+
+def unlogged_note(captures: Iterable[Capture]) -> str:
+    """Where the magnets' temperature is assumed, in words, or an empty string."""
+    found = {}
+    for capture in captures:
+        column = magnet_column(capture)
+        if column != "temp_magnet_degc":
+            size = policy().magnet.elsewhere_k if column else policy().magnet.unlogged_k
+            found[column or "ambient"] = f"{column or 'ambient temperature'} ± {size:g} K"
+    if not found:
+        return ""
+    return f"temp_magnet_degc not logged, magnets taken at {', '.join(found.values())}"
