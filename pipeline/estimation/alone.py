@@ -51,7 +51,19 @@ TEMPERATURES = ("temp_magnet_degc", "temp_winding_degc")
 
 
 def repeated(campaign: Campaign) -> tuple[Capture, ...]:
-    """The captures that another one of the campaign measures alike."""
+    """The captures that another one of the campaign measures alike.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+
+    Returns
+    -------
+    tuple of Capture
+        In order of the campaign.
+
+    """
     ways = {capture.path: _way(capture) for capture in campaign.captures}
     counts = Counter(ways.values())
     return tuple(c for c in campaign.captures if counts[ways[c.path]] > 1)

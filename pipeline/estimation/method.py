@@ -41,7 +41,23 @@ class Method:
         return (own or CONSTANTS[constant]).unit
 
     def scatter(self, of: str, u: float, dof: float = math.inf) -> Contribution:
-        """The scatter of something that this method fits [its unit], type A."""
+        """The scatter of something that this method fits.
+
+        Parameters
+        ----------
+        of
+            What.
+        u
+            Its standard uncertainty [its unit].
+        dof
+            Degrees of freedom.
+
+        Returns
+        -------
+        Contribution
+            Of type A, from a source that no other fit shares.
+
+        """
         return Contribution(f"scatter:{self.name}:{of}", u, "A", dof)
 
     def measured(
@@ -102,7 +118,28 @@ class Method:
         caption: str = "",
         capture: str | None = None,
     ) -> Evidence:
-        """A plot of what this method looked at; `axes` are the glossary names of x and y."""
+        """A plot of what this method looked at.
+
+        Parameters
+        ----------
+        title
+            Of the plot.
+        axes
+            Glossary names of x and y.
+        kind
+            Line, scatter, ...
+        series
+            What is drawn.
+        caption
+            Below the plot.
+        capture
+            Path of the capture that it is of, where it is of one.
+
+        Returns
+        -------
+        Evidence
+
+        """
         return Evidence(self.name, title, *axes, kind, tuple(series), capture, caption)
 
     def traces(

@@ -71,22 +71,28 @@ def fit_all(
 ) -> tuple[Constants, tuple[Evidence, ...], tuple[Failure, ...]]:
     """Runs every estimator on one motor's campaign, or recalls what it gave before.
 
-    An estimator sees those constants alone that it declares to use. Stated constants come after
-    all that is measured: they serve where nothing else is known.
-
-    `options` are by estimator; those of `policy` are numbers of judgement, by section.
-
-    Returns all estimates in order of preference (rank, then dependency order), the evidence, and
-    the estimators that broke on this data: their constants are then not_identifiable.
-
     Parameters
     ----------
     campaign
         All captures of one motor.
     options
-        By estimator, and `policy` by section.
+        By estimator; those of `policy` are numbers of judgement, by section.
     recall
         Gives a fit that was cached; None fits anew.
+
+    Returns
+    -------
+    constants
+        All estimates in order of preference (rank, then dependency order).
+    evidence
+        Of all fits.
+    failures
+        Estimators that broke on this data: their constants are then not_identifiable.
+
+    Notes
+    -----
+    An estimator sees those constants alone that it declares to use. Stated constants come after all
+    that is measured: they serve where nothing else is known.
 
     """
     with under(changed(options)) as changes:

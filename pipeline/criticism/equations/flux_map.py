@@ -73,8 +73,16 @@ def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """Both flux linkages [2, n, Wb]: ψ = ∂W/∂i. They are integrals of a voltage, so that the
-    voltmeter's gain is in them.
+    """Both flux linkages [2, n, Wb].
+
+    Notes
+    -----
+    ψ = ∂W/∂i. They are integrals of a voltage, so that the voltmeter's gain is in them.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (tests of permanent magnet machines).
+
     """
     psi = recorded_voltage(pieces.psi_wb, segment, x, model, values)
     return np.stack([psi.real, psi.imag])

@@ -24,8 +24,13 @@ _PROBE = 1e-3
 
 
 def cut(capture: Capture, _: Machine) -> Segment | None:
-    """A table over the angle. Its noise is the scatter about a mean and two waves a turn, but never
-    less than the rounding of its last digit, or a ten-thousandth of the largest reading.
+    """A table over the angle.
+
+    Notes
+    -----
+    Its noise is the scatter about a mean and two waves a turn, but never less than the rounding of
+    its last digit, or a ten-thousandth of the largest reading.
+
     """
     names = ["theta_elec_deg", "lab_h"] + [n for n in ("rab_ohm", "freq_hz") if capture.has(n)]
     found = capture.arrays(*names)

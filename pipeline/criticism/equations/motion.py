@@ -77,7 +77,13 @@ def measured(segment: Segment, _: Mapping[str, Array], __: Model, ___: Values) -
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """Acceleration that current and drags leave unexplained [1, n, rad/s²]: T/J − d²θ/dt²."""
+    """Acceleration that current and drags leave unexplained [1, n, rad/s²].
+
+    Notes
+    -----
+    (1.5 p [Im(ψ* i) + ∂W/∂ε] − drags)/J − d²θ/dt², of a shaft without any load.
+
+    """
     stretch = 1.0 + clock_gain(RECORDER, model, values)
     return unexplained_acceleration(segment, x, net_torque(x, pieces), values, stretch)[None]
 

@@ -98,7 +98,17 @@ def measured(_: Segment, signals: Mapping[str, Array], model: Model, values: Val
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """Voltages v_d, v_q [2, n, V] of a winding without current: v = dψ/dt + j ω_e ψ."""
+    """Voltages v_d, v_q [2, n, V] of a winding without current.
+
+    Notes
+    -----
+    v = dψ/dt + j ω_e ψ, over what the recorded voltage samples stand for.
+
+    References
+    ----------
+    IEEE Std 1812-2014 (tests of permanent magnet machines: open circuit).
+
+    """
     period = segment.ts_s
     omega = x.once(x.theta_rad, "pace", lambda: central(x.machine.pole_pairs * x.theta_rad, period))
     voltage = rotor_voltage(pieces, omega, period)

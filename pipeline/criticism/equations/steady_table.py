@@ -84,7 +84,14 @@ def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """The q voltage [1, n, V]: Im(R i + drops + j ω_e ψ)."""
+    """The q voltage [1, n, V].
+
+    Notes
+    -----
+    v_q = Im(R i + drops + j ω_e ψ), with dψ/dt = 0; ω_e L_d i_d is the part that levels of d
+    current show.
+
+    """
     steady = pieces.drop_v + 1j * x.machine.pole_pairs * x.omega_rad_s * pieces.psi_wb
     return recorded_voltage(steady, segment, x, model, values).imag[None]
 

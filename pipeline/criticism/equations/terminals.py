@@ -77,7 +77,13 @@ def _settled(weak: Projection, amps: Array, noise: float) -> Projection:
 def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True current [n] of a rotor at rest: i = (2/√3) i_pair e^{j(pair − 30° − ε)}."""
+    """True current [n] of a rotor at rest.
+
+    Notes
+    -----
+    i = (2/√3) i_pair e^{j(pair − 30° − ε)}: a current through two terminals, the third without.
+
+    """
     n = signals["i_pair_a"].size
     zero, eps = np.zeros(n), np.full(n, segment.fixed.get("theta_elec_rad", 0.0))
     stationary = (
@@ -100,7 +106,14 @@ def measured(_: Segment, signals: Mapping[str, Array], __: Model, ___: Values) -
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """The pair's voltage [1, n, V]: √3 Re[(drop + dψ/dt) e^{j(ε + 30° − pair)}]."""
+    """The pair's voltage [1, n, V].
+
+    Notes
+    -----
+    √3 Re[(R i + drops + dψ/dt) e^{j(ε + 30° − pair)}], the rotor at rest; `pair` is where the
+    pair's line voltage stands beside that of ab.
+
+    """
     frame = x.once(x.eps_rad, "turn", lambda: np.exp(1j * x.eps_rad))
     stationary = (pieces.drop_v + central(pieces.psi_wb, segment.ts_s)) * frame
     stationary = recorded_voltage(stationary, segment, x, model, values)

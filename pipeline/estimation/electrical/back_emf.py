@@ -50,10 +50,23 @@ class Spin:
     temp_degc: Array | None
 
     def vector_v(self, centred: bool = True) -> Complex:
-        """The space vector [n], phase to star point, least squares over the channels.
+        """The space vector of the voltages, by least squares over the channels.
 
-        With `centred` each channel's mean is taken off, which whole turns make its offset.
-        Raises ValueError with fewer than two independent channels.
+        Parameters
+        ----------
+        centred
+            Whether each channel's mean is taken off, which whole turns make its offset.
+
+        Returns
+        -------
+        array [n, V], complex
+            Phase to star point.
+
+        Raises
+        ------
+        ValueError
+            There are fewer than two independent channels.
+
         """
         rows = np.array([c.gain * np.exp(1j * c.angle_rad) for c in self.channels])
         design = np.column_stack([rows.real, rows.imag])
@@ -67,9 +80,7 @@ class Spin:
 
 
 def read_spin(capture: Capture, temp_column: str | None) -> Spin:
-    """The voltages of a capture, line to line where there, else phase; rows with NaN left out.
-
-    Raises KeyError where no voltage is there.
+    """The voltages of a capture: line to line where two are there, else phase.
 
     Parameters
     ----------
@@ -78,10 +89,15 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
     temp_column
         The temperature that the magnets are taken at, None where none was logged.
 
+    Returns
+    -------
+    Spin
+        On the clock of the voltages, rows with NaN left out; a temperature with gaps is bridged.
+
     Raises
     ------
     KeyError
-        Where no terminal voltage is there.
+        No terminal voltage is there.
 
     """
     lines = {f"v{p}_v": (math.sqrt(3.0), PAIR_AXES_RAD[p]) for p in PAIRS}

@@ -66,7 +66,20 @@ class Point:
         return float(np.arctan2(self.sin_turn, self.cos_turn)) if known else float("nan")
 
     def shifted(self, shift: Mapping[str, float]) -> Point:
-        """This point as it was if each instrument were off by `shift` (gains relative, K)."""
+        """This point as it was if each instrument were off.
+
+        Parameters
+        ----------
+        shift
+            By source: gains of current, voltage and torque [1, relative], temperature [K]; what is
+            not named is right.
+
+        Returns
+        -------
+        Point
+            Standard errors stay as they are.
+
+        """
         meta = self.capture.meta
         current = 1.0 + shift.get(current_source(meta), 0.0)
         voltage = 1.0 + shift.get(source_of_voltage(meta), 0.0)

@@ -133,8 +133,23 @@ def rotor_angles(name: str, solution: Solution, u_theta_rad: float) -> list[Cont
 def rounded_levels(name: str, solution: Solution) -> float:
     """Standard uncertainty by the rounding of a voltage that drives the model as it was sampled.
 
-    What rounding leaves in the mean of a level, one error between two of the edges that move;
-    where the voltage is a supply's, its samples' weights hold it already.
+    Parameters
+    ----------
+    name
+        Of the inductance, `ld_h` or `lq_h`.
+    solution
+        The fit of all captures.
+
+    Returns
+    -------
+    float
+        [H]; 0 where every voltage is a supply's, whose samples' weights hold it already.
+
+    Notes
+    -----
+    What rounding leaves in the mean of a level, one error between two of the edges that move, added
+    in squares.
+
     """
     model = solution.model
     lever, now = _lever(name, solution), _weighted(solution, model)
@@ -155,7 +170,19 @@ def rounded_levels(name: str, solution: Solution) -> float:
 
 
 def unexplained(solution: Solution) -> dict[str, float]:
-    """Of each capture what the fit leaves of its current, rms over the span, without its noise."""
+    """What the fit leaves of each capture's current beyond its noise.
+
+    Parameters
+    ----------
+    solution
+        The fit of all captures.
+
+    Returns
+    -------
+    dict
+        Root mean square over the span of the current [1], by path.
+
+    """
     found, first = {}, 0
     for record, weight in zip(solution.model.records, solution.weights, strict=True):
         rows = slice(first, first + record.i_a.size)

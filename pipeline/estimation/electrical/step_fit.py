@@ -84,10 +84,10 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
         start[[LD, LQ]] = start[AXES[axes[0]][0]]
     plain = [(r.current_noise.sigma, r.voltage_noise.sigma) for r in model.records]
     solution = _fit(model, start, free, plain)
-    price = price_of(model)
+    penalty = bic_penalty(model)
     for _ in range(TERMS):
         proposals = offers_of(solution, axes, plain)
-        wanted = [max(own)[1] for own in proposals.values() if own and max(own)[0] > price]
+        wanted = [max(own)[1] for own in proposals.values() if own and max(own)[0] > penalty]
         if not wanted:
             break
         free = solution.free.copy()
@@ -95,7 +95,7 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
         solution = _fit(model, solution.parameters, free, solution.sigmas)
     while True:
         worth = {k: _worth(solution, k) for name in axes for k in AXES[name][1] if solution.free[k]}
-        idle = [k for k, value in worth.items() if value < price]
+        idle = [k for k, value in worth.items() if value < penalty]
         if not idle:
             return solution
         least = min(idle, key=lambda k: worth[k])
@@ -104,8 +104,24 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
         solution = _fit(model, start, free, solution.sigmas)
 
 
-def price_of(model: StepModel) -> float:
-    """What a term must lower the weighted sum of squares by: log n."""
+def bic_penalty(model: StepModel) -> float:
+    """What one more term must lower the weighted sum of squares by.
+
+    Parameters
+    ----------
+    model
+        Whose samples count.
+
+    Returns
+    -------
+    float
+        log n [1], n the samples of all captures (Bayesian information criterion).
+
+    References
+    ----------
+    G. Schwarz, Ann. Statist. 6(2), 1978, 461, doi:10.1214/aos/1176344136.
+
+    """
     return math.log(sum(float(r.count.sum()) for r in model.records))
 
 
@@ -116,9 +132,27 @@ def _worth(solution: Solution, term: int) -> float:
 
 
 def offers_of(solution: Solution, axes: Sequence[str], sigmas: Sigmas) -> dict[str, list[Offer]]:
-    """For each axis and each term not in use: gain in weighted squares, term, change of L.
+    """What each term that is not in use would gain, and how it would move the inductance.
 
+    Parameters
+    ----------
+    solution
+        The present fit.
+    axes
+        `ld_h`, `lq_h`, or both.
+    sigmas
+        Standard deviations that weigh the rows.
+
+    Returns
+    -------
+    dict
+        By axis: fall of the weighted sum of squares [1], place of the term, change of the
+        inductance [H], one each.
+
+    Notes
+    -----
     One Gauss-Newton step of the present fit with that term added (Rao's score test).
+
     """
     everything = solution.free.copy()
     for name in axes:
@@ -165,8 +199,8 @@ def between_models(solution: Solution, offers: Sequence[Offer]) -> float:
     Hoeting et al., Statist. Sci. 14(4), 1999, 382, doi:10.1214/ss/1009212519, eq. 5.
 
     """
-    price = price_of(solution.model)
-    weights = [math.exp(-0.5 * max(price - gain, 0.0)) for gain, _, _ in offers]
+    penalty = bic_penalty(solution.model)
+    weights = [math.exp(-0.5 * max(penalty - gain, 0.0)) for gain, _, _ in offers]
     spread = sum(w * change**2 for w, (_, _, change) in zip(weights, offers, strict=True))
     return math.sqrt(spread / (1.0 + sum(weights)))
 

@@ -129,7 +129,23 @@ def drive_of(record: StepRecord, own: Own, values: Array) -> Drive:
 
 
 def start_of(records: Sequence[StepRecord], layout: Layout) -> Array:
-    """Starting values: the integrated form's L split over the axes, its R, the supply; linear."""
+    """Parameters to begin the fit with, all from linear equations.
+
+    Parameters
+    ----------
+    records
+        The captures.
+    layout
+        Where their parameters sit.
+
+    Returns
+    -------
+    array [k]
+        L_d and L_q by which the captures' integrated forms, L = 2 (L_d cos² + L_q sin²) of the
+        angle between d axis and pair, are met best; R and the supply's open voltages and resistance
+        of each capture; all else 0.
+
+    """
     cos2 = np.array([math.cos(r.axis_rad) ** 2 for r in records])
     mixing = 2.0 * np.column_stack([cos2, 1.0 - cos2])
     l_total = np.array([r.l_start_h for r in records])
@@ -196,7 +212,24 @@ class StepModel:
         return StepModel(records, self.inductances)
 
     def predict(self, variants: Sequence[Array]) -> list[Array]:
-        """Currents [n, m] of each capture; variants[c] [m, size] are full parameter vectors."""
+        """Currents of every capture for every variant of the parameters, in one sweep.
+
+        Parameters
+        ----------
+        variants
+            Full parameter vectors of each capture [m, size].
+
+        Returns
+        -------
+        list of array [n, m]
+            Of each capture [A], offset included.
+
+        Notes
+        -----
+        L(ψ) di/dt = v − R i, each step exact for the inductance in its middle: i → v/R with
+        exp(−h R/L).
+
+        """
         shared, cos_g, width, volts, own = [], [], [], [], []
         for record, grid, rows, at, places in zip(
             self.records, self._grids, variants, self.layout.starts, self.layout.own, strict=True
@@ -327,10 +360,19 @@ class StepModel:
         return found
 
     def bounds(self, start: Array) -> tuple[Array, Array]:
-        """Where the search may go from `start`: beyond, a current would run away without end.
+        """Where the search may go; beyond, a current would run away without end.
 
-        Inductances and resistances stay positive, the loop's too, and an edge near the samples
-        that leave it open.
+        Parameters
+        ----------
+        start
+            Starting values [k].
+
+        Returns
+        -------
+        low, high
+            [k]. Inductances and resistances stay positive, the loop's too, and an edge near the
+            samples that leave it open.
+
         """
         low, high = np.full(start.size, -np.inf), np.full(start.size, np.inf)
         positive = [LD, LQ, *self.layout.starts]

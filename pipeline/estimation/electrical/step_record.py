@@ -52,7 +52,19 @@ class StepRecord:
 
 
 def rotor_angle_rad(capture: Capture) -> float | None:
-    """Electrical angle at which the rotor was locked: as stated, else the mean of the column."""
+    """Electrical angle at which the rotor was locked.
+
+    Parameters
+    ----------
+    capture
+        Of a locked rotor.
+
+    Returns
+    -------
+    float or None
+        [rad], as stated, else the mean of the column; None where neither is there.
+
+    """
     if capture.meta.theta_elec_deg is not None:
         return math.radians(capture.meta.theta_elec_deg)
     if capture.has("theta_elec_rad"):
@@ -135,21 +147,23 @@ def _spikes(signal: Array) -> NDArray[np.bool_]:
 
 
 def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] | None:
-    """L [H] and R [ohm] between the terminals: i = (1/L) ∫v dt - (R/L) ∫i dt + c.
-
-    The integrated form takes no derivative; solved for i, in which alone the noise is white. A
-    start for the fit, not an estimate: the trapezoid across an edge reads L up to half a sample of
-    the time constant high. None where the two integrals are not told apart.
+    """L and R between the terminals by the integrated voltage equation, to begin a fit with.
 
     Parameters
     ----------
-    t_s, v_v, i_a : array [n]
-        Times [s], voltage [V] and current [A] of one pair.
+    t_s, v_v, i_a
+        Times [n, s], voltage [n, V] and current [n, A] of one pair.
 
     Returns
     -------
     (L, R) or None
-        [H] and [ohm], None where the two integrals are not told apart.
+        [H] and [ohm]; None where the two integrals cannot be told apart.
+
+    Notes
+    -----
+    i = (1/L) ∫v dt − (R/L) ∫i dt + c takes no derivative, and is solved for i, in which alone the
+    noise is white. Not an estimate: the trapezoid across an edge reads L up to half a sample of the
+    time constant high.
 
     """
     volts, amps = trapezoid(t_s, v_v), trapezoid(t_s, i_a)
@@ -161,9 +175,22 @@ def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] |
 
 
 def disagreement(records: Sequence[StepRecord]) -> str:
-    """The captures that cannot be of one rotor with the others, in words; empty where all can.
+    """The captures that cannot be of one rotor with the others, in words.
 
+    Parameters
+    ----------
+    records
+        All captures.
+
+    Returns
+    -------
+    str
+        Empty where no L is more than `steps.most_apart` times another.
+
+    Notes
+    -----
     A clock or a current in another unit scales L by a thousand, and a common fit would follow it.
+
     """
     found = np.log([record.l_start_h for record in records])
     if found.size < 2 or np.ptp(found) < math.log(policy().steps.most_apart):

@@ -12,7 +12,19 @@ PAIRS = ("ab", "bc", "ca")
 
 
 def pair_of(capture: Capture) -> str | None:
-    """The terminal pair of a two-terminal test: as stated, else the only line voltage there."""
+    """The terminal pair of a two-terminal test.
+
+    Parameters
+    ----------
+    capture
+        Of one pair.
+
+    Returns
+    -------
+    str or None
+        `ab`, `bc` or `ca`: as stated, else of the only line voltage there.
+
+    """
     if capture.meta.pair in PAIRS:
         return capture.meta.pair
     held = [pair for pair in PAIRS if capture.has(f"v{pair}_v")]

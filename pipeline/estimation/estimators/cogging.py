@@ -81,10 +81,23 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 def part_orders(
     lines: Sequence[OrderLine], known: Constants, campaign: Campaign
 ) -> tuple[list[OrderLine], list[OrderLine]]:
-    """Orders that teeth and magnets can make, and those of once and twice a turn that they cannot.
+    """Parts the orders that teeth and magnets can make from those of a shaft that is not true.
 
-    Unbalance, a bent shaft and an eccentric coupling make orders 1 and 2 in any motor; they are
-    cogging only in a motor of one or two pole pairs or slots.
+    Parameters
+    ----------
+    lines
+        All orders found.
+    known
+        Constants found so far.
+    campaign
+        Its nameplate, where the pole pairs are not known.
+
+    Returns
+    -------
+    cogging, slow
+        Orders 1 and 2 are slow except in a motor of one or two pole pairs or slots: unbalance, a
+        bent shaft and an eccentric coupling make them in any motor.
+
     """
     pairs = known.best("pole_pairs")
     poles = round(pairs.number) if pairs else campaign.nameplate("pole_pairs")
@@ -99,13 +112,32 @@ def peak_orders(
     teeth: Sequence[int],
     sides: Sequence[OrderLine],
 ) -> list[OrderLine]:
-    """The orders that the peak is made of: what the motor can make, and strangers past doubt.
+    """The orders that the peak is made of: what the motor can make, and others past doubt.
 
+    Parameters
+    ----------
+    lines
+        Orders found, the leading one first.
+    spec
+        Their spectrum.
+    teeth
+        Slots and poles a turn, as far as they are known.
+    sides
+        Sidebands of the encoder.
+
+    Returns
+    -------
+    list of OrderLine
+        Multiples of the leading order, of `teeth` and the encoder's sidebands as found; others only
+        where p < `cogging.stranger_level`; and the second and third multiple of the leading order,
+        found or not.
+
+    Notes
+    -----
     Over a turn the crest of any further order meets that of the others somewhere, so a false one
-    adds its whole height. Multiples of the leading order, of `teeth` (slots, poles) and the
-    encoder's `sides` count as found, others only where p < `cogging.stranger_level`. The second
-    and third multiple of the leading order are in whatever their test says: they bend the crests
-    of every real motor, and as measured they are unbiased.
+    adds its whole height. The second and third multiple bend the crests of every real motor, and as
+    measured they are unbiased.
+
     """
     leading = lines[0].order
     known = [leading, *teeth]

@@ -81,13 +81,38 @@ class DragFit:
     fastest_rad_s: float
 
     def refit(self, driving_nm: Array) -> Array:
-        """The coefficients with another driving torque [w] in the same columns."""
+        """The coefficients with another driving torque in the same columns.
+
+        Parameters
+        ----------
+        driving_nm
+            Torque [w, N·m].
+
+        Returns
+        -------
+        array [k]
+            As `coefficients`.
+
+        """
         design = self.design.copy()
         design[:, 0] = driving_nm
         return linear_fit(design, self.target, self.sigma).coefficients
 
     def constants(self, coefficients: Array) -> Array:
-        """J, T_c and B from coefficients in this fit's columns."""
+        """Inertia, Coulomb and viscous friction from coefficients.
+
+        Parameters
+        ----------
+        coefficients
+            In this fit's columns [k].
+
+        Returns
+        -------
+        array [3]
+            J [kg·m²], T_c [N·m], B [N·m·s/rad]; of a free curve T_c is its end at standstill and B
+            its mean slope.
+
+        """
         inertia = 1.0 / coefficients[0]
         if not self.free:
             return np.array([inertia, coefficients[1] * inertia, coefficients[2] * inertia])
@@ -95,7 +120,14 @@ class DragFit:
         return np.array([inertia, level * inertia, slope * inertia])
 
     def scatter(self) -> Array:
-        """Factor [3, 3] of the covariance: rows J, T_c, B; columns the sources that they share."""
+        """Factor of the covariance of inertia, Coulomb and viscous friction.
+
+        Returns
+        -------
+        array [3, 3]
+            F with F F' the covariance; rows J, T_c, B, columns the sources that they share.
+
+        """
         step = 1e-6 * np.maximum(np.abs(self.coefficients), np.sqrt(np.diag(self.covariance)))
         columns = []
         for k in range(self.coefficients.size):
@@ -111,7 +143,19 @@ class DragFit:
         return factor
 
     def curve(self, rows: ShaftRows) -> tuple[Array, Array, Array]:
-        """Speed, drag torque and the published line, one point a window (at most 2000)."""
+        """Drag over speed, for a plot.
+
+        Parameters
+        ----------
+        rows
+            The windows that were fitted.
+
+        Returns
+        -------
+        speed, drag, line
+            [rad/s], [N·m] and the published T_c sign ω + B ω [N·m], by speed, at most 2000 windows.
+
+        """
         inertia = 1.0 / self.coefficients[0]
         drag_columns = [k for k, name in enumerate(self.names) if name in _DRAG_NAMES]
         modelled = self.design[:, drag_columns] @ self.coefficients[drag_columns]
@@ -202,11 +246,27 @@ def _drive_columns(rows: ShaftRows) -> int:
 
 
 def too_short(rows: ShaftRows) -> str:
-    """Why the drive windows cannot carry an inertia with its uncertainty, else empty.
+    """Why the drive windows cannot carry an inertia with its uncertainty.
 
-    The scatter s of v degrees of freedom is itself known to 1/sqrt(2v): a quarter at
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+
+    Returns
+    -------
+    str
+        Empty where they can.
+
+    Notes
+    -----
+    The scatter s of ν degrees of freedom is itself known to 1/√(2ν): a quarter at
     `drag.least_freedom`. Fewer tell neither how sure J is nor whether a nuisance is there.
-    Reference: JCGM 100:2008, E.4.3.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), E.4.3.
+
     """
     least = policy().drag.least_freedom
     if freedom(rows) >= least:
@@ -219,7 +279,21 @@ def too_short(rows: ShaftRows) -> str:
 
 
 def torque_is_parted(design: Array, sigma: Array) -> bool:
-    """Whether the torque column (the first) is no combination of the others."""
+    """Whether the torque is no linear combination of the other columns.
+
+    Parameters
+    ----------
+    design
+        Columns of the regression [w, k], the torque first.
+    sigma
+        Standard deviation of each row [w].
+
+    Returns
+    -------
+    bool
+        By the rank of the columns, scaled to unit length.
+
+    """
     scaled = design / sigma[:, None]
     norm = np.linalg.norm(scaled, axis=0)
     scaled = scaled / np.where(norm > 0.0, norm, 1.0)
@@ -320,7 +394,7 @@ def _shape_doubt(
     y: Array,
     sigma: Array,
 ) -> Array:
-    """How far J, T_c and B move with the next best shape of Stribeck's excess: half of that."""
+    """Half of how far T_c and B move with the next best shape of Stribeck's excess; 0 for J."""
     bumps = [n for n in chosen if n in STRIBECK]
     if not bumps:
         return np.zeros(3)

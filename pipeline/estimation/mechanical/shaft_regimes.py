@@ -25,7 +25,21 @@ Array = NDArray[np.float64]
 
 
 def shaft_partitions(rows: ShaftRows, information: Array) -> list[Partition]:
-    """Regimes of the rows by speed, sense, acceleration, current, time and capture."""
+    """Regimes of the rows by speed, sense, acceleration, current, time and capture.
+
+    Parameters
+    ----------
+    rows
+        Windows of drives and coast-downs.
+    information
+        Of each row on the coefficient in question [w].
+
+    Returns
+    -------
+    list of Partition
+        Those by current of the drives alone.
+
+    """
     speed = rows.speed_rad_s
     gaining, current = rows.acceleration_rad_s2 * np.sign(speed), np.abs(rows.q_current_a)
     every, drives = np.ones(rows.count, dtype=bool), rows.kind == DRIVE

@@ -67,7 +67,26 @@ class Disagreement:
 def halves(
     name: str, values: Array, low: str, high: str, information: Array, among: NDArray[np.bool_]
 ) -> Partition:
-    """Rows `among` [n] below and above the value [n] that halves their information [n]."""
+    """Rows below and above the value that halves their information.
+
+    Parameters
+    ----------
+    name
+        Of the partition.
+    values
+        By which the rows are parted [n].
+    low, high
+        Names of the two regimes.
+    information
+        Of each row [n].
+    among
+        Rows that count [n]; the others are in neither regime.
+
+    Returns
+    -------
+    Partition
+
+    """
     order = np.argsort(values, kind="stable")
     share = np.cumsum(np.where(among, information, 0.0)[order])
     labels = np.full(values.size, -1)
@@ -76,7 +95,24 @@ def halves(
 
 
 def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_]) -> Partition:
-    """Rows `among` [n] of negative and of positive values [n]."""
+    """Rows of negative and of positive values.
+
+    Parameters
+    ----------
+    name
+        Of the partition.
+    values
+        By which the rows are parted [n]; 0 counts as negative.
+    low, high
+        Names of the two regimes.
+    among
+        Rows that count [n]; the others are in neither regime.
+
+    Returns
+    -------
+    Partition
+
+    """
     return Partition(name, np.where(among, (values > 0.0).astype(np.int64), -1), (low, high))
 
 
@@ -108,11 +144,7 @@ def disagreement(
     partitions: Callable[[Array], Sequence[Partition]],
     level: float,
 ) -> Disagreement | None:
-    """The partition whose regimes scatter most beyond chance in one coefficient, or None.
-
-    `partitions` makes them from the rows' information [n]. The coefficient is fitted once a regime
-    with all else common. `level` is the chance of any partition to be named where the law is whole
-    (Bonferroni).
+    """The partition whose regimes scatter most beyond chance in one coefficient.
 
     Parameters
     ----------
@@ -123,12 +155,13 @@ def disagreement(
     partitions
         Of the rows, from their information [n].
     level
-        Chance of a false alarm [1].
+        Chance that any partition is named where the law is whole [1] (Bonferroni).
 
     Returns
     -------
     Disagreement or None
-        The values of the regimes, relative to the common one [1], and what they scatter.
+        The values of the regimes, relative to the common one [1], and what they scatter. The
+        coefficient is fitted once a regime, with all else common.
 
     """
     told = information(regression, column)

@@ -47,8 +47,10 @@ class ReadLimits:
     def __post_init__(self) -> None:
         """Refuses limits that no file could keep.
 
-        Raises:
-            UsageError: A time that is not above zero, a memory that is too little for any file.
+        Raises
+        ------
+        UsageError
+            The time is not above zero, or the memory too little for any file.
 
         """
         if not 0.0 < self.seconds <= MOST:

@@ -35,9 +35,22 @@ _CHOICES = {
 def merge(
     path: str, sources: Sequence[tuple[str, Mapping[str, str]]]
 ) -> tuple[dict[str, str], list[Finding]]:
-    """The statements of all sources, the first one winning; contradictions become warnings.
+    """The statements of all sources on one capture, the first one counting.
 
-    `sources` are pairs of a name for messages and key-value texts, the strongest first.
+    Parameters
+    ----------
+    path
+        Of the capture, for findings.
+    sources
+        Name for messages, and texts by key; the strongest first.
+
+    Returns
+    -------
+    values
+        Texts by key.
+    findings
+        A warning for each contradiction; numbers that are equal do not contradict each other.
+
     """
     said: dict[str, str] = {}
     origin: dict[str, str] = {}
@@ -68,7 +81,24 @@ def _same(one: str, other: str) -> bool:
 
 
 def sidecar(data: bytes) -> dict[str, str]:
-    """The keys of a NAME.meta.yaml, every value as the text that was written."""
+    """The keys of a NAME.meta.yaml, every value as the text that was written.
+
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+
+    Returns
+    -------
+    dict
+        Texts by key.
+
+    Raises
+    ------
+    CaptureError
+        It is no plain YAML (`bad_yaml`), or no mapping of single values (`bad_metadata`).
+
+    """
     found = load_plain(data, "the sidecar")
     if not isinstance(found, dict):
         raise CaptureError("bad_metadata", "the sidecar is no list of keys", "write `key: value`")
@@ -81,9 +111,26 @@ def sidecar(data: bytes) -> dict[str, str]:
 
 
 def manifest(data: bytes, folder: str) -> dict[str, dict[str, str]]:
-    """What a manifest.csv says of each file [path relative to the input folder].
+    """What a manifest.csv says of each file.
 
-    Raises CaptureError where it is no table with `file` as its first column.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+    folder
+        Where it lies, relative to the input folder.
+
+    Returns
+    -------
+    dict
+        Texts by key, by the path of the file relative to the input folder; empty cells say nothing.
+
+    Raises
+    ------
+    CaptureError
+        It is larger than 4 MiB, no table with `file` as its first column, or names a file or a
+        column twice (`bad_manifest`).
+
     """
     if len(data) > MAX_MANIFEST_BYTES:
         raise _bad_manifest("is larger than 4 MiB")
@@ -117,7 +164,24 @@ def _bad_manifest(what: str, rows: tuple[int, int] | None = None) -> CaptureErro
 
 
 def capture_meta(values: Mapping[str, str]) -> CaptureMeta:
-    """The metadata record; raises CaptureError for all that is missing, unknown or no number."""
+    """The metadata of one capture, each key as its type.
+
+    Parameters
+    ----------
+    values
+        Texts by key.
+
+    Returns
+    -------
+    CaptureMeta
+        Keys that the contract does not know are in `extra`.
+
+    Raises
+    ------
+    CaptureError
+        The contract is another one, or all that is missing, unknown, no number or out of its range.
+
+    """
     if values.get("contract") != CONTRACT_VERSION:
         raise CaptureError(
             "contract_version",

@@ -101,9 +101,30 @@ class Layout:
 
 
 def scan(data: bytes, *, recover: bool = False) -> Layout:
-    """The layout of a whole MCAP file, or a CaptureError with what is wrong with it.
+    """The layout of a whole MCAP file, proved before anything is decoded.
 
-    `recover` takes the whole records of a file that lacks its end; `Layout.cut` then says so.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+    recover
+        Whether to take the whole records of a file that lacks its end; `Layout.cut` then says so.
+
+    Returns
+    -------
+    Layout
+        Where chunks, messages and metadata lie; chunks stay packed.
+
+    Raises
+    ------
+    CaptureError
+        It is no MCAP file (`not_mcap`), lacks its end (`truncated`), contradicts the format, its
+        index or a checksum (`corrupt`), or claims to unpack to too much (`limit`).
+
+    References
+    ----------
+    MCAP Format Specification, version 0, https://mcap.dev/spec.
+
     """
     if not data.startswith(MAGIC):
         raise CaptureError(

@@ -14,10 +14,33 @@ QUANTITIES = ("position", "velocity", "effort")
 
 
 def pick_joint(batch: Batch, leaves: dict[str, Leaf], joint: str | None) -> dict[str, Leaf]:
-    """The leaves with the quantities [messages] of one joint; None means the only one.
+    """The quantities of one joint of joint states.
 
-    A quantity that no message holds is left out. Raises CaptureError where the joint is not
-    stated and several are there, or where it is missing from a message.
+    Parameters
+    ----------
+    batch
+        Messages of the type sensor_msgs/JointState.
+    leaves
+        Their decoded fields.
+    joint
+        Name of the joint; None means the only one.
+
+    Returns
+    -------
+    dict
+        Leaves by name: position, velocity and effort [messages] of the joint, a quantity that no
+        message holds left out, and the fields that are no arrays.
+
+    Raises
+    ------
+    CaptureError
+        The joint is not stated and several are there, it is missing from a message, or a message
+        has another number of values than of names (`joint`).
+
+    References
+    ----------
+    ROS 2, sensor_msgs/msg/JointState.
+
     """
     found = {name: leaf for name, leaf in leaves.items() if leaf.counts is None}
     names = leaves.get("name")

@@ -79,7 +79,25 @@ class Batch:
 
 
 def batches(layout: Layout) -> Iterator[Batch]:
-    """All messages in batches of several chunks; complete iteration also proves the statistics."""
+    """All messages of a file in batches of several chunks.
+
+    Parameters
+    ----------
+    layout
+        As `scan` found it; it learns the schemas and channels that lie in chunks.
+
+    Yields
+    ------
+    Batch
+        Messages with their channel, log time and the place of their payload, in the file's order.
+
+    Raises
+    ------
+    CaptureError
+        A chunk, its index, a definition or, once all are through, the statistics contradict the
+        file (`corrupt`).
+
+    """
     ledger = _Ledger(layout.definitions)
     for batch in _all(layout):
         ledger.add(batch)

@@ -64,7 +64,29 @@ class Message:
 
 
 def plan_of(schema: Schema) -> Message:
-    """The plan of a schema's root message; raises CaptureError where the descriptor is broken."""
+    """The plan by which messages of a schema's root type are decoded.
+
+    Parameters
+    ----------
+    schema
+        Whose data are a FileDescriptorSet.
+
+    Returns
+    -------
+    Message
+        Numeric fields by tag, nested ones within.
+
+    Raises
+    ------
+    CaptureError
+        The descriptor is broken, lacks a type, or has too many fields (`bad_schema`).
+
+    References
+    ----------
+    Protocol Buffers, descriptor.proto and Encoding,
+    https://protobuf.dev/programming-guides/encoding/.
+
+    """
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
     from google.protobuf.message import DecodeError
 

@@ -58,7 +58,28 @@ class Field:
 
 
 def layout_of(schema: Schema) -> tuple[Field, ...]:
-    """The fields of a schema's root message; raises CaptureError where it cannot be parsed."""
+    """The fields of a schema's root message, in the order in which they are encoded.
+
+    Parameters
+    ----------
+    schema
+        Whose data are concatenated message definitions.
+
+    Returns
+    -------
+    tuple of Field
+        Nested messages hold their own.
+
+    Raises
+    ------
+    CaptureError
+        The text cannot be parsed, names an unknown type, nests too deep, or has too many fields.
+
+    References
+    ----------
+    MCAP well-known schema encodings, ros2msg, https://mcap.dev/spec/registry.
+
+    """
     try:
         text = decoded(schema.data)
     except ParseError as fault:

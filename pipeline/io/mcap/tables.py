@@ -47,7 +47,30 @@ class _Stream:
 
 
 def decoder_of(encoding: str, schema: Schema | None) -> Decoder | None:
-    """The decoder for a channel, or None where its encoding carries no samples we know."""
+    """The decoder of a channel's messages.
+
+    Parameters
+    ----------
+    encoding
+        Of the messages: json, protobuf or cdr.
+    schema
+        Of the channel, None where it has none.
+
+    Returns
+    -------
+    Decoder or None
+        None where the encoding, or the schema's, carries no samples that are known here.
+
+    Raises
+    ------
+    CaptureError
+        The schema cannot be parsed.
+
+    References
+    ----------
+    MCAP well-known message and schema encodings, https://mcap.dev/spec/registry.
+
+    """
     if encoding == "json" and (schema is None or schema.encoding in ("jsonschema", "")):
         return JsonDecoder()
     if schema is None:
@@ -60,9 +83,28 @@ def decoder_of(encoding: str, schema: Schema | None) -> Decoder | None:
 
 
 def read_tables(layout: Layout, wanted: WantedIn, joint: str | None = None) -> list[RawTable]:
-    """Every stream's wanted fields, in order of log time; streams without any are left out.
+    """Every stream's wanted fields, in order of log time.
 
-    The whole file is read and checked, whatever is wanted. Raises CaptureError.
+    Parameters
+    ----------
+    layout
+        Of the file.
+    wanted
+        Whether a field of a topic is worth decoding: (topic, dotted name).
+    joint
+        Name of the joint, for joint states of several.
+
+    Returns
+    -------
+    list of RawTable
+        One a topic and schema, log time in ns from the first message of the file; streams without a
+        wanted field are left out.
+
+    Raises
+    ------
+    CaptureError
+        Something in the file is wrong: all of it is read and checked, whatever is wanted.
+
     """
     streams: dict[tuple[str, str, Schema | None], _Stream] = {}
     known: dict[int, _Stream] = {}

@@ -12,9 +12,34 @@ _ZSTD_MAX_WINDOW_BYTES = 128 * 2**20
 
 
 def unpack(data: bytes, chunk: Chunk, first_message: int = 0) -> bytes:
-    """The records of a chunk [bytes], exactly as many as declared; raises CaptureError.
+    """The records of a chunk, exactly as many bytes as declared.
 
-    Raises MemoryError where the limits of this process are below what a sound chunk takes.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+    chunk
+        Where the chunk lies, how it is packed, its size and checksum.
+    first_message
+        Number of its first message in the file, for the refusal.
+
+    Returns
+    -------
+    bytes
+        Unpacked records.
+
+    Raises
+    ------
+    CaptureError
+        It is packed otherwise than by lz4 or zstd (`unsupported`), unpacks to another size, or
+        fails its checksum (`corrupt`).
+    MemoryError
+        The limits of this process are below what a sound chunk takes.
+
+    References
+    ----------
+    RFC 8878 (zstd); LZ4 Frame Format Description.
+
     """
     packed = memoryview(data)[chunk.begin : chunk.end]
     if chunk.compression == "":

@@ -42,10 +42,31 @@ def view_at_every_byte(data: Bytes | bytes, dtype: str) -> NDArray[np.generic]:
 
 
 def walk(data: bytes, start: int, end: int) -> RecordSpans:
-    """The records that fill bytes [start, end); where they do not, the walk ends with a fault.
+    """The records that fill a stretch of bytes.
 
-    Equal lengths come in runs, so after a few equal records the run is measured with a strided
-    view instead of being stepped through.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+    start, end
+        The stretch [byte], end excluded.
+
+    Returns
+    -------
+    RecordSpans
+        Opcode, start and length of each record's content; with a fault where a record claims more
+        bytes than are there, the records before it.
+
+    Notes
+    -----
+    A record is an opcode of one byte, a length of eight, little-endian, and its content. Equal
+    lengths come in runs, so after a few equal records the run is measured with a strided view
+    instead of being stepped through.
+
+    References
+    ----------
+    MCAP Format Specification, version 0, "Records", https://mcap.dev/spec.
+
     """
     opcodes: list[Bytes] = []
     starts: list[Integers] = []

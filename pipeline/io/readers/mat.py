@@ -23,7 +23,29 @@ DEEPEST = 8
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """A table for each length of vectors; raises CaptureError for what is no MATLAB file."""
+    """Numeric vectors of a MATLAB file.
+
+    Parameters
+    ----------
+    data
+        Bytes of the file: version 5, or 7.3, which is HDF5.
+
+    Returns
+    -------
+    tuple of RawTable
+        One for each length of vectors; fields by name, those of a struct as `struct.name` (7.3:
+        `struct/name`), a complex one as `NAME.real` and `NAME.imag` (version 5).
+
+    Raises
+    ------
+    CaptureError
+        It is no MATLAB file (`not_mat`), or h5py is missing (`missing_library`).
+
+    References
+    ----------
+    MathWorks, MAT-File Format (version 5).
+
+    """
     if HDF5_MARK in (data[:8], data[HDF5_AT : HDF5_AT + 8]):
         return tables(data, form="mat")
     from scipy.io import loadmat

@@ -15,9 +15,28 @@ REMEDY = "export it again as MDF 4.10"
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """Tables of physical values; a channel whose name is there twice in a group counts once.
+    """Tables of physical values of an ASAM measurement file.
 
-    Raises CaptureError for what is no measurement file.
+    Parameters
+    ----------
+    data
+        Bytes of the file: MDF 3 or 4.
+
+    Returns
+    -------
+    tuple of RawTable
+        One a channel group: its master channel as `time` [s], then the numeric channels with the
+        units that the file states. A channel whose name is there twice in a group counts once.
+
+    Raises
+    ------
+    CaptureError
+        It is no MDF file (`not_mdf`), or asammdf is missing (`missing_library`).
+
+    References
+    ----------
+    ASAM MDF, Measurement Data Format, version 4.2.
+
     """
     asammdf = library("asammdf", "mdf")
     if not data.startswith(MARK):

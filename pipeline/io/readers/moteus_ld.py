@@ -31,7 +31,24 @@ def _document(data: bytes) -> Mapping[str, Any]:
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """Fields `d_A`, `omega` and `y`, a row a speed, levels in rising order; raises CaptureError."""
+    """Levels of d current, each run at several speeds.
+
+    Parameters
+    ----------
+    data
+        Bytes of the file: JSON with the table `raw`.
+
+    Returns
+    -------
+    tuple of one RawTable
+        Fields `d_A` [A], `omega` [rad/s, electrical] and `y` [V], a row a speed, in rising order.
+
+    Raises
+    ------
+    CaptureError
+        It is no JSON (`not_json`), or a row has no numbers (`missing_column`).
+
+    """
     rows: list[tuple[float, ...]] = []
     for level, runs in _document(data)["raw"].items():
         for run in runs if isinstance(runs, list) else [None]:

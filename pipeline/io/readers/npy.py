@@ -15,7 +15,29 @@ REMEDY = "save it with numpy.save, a row a sample"
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """One table; objects are never unpickled. Raises CaptureError for anything else."""
+    """One numpy array as a table.
+
+    Parameters
+    ----------
+    data
+        Bytes of the file; objects are never unpickled.
+
+    Returns
+    -------
+    tuple of one RawTable
+        Numeric fields of a structured array, or columns `0`, `1`, ... of one with one or two
+        dimensions, a row a sample.
+
+    Raises
+    ------
+    CaptureError
+        It is no numpy array of plain numbers (`not_npy`), or none that is a table (`not_a_table`).
+
+    References
+    ----------
+    NumPy Enhancement Proposal 1, A simple file format for NumPy arrays.
+
+    """
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except BROKEN as fault:

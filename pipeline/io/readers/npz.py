@@ -24,9 +24,29 @@ BROKEN = (
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """Fields `NAME`, or `NAME.real` and `NAME.imag`; tables are laid out row after row.
+    """Arrays of a numpy archive as the fields of one table.
 
-    Objects are never unpickled. Raises CaptureError for what is no archive, or too large unpacked.
+    Parameters
+    ----------
+    data
+        Bytes of the file; objects are never unpickled.
+
+    Returns
+    -------
+    tuple of one RawTable
+        Fields `NAME`, or `NAME.real` and `NAME.imag`; an array of several dimensions is laid out
+        row after row.
+
+    Raises
+    ------
+    CaptureError
+        It is no archive of plain arrays (`not_npz`), they differ in length (`lengths`), or it
+        unpacks to more than 1 GiB (`limit`).
+
+    References
+    ----------
+    NumPy Enhancement Proposal 1, A simple file format for NumPy arrays.
+
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:

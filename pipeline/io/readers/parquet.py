@@ -15,9 +15,28 @@ NANOSECOND_S = 1e-9
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """One table; texts, lists and structs are left out, null is NaN.
+    """Numeric columns of a Parquet file.
 
-    Raises CaptureError for what is no Parquet file.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+
+    Returns
+    -------
+    tuple of one RawTable
+        An instant or a duration in seconds from the column's earliest; null is NaN; texts, lists
+        and structs are left out.
+
+    Raises
+    ------
+    CaptureError
+        It is no Parquet file (`not_parquet`).
+
+    References
+    ----------
+    Apache Parquet, file format, https://parquet.apache.org/docs/file-format/.
+
     """
     try:
         frame = pl.read_parquet(io.BytesIO(data))

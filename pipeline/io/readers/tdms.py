@@ -19,7 +19,30 @@ from pipeline.records.errors import CaptureError
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """Tables by group and length; raises CaptureError for what is no TDMS file."""
+    """Tables of an NI TDMS file.
+
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+
+    Returns
+    -------
+    tuple of RawTable
+        One a group, length of channels and sampling interval: fields `group/channel`, and
+        `group/time` [s] of waveforms, wf_start_offset + n wf_increment.
+
+    Raises
+    ------
+    CaptureError
+        It is no TDMS file, or one that is cut off (`not_tdms`), or npTDMS is missing
+        (`missing_library`).
+
+    References
+    ----------
+    NI, TDMS File Format Internal Structure.
+
+    """
     nptdms = library("nptdms", "tdms")
     found: dict[tuple[str, int, float], dict[str, np.ndarray]] = {}
     try:

@@ -34,9 +34,28 @@ class _Entry:
 
 
 def read(data: bytes) -> tuple[RawTable, ...]:
-    """Numeric entries; an array's elements are `NAME.0`, `NAME.1`, ... Texts are left out.
+    """Numeric entries of a WPILib data log.
 
-    Raises CaptureError for what is no such log, or one that is cut off.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+
+    Returns
+    -------
+    tuple of RawTable
+        One an entry: `timestamp` [s] and its name; an array's elements are `NAME.0`, `NAME.1`, ...
+        An array that changes its length is left out, and so are texts.
+
+    Raises
+    ------
+    CaptureError
+        It does not begin as such a log, or is cut off (`not_wpilog`).
+
+    References
+    ----------
+    WPILib, Data Log File Format Specification, version 1.0 (wpilibsuite/allwpilib, datalog.adoc).
+
     """
     try:
         entries = _entries(data)

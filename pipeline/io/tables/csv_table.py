@@ -66,9 +66,28 @@ def check_text(data: bytes) -> None:
 
 
 def split_comments(data: bytes) -> tuple[dict[str, str], int]:
-    """The `# key: value` lines that begin a file, and where the rest begins [byte].
+    r"""The `# key: value` lines that begin a file.
 
-    A key that appears twice with two values is a CaptureError.
+    Parameters
+    ----------
+    data
+        Bytes of the file, with or without the byte order mark of UTF-8.
+
+    Returns
+    -------
+    values, place
+        Texts by key, and where the rest begins [byte].
+
+    Raises
+    ------
+    CaptureError
+        A key has two values (`bad_metadata`), or a line is no UTF-8 (`encoding`).
+
+    Examples
+    --------
+    >>> split_comments(b"# motor_id: M1\nt_s,ia_a\n")
+    ({'motor_id': 'M1'}, 15)
+
     """
     found: dict[str, str] = {}
     at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
@@ -94,9 +113,36 @@ def read_csv(
     wanted: Callable[[str], bool] = bool,
     name: str = "csv",
 ) -> CsvTable:
-    """Parse a whole text table; columns not `wanted` may hold any text.
+    """A whole text table as numbers.
 
-    Raises CaptureError with the first offending row, counted from 0.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+    dialect
+        Separator, decimal sign, head, and words for missing values; the contract's by default.
+    wanted
+        Which columns, by name; the others may hold any text.
+    name
+        Of the table.
+
+    Returns
+    -------
+    CsvTable
+        Columns [rows], NaN where a field is empty; `verified` where `sha256_rows` was stated and
+        holds.
+
+    Raises
+    ------
+    CaptureError
+        Something is amiss, with the first offending row, counted from 0: a row has more or fewer
+        fields (`ragged_row`), a field is no number (`bad_number`, `infinite`), the last line is cut
+        (`truncated`), the rows fail their checksum (`corrupt`), ...
+
+    References
+    ----------
+    RFC 4180 (comma-separated values); quotes are taken off, and never hold a separator.
+
     """
     check_text(data)
     metadata, begin = split_comments(data) if dialect.comment_lines else ({}, 0)

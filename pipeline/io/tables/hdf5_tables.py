@@ -15,11 +15,35 @@ MOST_BYTES = 1 << 30
 
 
 def tables(data: bytes, form: str) -> tuple[RawTable, ...]:
-    """A table for each length of vectors in a group, fields by their path in the file.
+    """Numeric vectors of an HDF5 file by their path.
 
-    A dataset of one dimension is a field, so is a matrix of one row or one column; of a table with
-    named columns each numeric column is one. Links to other files are not followed. Raises
-    CaptureError for what is no HDF5 file, or is too large unpacked.
+    Parameters
+    ----------
+    data
+        Bytes of the file.
+    form
+        Name of the file's form, for the code of a refusal.
+
+    Returns
+    -------
+    tuple of RawTable
+        One for each length of vectors in a group. A dataset of one dimension is a field, so is a
+        matrix of one row or one column; of a table with named columns each numeric column is one.
+
+    Raises
+    ------
+    CaptureError
+        It is no HDF5 file (`not_FORM`), it unpacks to more than 1 GiB (`limit`), or h5py is missing
+        (`missing_library`).
+
+    Notes
+    -----
+    Links to other files are not followed: the file is not trusted.
+
+    References
+    ----------
+    The HDF Group, HDF5 File Format Specification, version 3.0.
+
     """
     h5py = library("h5py", "hdf5")
     found: dict[tuple[str, int], dict[str, np.ndarray]] = {}
