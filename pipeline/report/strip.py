@@ -40,7 +40,7 @@ def strip_plot(name: str, unit: str, rows: Sequence[tuple[str, Sequence[Dot]]]) 
     columns = x_ticks(x, bottom, (TOP, bottom))
     lots = "".join(_lot(x, unit, lot, members, i) for i, (lot, members) in enumerate(rows))
     return (
-        f'<svg class="strip" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="img" '
+        f'<svg class="strip" viewBox="0 0 {WIDTH:g} {bottom + BOTTOM:g}" role="group" '
         f'aria-label="{escape(x.title)} by lot">{columns}{lots}</svg>'
     )
 
