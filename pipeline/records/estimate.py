@@ -105,7 +105,19 @@ class Estimate:
         return effective_dof(self.budget)
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Coverage interval [unit] from Student's t with the effective degrees of freedom."""
+        """Coverage interval of the value.
+
+        Parameters
+        ----------
+        level
+            Coverage probability [1].
+
+        Returns
+        -------
+        low, high
+            [unit], by Student's t with the effective degrees of freedom.
+
+        """
         from scipy.special import stdtrit
 
         dof = min(self.dof, 1e9)
@@ -164,7 +176,31 @@ def derived(
     at: Conditions | None = None,
     note: str = "",
 ) -> Estimate:
-    """A constant computed from others; `terms` are (partial derivative, estimate) pairs."""
+    """A constant that is computed from others.
+
+    Parameters
+    ----------
+    name
+        Of the constant.
+    unit
+        As in the glossary.
+    value
+        [unit]
+    terms
+        Pairs of the partial derivative by an estimate [unit over its unit] and the estimate.
+    method
+        What computes it.
+    at
+        Conditions that it holds at.
+    note
+        The formula, for people.
+
+    Returns
+    -------
+    Estimate
+        Of status `derived`, on all captures of its inputs; sources that they share cancel or add.
+
+    """
     captures = sorted({path for _, source in terms for path in source.captures})
     budget = propagate((slope, source.budget) for slope, source in terms)
     return Estimate(name, value, unit, "derived", method, budget, at or {}, tuple(captures), note)

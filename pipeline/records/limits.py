@@ -79,9 +79,28 @@ class Limits:
 
 
 def amount_from(text: str) -> Amount:
-    """`3 %` (of nominal), `1.5 sd` (of motors), `0.822 U`, or a number in the constant's unit.
+    """A size as a limits file writes it.
 
-    Raises UsageError for other text.
+    Parameters
+    ----------
+    text
+        `3 %` (of nominal), `1.5 sd` (of motors), `0.822 U`, or a number in the constant's unit.
+
+    Returns
+    -------
+    Amount
+        Per cent as a share [1].
+
+    Raises
+    ------
+    UsageError
+        It is other text.
+
+    Examples
+    --------
+    >>> amount_from("3 %")
+    Amount(value=0.03, per='nominal')
+
     """
     words = text.strip()
     per: Per = "unit"

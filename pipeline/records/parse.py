@@ -27,7 +27,26 @@ class ParseError(ValueError):
 
 
 def whole(text: str, low: int = 0, high: int = 10**MOST_DIGITS) -> int | None:
-    """The whole number that a text is, if it lies within `low` and `high`; else None."""
+    """The whole number that a text is.
+
+    Parameters
+    ----------
+    text
+        Decimal digits with or without a sign; blanks are not taken.
+    low, high
+        Bounds, both inclusive.
+
+    Returns
+    -------
+    int or None
+        None for other text, and for a number out of bounds.
+
+    Examples
+    --------
+    >>> whole("12"), whole("-1"), whole("1.0")
+    (12, None, None)
+
+    """
     if len(text) > MOST_CHARS or not _WHOLE.fullmatch(text):
         return None
     digits = text.lstrip("+-").lstrip("0") or "0"
@@ -38,7 +57,24 @@ def whole(text: str, low: int = 0, high: int = 10**MOST_DIGITS) -> int | None:
 
 
 def number(text: str) -> float | None:
-    """The finite number that a text is, with a point as decimal sign; else None."""
+    """The finite number that a text is.
+
+    Parameters
+    ----------
+    text
+        With a point as decimal sign; blanks around it are taken.
+
+    Returns
+    -------
+    float or None
+        None for other text, `nan` and `inf` among it, and for what is too large.
+
+    Examples
+    --------
+    >>> number(" 1.5e3 "), number("1,5"), number("nan")
+    (1500.0, None, None)
+
+    """
     bare = text.strip()
     if len(bare) > MOST_CHARS or not _NUMBER.fullmatch(bare):
         return None
@@ -87,9 +123,27 @@ def is_text(value: str) -> bool:
 def json_value(data: bytes, *, unique_keys: bool = False) -> Any:
     """The value of a UTF-8 JSON document; NaN is taken, for recorders write it.
 
-    Raises:
-        ParseError: No JSON, nested too deep, a whole number of more digits than any counter has, a
-            text that holds half a surrogate pair, a key twice where keys are to be unique.
+    Parameters
+    ----------
+    data
+        Bytes of the document.
+    unique_keys
+        Whether a key that is there twice is an error.
+
+    Returns
+    -------
+    object
+        A whole number of more digits than 64 bits hold as a float.
+
+    Raises
+    ------
+    ParseError
+        It is no JSON, nests too deep, holds a number of more digits than any counter has, a text
+        with half a surrogate pair, or a key twice where keys are to be unique.
+
+    References
+    ----------
+    RFC 8259 (JSON), which has no NaN.
 
     """
     hook = _unique if unique_keys else None

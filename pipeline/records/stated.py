@@ -23,11 +23,24 @@ def may_be_stated(name: str) -> bool:
 
 
 def stated_constants(campaign: Campaign) -> tuple[Estimate, ...]:
-    """Each stated constant as an estimate of status `stated`, by name.
+    """Each stated constant as an estimate of status `stated`.
 
-    `NAME` is its value and `u_NAME` its standard uncertainty, both in the constant's unit. What
-    the configuration says (`campaign.stated`) goes before what captures say; of captures that
-    differ the most frequent pair counts. Without `u_NAME` it is `UNSTATED_SHARE` of the value.
+    Parameters
+    ----------
+    campaign
+        All captures of one motor, and what the configuration states.
+
+    Returns
+    -------
+    tuple of Estimate
+        By name, with a type B contribution.
+
+    Notes
+    -----
+    `NAME` is its value and `u_NAME` its standard uncertainty, both in the constant's unit. What the
+    configuration says goes before what captures say; of captures that differ the most frequent pair
+    counts. Without `u_NAME` it is `UNSTATED_SHARE` of the value.
+
     """
     found = []
     names = {key for c in campaign.captures for key in c.meta.extra} | set(campaign.stated)

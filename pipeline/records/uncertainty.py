@@ -49,10 +49,31 @@ def type_b(source: str, u: float, dof: float = math.inf) -> Budget:
 
 
 def propagate(terms: Iterable[tuple[float, Budget]]) -> Budget:
-    """First-order propagation: the budget of sum(c_i x_i) from (c_i, budget of x_i) pairs.
+    """First-order propagation: the budget of Σ c_i x_i.
 
-    Contributions of one source add with their signs; the result is sorted by source so that
-    equal work gives equal bytes. GUM eq. 13 follows because distinct sources are independent.
+    Parameters
+    ----------
+    terms
+        Pairs of a sensitivity c_i [unit of the result over unit of x_i] and the budget of x_i.
+
+    Returns
+    -------
+    Budget
+        Contributions of one source are added with their signs; sorted by source, so that equal work
+        gives equal bytes.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), eq. 13, for sources that are independent of each other.
+
+    Examples
+    --------
+    A gain of 1 % that two readings of 2 share is gone in their difference:
+
+    >>> gain = type_b("current@rig", 0.02)
+    >>> standard_uncertainty(propagate([(1.0, gain), (-1.0, gain)]))
+    0.0
+
     """
     sums: dict[str, Contribution] = {}
     for sensitivity, budget in terms:
@@ -64,7 +85,26 @@ def propagate(terms: Iterable[tuple[float, Budget]]) -> Budget:
 
 
 def standard_uncertainty(budget: Budget, kind: Kind | None = None) -> float:
-    """Root sum of squares of the contributions, of one kind or of both."""
+    """Root sum of squares of the contributions.
+
+    Parameters
+    ----------
+    budget
+        Its sources are different from each other.
+    kind
+        `A` or `B` alone; both where not given.
+
+    Returns
+    -------
+    float
+        Unit of the estimate.
+
+    Examples
+    --------
+    >>> standard_uncertainty((*type_a("scatter:x", 3.0), *type_b("current@rig", 4.0)))
+    5.0
+
+    """
     return math.sqrt(sum(part.u**2 for part in budget if kind in (None, part.kind)))
 
 
@@ -75,20 +115,69 @@ METHODS = f"{BETWEEN}methods:"
 def without_between(budget: Budget, source: str = BETWEEN) -> Budget:
     """The budget as it was before the scatter between equations, captures and methods joined.
 
-    With `METHODS` only that between methods goes: what a check must see, as a disagreement does
-    not excuse itself.
+    Parameters
+    ----------
+    budget
+        Of a constant.
+    source
+        What the sources begin with that go: all scatter between, or, with `METHODS`, that between
+        methods alone, which a check must not see, for a disagreement does not excuse itself.
+
+    Returns
+    -------
+    Budget
+        The other contributions.
+
     """
     return tuple(part for part in budget if not part.source.startswith(source))
 
 
 def covariance(one: Budget, other: Budget) -> float:
-    """Covariance of two estimates: products of the contributions they share."""
+    """Covariance of two estimates: the products of the contributions that they share.
+
+    Parameters
+    ----------
+    one, other
+        Their budgets.
+
+    Returns
+    -------
+    float
+        Product of their units.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), 5.2 and F.1.2.3.
+
+    """
     shared = {part.source: part.u for part in other}
     return sum(part.u * shared.get(part.source, 0.0) for part in one)
 
 
 def effective_dof(budget: Budget) -> float:
-    """Welch-Satterthwaite degrees of freedom (GUM eq. G.2b); infinite without scatter."""
+    """Effective degrees of freedom of a budget.
+
+    Parameters
+    ----------
+    budget
+        Its sources are different from each other.
+
+    Returns
+    -------
+    float
+        u⁴/Σ(u_i⁴/ν_i); infinite where no contribution has finite degrees of freedom.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), G.4.1, eq. G.2b.
+    Satterthwaite, Biometrics Bulletin 2(6), 1946, 110, doi:10.2307/3002019.
+
+    Examples
+    --------
+    >>> round(effective_dof((*type_a("scatter:x", 1.0, 4.0), *type_b("current@rig", 1.0))), 9)
+    16.0
+
+    """
     total = standard_uncertainty(budget) ** 2
     spread = sum(part.u**4 / part.dof for part in budget if math.isfinite(part.dof))
     return math.inf if spread == 0.0 else total**2 / spread
@@ -99,7 +188,30 @@ COVERAGE = 0.9545
 
 
 def coverage_factor(dof: float, level: float = COVERAGE) -> float:
-    """K such that k u covers `level`: Student's t with `dof` degrees of freedom (GUM G.3)."""
+    """The factor k by which U = k u covers a level.
+
+    Parameters
+    ----------
+    dof
+        Effective degrees of freedom.
+    level
+        Coverage probability [1].
+
+    Returns
+    -------
+    float
+        Quantile of Student's t [1]; 2 for the default level and infinite degrees of freedom.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), G.3.
+
+    Examples
+    --------
+    >>> round(coverage_factor(math.inf), 3), round(coverage_factor(10.0, 0.95), 3)
+    (2.0, 2.228)
+
+    """
     from scipy.special import stdtrit
 
     return float(stdtrit(min(dof, 1e9), 0.5 + level / 2.0))

@@ -21,11 +21,30 @@ _REACH = 2
 
 
 def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
-    """Period [s] and sample numbers [n] of an even clock whose stamps [n, s] scatter by less than
-    half the period; None where there is no such clock.
+    """The even clock behind stamps that scatter.
 
+    Parameters
+    ----------
+    time
+        Stamps [n, s], rising.
+
+    Returns
+    -------
+    (period, numbers) or None
+        Period [s] and number of each sample [n]; None where the stamps scatter by more than half a
+        period about any even clock.
+
+    Notes
+    -----
     Two counts are tried: one in which a long step stands for missing samples, whose numbers are
     left out, and one in which it does not. The one with less scatter counts.
+
+    Examples
+    --------
+    >>> period, numbers = counted(np.array([0.0, 1.0, 2.0, 4.0, 5.0]))
+    >>> round(period, 9), numbers.tolist()
+    (1.0, [0, 1, 2, 4, 5])
+
     """
     since = time - time[0]
     steps = np.diff(since) / np.median(np.diff(since))
@@ -41,12 +60,28 @@ def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
 
 
 def sampled_unevenly(time: Array, number: NDArray[np.int64], columns: Iterable[Array]) -> bool:
-    """Whether signals [n] surely run more smoothly over the stamps [n] than over the sample
-    numbers [n].
+    """Whether the samples came unevenly, and not only their stamps.
 
-    A shaft that turns tells when its angle was read: where it is evener than the clock that
-    stamped it, the stamps are at fault and not the sampling. The signal that tells most decides;
-    where none moves enough, it makes no difference.
+    Parameters
+    ----------
+    time
+        Stamps [n, s].
+    number
+        Number of each sample on the even clock [n].
+    columns
+        Signals [n each, any unit].
+
+    Returns
+    -------
+    bool
+        Where the signal that shows most runs `_SURELY` times more smoothly over the stamps.
+
+    Notes
+    -----
+    A shaft that turns shows when its angle was read: where it is evener than the clock that stamped
+    it, the stamps are at fault and not the sampling. Roughness is the median distance of samples
+    from the cubic through the two before and the two after.
+
     """
     told = [_roughness(c, number.astype(float)) / _roughness(c, time) for c in columns]
     clearest = max(told, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)

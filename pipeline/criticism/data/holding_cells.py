@@ -39,11 +39,24 @@ class Cells:
 
 
 def holding_cells(capture: Capture) -> Cells | None:
-    """The cells of a holding current; None where there are too few.
+    """A holding current averaged in cells of angle and sense.
 
+    Parameters
+    ----------
+    capture
+        With shaft angle and q current.
+
+    Returns
+    -------
+    Cells or None
+        None where there are fewer cells than `_SECTORS`.
+
+    Notes
+    -----
     The noise of a cell's mean comes from the scatter within cells about a straight line, with its
-    correlation from sample to sample; a loop that holds does not repeat better than that. Where
-    few cells have rows enough it comes from the differences between neighbours.
+    correlation from sample to sample; a loop that holds does not repeat better than that. Where few
+    cells have rows enough it comes from the differences between neighbours.
+
     """
     if not capture.has("theta_mech_rad", "iq_a"):
         return None

@@ -24,15 +24,35 @@ _FEWEST_SECTORS = 6
 def holding_orders(
     captures: Iterable[Capture], bases: tuple[int, ...], highest: int = 400
 ) -> tuple[int, ...]:
-    """Multiples of `bases` (pole pairs, slots) that a holding current repeats, in any order found.
+    """Orders that a holding current repeats in parts of the turn they were not fitted to.
 
+    Parameters
+    ----------
+    captures
+        Holding currents of one motor.
+    bases
+        Pole pairs and slots; only multiples of these are looked for.
+    highest
+        Highest order [1/turn].
+
+    Returns
+    -------
+    tuple of int
+        Orders [1/turn], rising; empty where fewer than six sectors were passed.
+
+    Notes
+    -----
     Forward selection: the order that takes most of the square of what is left joins, as long as the
     sectors of the turn, each predicted from all others, gain on average by more than `_CLEAR`
     standard errors. An order too many makes held-out sectors worse at once, however well the rest
-    is fitted. With fewer than six sectors their scatter is not known, and no order is told.
+    is fitted.
 
-    References: [1] Chen, Billings & Luo, Int. J. Control 50 (1989), forward selection; [2] Hastie,
-    Tibshirani & Friedman, The Elements of Statistical Learning, 2nd ed. (2009), 7.10.
+    References
+    ----------
+    Chen, Billings and Luo, Int. J. Control 50(5), 1989, 1873, doi:10.1080/00207178908953472.
+    Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed., Springer, 2009,
+    7.10, doi:10.1007/978-0-387-84858-7.
+
     """
     joined = _joined(captures)
     if joined is None or not bases:
@@ -59,8 +79,25 @@ def holding_orders(
 
 
 def sector_errors(captures: Iterable[Capture], orders: Sequence[int]) -> tuple[float, float]:
-    """Rms current [A] that these orders, and an offset a sense, leave: fitted, and held out by
-    sectors of the turn. Raises ValueError without a holding current.
+    """What orders, and an offset a sense, leave of a holding current.
+
+    Parameters
+    ----------
+    captures
+        Holding currents of one motor.
+    orders
+        [1/turn]
+
+    Returns
+    -------
+    fitted, held_out
+        Root mean squares [A]: of the residuals, and with each sector predicted from all others.
+
+    Raises
+    ------
+    ValueError
+        There is no holding current.
+
     """
     joined = _joined(captures)
     if joined is None:

@@ -16,10 +16,23 @@ _CLEAR_OF_NOISE = 2.0
 
 
 def set_levels(current: Array) -> NDArray[np.int64]:
-    """Number of the level [n] that was set for each current, noise and all.
+    """The level that was set for each current, noise and all.
 
+    Parameters
+    ----------
+    current
+        [n, A]
+
+    Returns
+    -------
+    array [n]
+        Number of the level, from the lowest; all 0 where there are no levels.
+
+    Notes
+    -----
     The rows are parted as finely as leaves three rows a level on average, and levels further from
-    each other than twice the width of the widest. If there is no such parting, all are one level.
+    each other than twice the width of the widest.
+
     """
     gaps = np.diff(np.sort(current))
     gaps = gaps[gaps > _apart(current, 0.0)]
@@ -35,9 +48,29 @@ def set_levels(current: Array) -> NDArray[np.int64]:
 
 
 def levels_of(current: Array, least: float = 0.0) -> NDArray[np.int64]:
-    """Number of the level [n] that each current is at; levels are parted by a gap between them.
+    """The level that each current is at; levels are parted by a gap between them.
 
+    Parameters
+    ----------
+    current
+        [n, A]
+    least
+        Gap that does not part levels [A].
+
+    Returns
+    -------
+    array [n]
+        Number of the level, from the lowest.
+
+    Notes
+    -----
     A gap is a step of the sorted currents over a hundredth of their range, and over `least`.
+
+    Examples
+    --------
+    >>> levels_of(np.array([0.0, 5.0, 0.001, 5.001])).tolist()
+    [0, 1, 0, 1]
+
     """
     order = np.argsort(current, kind="stable")
     parted = np.diff(current[order]) > _apart(current, least)

@@ -38,10 +38,21 @@ PAIRLESS = (
 
 
 def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
-    """Pole pairs, slots and scales of the motor on the bench; None where it turned and nothing
-    tells its pole pairs, without which no speed means anything to a winding.
+    """How large the machine is: pole pairs, slots, scales and orders, before any fit.
 
-    Pole pairs come from the back-EMF against the angle, else from `start`, else the nameplate.
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+    start
+        Constants known from elsewhere.
+
+    Returns
+    -------
+    Machine or None
+        None where the shaft turned and nothing tells its pole pairs, without which no speed means
+        anything to a winding.
+
     """
     slots, stated = campaign.nameplate("slots"), stated_u(campaign.captures)
     pole_pairs = pole_pairs_of(campaign, start)
@@ -101,10 +112,23 @@ def _travel_turns(capture: Capture) -> float:
 
 
 def encoder_step(campaign: Campaign) -> float:
-    """The step of the encoder in drive logs [rad], 0 where there is none that they agree on.
+    """The step of the encoder in drive logs.
 
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+
+    Returns
+    -------
+    float
+        [rad]; 0 where there is none that the logs agree on.
+
+    Notes
+    -----
     A log at many speeds shows it; at one speed an angle may move by nearly whole steps a sample,
     and look finer or coarser than it is.
+
     """
     logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
     found = [rounding_step(c.arrays("theta_mech_rad")["theta_mech_rad"]) for c in logs]
@@ -140,7 +164,19 @@ def pole_pairs_of(campaign: Campaign, start: Constants) -> int | None:
 
 
 def counted_pole_pairs(campaign: Campaign) -> int | None:
-    """Electrical cycles a turn, counted in an open-circuit spin of a turn; None where none is."""
+    """Electrical cycles a turn, counted in an open-circuit spin of a turn or more.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+
+    Returns
+    -------
+    int or None
+        Of the first spin whose count is within 0.02 of a whole number; None where there is none.
+
+    """
     for recorded in campaign.of("open_circuit"):
         capture = tellable(recorded)
         if capture is None or not capture.has("theta_mech_rad"):
@@ -185,12 +221,26 @@ def _period(capture: Capture) -> float:
 
 
 def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple[int, ...]:
-    """Orders a turn that stand out of every slow turn's torque spectrum, up to `highest`, or to 400
-    where samples are too few for that.
+    """Orders that stand out of every slow turn's torque spectrum.
 
+    Parameters
+    ----------
+    captures
+        Slow turns.
+    highest
+        Highest order [1/turn]; 400 where samples are too few for that.
+
+    Returns
+    -------
+    tuple of int
+        [1/turn], rising.
+
+    Notes
+    -----
     The torque is averaged in even bins of angle over whole turns; an order counts where its
     amplitude is 6 times the spectrum's median (of a Rayleigh floor 2^-36 of orders pass that), in
     every capture of at least one turn.
+
     """
     found: set[int] | None = None
     for capture in captures:

@@ -55,16 +55,33 @@ judgement: one that stands still is in step with anything."""
 
 
 def sensor_noise(signal: Array, steady: bool = False) -> float:
-    """Standard deviation of a signal's white sensor noise [its unit].
+    """Standard deviation of a signal's white sensor noise.
 
-    Third differences of white noise have variance 20 σ²; their mean square is taken in blocks
-    and a low quantile over the blocks keeps steps and bursts out (a higher one for a `steady`
-    signal, an angle, whose rounding comes and goes with its speed). It is never below the rounding
-    noise q/√12 of the signal's step q.
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit], finite.
+    steady
+        Whether it is an angle, whose rounding comes and goes with its speed.
 
-    References: [1] von Neumann et al., Ann. Math. Stat. 12 (1941), successive differences; [2]
-    Wilson & Hilferty, Proc. Natl. Acad. Sci. 17 (1931); [3] Widrow & Kollar, Quantization Noise
-    (2008), ch. 3.
+    Returns
+    -------
+    float
+        Unit of the signal; 0 for fewer than four samples. Never below q/√12 of the signal's step q.
+
+    Notes
+    -----
+    Third differences of white noise have the variance 20 σ². Their mean square is taken in blocks,
+    and a low quantile over the blocks keeps steps and bursts out, a higher one for a `steady`
+    signal; what a quantile of chi-square is below its mean is made up for.
+
+    References
+    ----------
+    von Neumann, Kent, Bellinson and Hart, Ann. Math. Statist. 12(2), 1941, 153 (successive
+    differences), doi:10.1214/aoms/1177731746.
+    Wilson and Hilferty, Proc. Natl. Acad. Sci. 17(12), 1931, 684, doi:10.1073/pnas.17.12.684.
+    Widrow and Kollar, Quantization Noise, Cambridge University Press, 2008, ch. 3.
+
     """
     third = np.diff(signal, 3)
     if third.size == 0:
@@ -81,8 +98,19 @@ def sensor_noise(signal: Array, steady: bool = False) -> float:
 
 
 def resolution(signal: Array) -> float:
-    """The step that a signal's values [n] are whole multiples of, from their least distance; 0
-    where there is none.
+    """The step that a signal's values are whole multiples of.
+
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+
+    Returns
+    -------
+    float
+        The least distance of two values, where `_MOSTLY` of all distances are whole multiples of
+        it; else 0.
+
     """
     gaps = np.diff(np.unique(signal))
     # what floating point makes of equal numbers is no step
@@ -95,20 +123,50 @@ def resolution(signal: Array) -> float:
 
 
 def coarse_step(signal: Array, sigma: float) -> float:
-    """The resolution of a signal that its noise does not dither, else 0; `sigma` with rounding.
+    """The resolution of a signal that its noise does not dither.
 
-    Noise below 0.45 steps leaves a part of the rounding error that follows the signal, and does not
-    average out. Reference: Widrow & Kollar, Quantization Noise (2008), ch. 19.
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+    sigma
+        Standard deviation of its noise, that of rounding among it [same unit].
+
+    Returns
+    -------
+    float
+        [same unit]; 0 where there is no step, or noise of 0.45 steps or more.
+
+    Notes
+    -----
+    Less noise leaves a part of the rounding error that follows the signal, and does not average
+    out.
+
+    References
+    ----------
+    Widrow and Kollar, Quantization Noise, Cambridge University Press, 2008, ch. 19.
+
     """
     step = resolution(signal)
     return step if step > _UNDITHERED * sigma else 0.0
 
 
 def unrounded(signal: Array, step: float) -> Array:
-    """What a slow signal [n] may have been before it was rounded.
+    """What a slow signal may have been before it was rounded.
 
-    Where it changes by a single step it stood half way between the two; it is straight from one
-    such place to the next. Around larger changes it stays as it is.
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+    step
+        Step of the rounding [same unit].
+
+    Returns
+    -------
+    array [n]
+        Where the signal changes by a single step it stood half way between the two; it is straight
+        from one such place to the next. Around larger changes it stays as it is.
+
     """
     change = np.diff(signal)
     at = np.flatnonzero(change)
@@ -123,10 +181,23 @@ def unrounded(signal: Array, step: float) -> Array:
 
 
 def rounding_error(signal: Array, step: float, shift: float) -> Array:
-    """What rounding to multiples of `step` does to a signal [n] like this one [its unit].
+    """What rounding does to a signal like this one.
 
-    The recorded signal is smoothed, moved by `shift` steps and rounded anew. Of a steady motion the
-    error is no white noise, but a saw-tooth whose beat with the sampling may fall on any order.
+    Parameters
+    ----------
+    signal
+        As recorded [n, any unit].
+    step
+        Of the rounding [same unit].
+    shift
+        By which the smoothed signal is moved before it is rounded anew [steps].
+
+    Returns
+    -------
+    array [n]
+        Rounded less smooth [same unit]. Of a steady motion that is no white noise, but a saw-tooth
+        whose beat with the sampling may fall on any order.
+
     """
     kernel = np.full(_SMOOTH, 1.0 / _SMOOTH)
     padded = np.pad(signal / step, _SMOOTH // 2, mode="reflect", reflect_type="odd")
@@ -136,11 +207,24 @@ def rounding_error(signal: Array, step: float, shift: float) -> Array:
 
 
 def rounding_step(signal: Array) -> float:
-    """The step of a signal whose noise is mostly its rounding, 0 of another one [its unit].
+    """The step of a signal whose noise is mostly its rounding.
 
-    Third differences of a rounded signal are whole steps, so that their phase e^{j2π d/q} stays
-    together at the right q, even where a number format has rounded it once more. The whole record
-    tells q sharply enough to part 4000 steps a turn from 4096.
+    Parameters
+    ----------
+    signal
+        Samples [n, rad]; an encoder of 2^n steps a turn, or of whole lines, is taken as such.
+
+    Returns
+    -------
+    float
+        [rad]; 0 of another signal.
+
+    Notes
+    -----
+    Third differences d of a rounded signal are whole steps q, so that their phase e^{j2πd/q} stays
+    together at the right q, even where a number format has rounded it once more. Parts of the
+    record, longer and longer, tell q sharply enough to separate 4000 steps a turn from 4096.
+
     """
     signal = signal[np.isfinite(signal)]
     third = np.diff(signal, 3)

@@ -81,11 +81,30 @@ def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame) -> bool:
 def even_clock(
     capture: Capture, names: tuple[str, ...]
 ) -> tuple[float, dict[str, Array], NDArray[np.bool_]]:
-    """Sample period [s], columns [n each] on an even clock and the samples to keep [n].
+    """Columns of a capture on an even clock.
 
-    A clock that is even within a thousandth is taken as it is. Of another one it is asked whether
-    the samples came unevenly, and are interpolated, or only their stamps, and are counted. Missing
-    values are bridged and not kept; so are samples inside a gap of over 1.5 periods.
+    Parameters
+    ----------
+    capture
+        With `t_s`.
+    names
+        Columns that are wanted, on one clock.
+
+    Returns
+    -------
+    period
+        Sample period [s].
+    columns
+        [n each]; missing values are bridged.
+    keep
+        Samples that count [n]: not those bridged, inside a gap of over 1.5 periods, or at either
+        end.
+
+    Notes
+    -----
+    A clock that is even within a thousandth is taken as it is. Of another one it is found out
+    whether the samples came unevenly, and are interpolated, or only their stamps, and are counted.
+
     """
     home = capture.table_of("t_s", *names)
     found = capture.arrays("t_s", *names, masked=False)
@@ -117,7 +136,21 @@ def even_clock(
 
 
 def smoothed(signal: Array, width: int) -> Array:
-    """Centred moving mean [n] of an odd width, edges held."""
+    """Centred moving mean, the ends continued by the mean of their half window.
+
+    Parameters
+    ----------
+    signal
+        Samples [n, any unit].
+    width
+        Samples of the mean, odd.
+
+    Returns
+    -------
+    array [n]
+        Same unit.
+
+    """
     half = min(width, signal.size) // 2
     if half == 0:
         return signal
@@ -137,8 +170,25 @@ def decimated(signal: Array, factor: int) -> Array:
 
 
 def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
-    """First samples of the runs after each reversal: the extremes that an angle [n, rad] then
-    leaves by more than `slack`, which is what its noise may do.
+    """First samples of the runs after each reversal of an angle.
+
+    Parameters
+    ----------
+    theta
+        Unwrapped angle [n, rad].
+    slack
+        What its noise may do [rad].
+
+    Returns
+    -------
+    array
+        Extremes that the angle then leaves by more than `slack`.
+
+    Examples
+    --------
+    >>> reversals(np.array([0.0, 1.0, 2.0, 1.9, 2.0, 1.0, 0.0]), 0.5).tolist()
+    [4]
+
     """
     step = np.diff(theta)
     moving = np.flatnonzero(step)
@@ -165,8 +215,24 @@ def reversals(theta: Array, slack: float) -> NDArray[np.int64]:
 
 
 def travel(theta: Array, slack: float) -> tuple[Array, Array, Array]:
-    """Angle [n] turned since the last reversal, infinite before the first one; number of the run
-    [n]; and the angle turned in each run [runs], negative backwards [rad].
+    """Angle turned since the last reversal.
+
+    Parameters
+    ----------
+    theta
+        Unwrapped angle [n, rad].
+    slack
+        What its noise may do [rad].
+
+    Returns
+    -------
+    since
+        [n, rad], infinite before the first reversal.
+    run
+        Number of the run of each sample [n].
+    turned
+        Angle turned in each run [runs, rad], negative backwards; that of the first is infinite.
+
     """
     starts = np.concatenate([[0], reversals(theta, slack)])
     run = np.searchsorted(starts, np.arange(theta.size), side="right") - 1
@@ -185,10 +251,32 @@ def thinned(
     most: int,
     pad: int = PAD,
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    """Signals cut to an even selection of `most` windows, and their first samples in them.
+    """Signals cut to an even selection of windows.
 
-    A bench log holds far more windows than the effects need, and cost goes with samples. A few
-    samples on each side of a window keep what is smoothed or differenced out of its weights.
+    Parameters
+    ----------
+    found
+        Signals [n each].
+    keep
+        Samples that count [n].
+    length
+        Samples a window.
+    most
+        Windows that stay.
+    pad
+        Samples kept on each side of a window, for what is smoothed or differenced.
+
+    Returns
+    -------
+    signals
+        Cut to the windows and their pads, one after the other; whole where little would go.
+    starts
+        First samples of the windows in them.
+
+    Notes
+    -----
+    A bench log holds far more windows than the effects need, and cost goes with samples.
+
     """
     starts = window_starts(keep, length, length, most)
     if starts.size * (length + 2 * pad) >= keep.size:
@@ -259,10 +347,26 @@ def coarse_steps(found: Mapping[str, Array], noise: Mapping[str, float]) -> dict
 
 
 def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) -> None:
-    """Takes an angle that shows nothing but its noise around an even run as its local parabola.
+    """Takes an angle that shows nothing but its noise about an even run as its local parabola.
 
-    A dynamometer that holds its speed leaves only the encoder's rounding to difference twice;
-    times J that would be a torque, and a model that takes inertia away would seem to explain it.
+    Parameters
+    ----------
+    found
+        Columns; `theta_mech_rad` [n] is replaced.
+    noise
+        Of each column; that of the angle is lowered to what the parabola leaves [rad].
+    window
+        Samples of a weak window; a parabola has as many.
+
+    Notes
+    -----
+    A dynamometer that holds its speed leaves only the encoder's rounding to difference twice; times
+    J that would be a torque, and a model that takes inertia away would seem to explain it.
+
+    References
+    ----------
+    Savitzky and Golay, Anal. Chem. 36(8), 1964, 1627, doi:10.1021/ac60214a047.
+
     """
     theta, width = found["theta_mech_rad"], 2 * (window // 2) + 1
     if theta.size < 3 * width or noise["theta_mech_rad"] <= 0.0:

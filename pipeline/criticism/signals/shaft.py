@@ -61,7 +61,28 @@ def unexplained_acceleration(
 def sensed_torque(
     segment: Segment, x: Operating, torque_nm: Array, model: Model, values: Values
 ) -> Array:
-    """Torque [n, N·m] that a transducer shows: T − J d²θ/dt², with its errors and its gain."""
+    """Torque that a transducer between shaft and load shows.
+
+    Parameters
+    ----------
+    segment
+        On its true clock.
+    x
+        State of the machine, at one or more points a sample.
+    torque_nm
+        What turns the shaft, at the points of `x` [n·m, N·m].
+    model, values
+        With the effects of the transducer's errors, its gain and `j_kgm2`.
+
+    Returns
+    -------
+    array [n, N·m]
+
+    Notes
+    -----
+    T − J d²θ/dt², with its errors and its gain.
+
+    """
     finer = x.theta_rad.size // segment.size
     torque = _averaged(torque_nm, finer) if finer > 1 else torque_nm
     acceleration = _second_difference(x.theta_rad[::finer], segment.ts_s)
@@ -84,7 +105,24 @@ def true_load(
     *,
     inverter: bool = False,
 ) -> Array:
-    """Recorded torque [n, N·m], the dynamics of its transducer taken out."""
+    """Recorded torque, the dynamics of its transducer taken out.
+
+    Parameters
+    ----------
+    segment
+        Whose transducer it is.
+    signals
+        Recorded signals, `torque_shaft_nm` [n, N·m] among them.
+    model, values
+        With the effects of the transducer's dynamics.
+    inverter
+        Whether a drive feeds the machine.
+
+    Returns
+    -------
+    array [n, N·m]
+
+    """
     hooks = [e for e in model.effects if e.load is not None]
     torque = signals["torque_shaft_nm"]
     if not hooks:

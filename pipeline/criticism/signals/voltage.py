@@ -43,7 +43,21 @@ def rotor_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Comp
 
 
 def held_voltage(pieces: Pieces, omega_e_rad_s: Array, period_s: float) -> Complex:
-    """Voltage [n, V] in the rotor frame that is held from each sample to the next.
+    """Voltage in the rotor frame that is held from each sample to the next.
+
+    Parameters
+    ----------
+    pieces
+        Flux linkage [n, Wb] and voltage drop [n, V].
+    omega_e_rad_s
+        Electrical speed from each sample to the next [n, rad/s].
+    period_s
+        Sample period [s].
+
+    Returns
+    -------
+    complex array [n], V
+        d + jq; without the step to a next sample at the last.
 
     Notes
     -----
@@ -65,9 +79,25 @@ def recorded_voltage(
     *,
     in_frame: bool = False,
 ) -> Complex:
-    """What the voltmeter says of a true voltage [n, V]: the effects of its errors, and its gain.
+    """What the voltmeter shows of a true voltage: with the effects of its errors, and its gain.
 
-    `in_frame`: the voltage was turned into the rotor's frame by the recorded angle, error and all.
+    Parameters
+    ----------
+    voltage
+        True vector [n, V].
+    segment
+        Whose meter it is.
+    x
+        State of the machine.
+    model, values
+        With the effects of the meter's errors.
+    in_frame
+        Whether the voltage was turned into the rotor's frame by the recorded angle, error and all.
+
+    Returns
+    -------
+    complex array [n], V
+
     """
     for effect in model.effects:
         if effect.voltage is not None:
@@ -80,14 +110,42 @@ def recorded_voltage(
 
 
 def central(signal: Any, period_s: float) -> Any:
-    """Slope [n] by central differences, zero at both ends."""
+    """Slope by central differences.
+
+    Parameters
+    ----------
+    signal
+        [n, any unit]
+    period_s
+        Sample period [s].
+
+    Returns
+    -------
+    array [n]
+        (x_(k+1) − x_(k−1))/2T, zero at both ends.
+
+    """
     slope = np.zeros_like(signal)
     slope[1:-1] = (signal[2:] - signal[:-2]) / (2 * period_s)
     return slope
 
 
 def forward(signal: Any, period_s: float) -> Any:
-    """Slope [n] to the next sample, zero at the last."""
+    """Slope to the next sample.
+
+    Parameters
+    ----------
+    signal
+        [n, any unit]
+    period_s
+        Sample period [s].
+
+    Returns
+    -------
+    array [n]
+        (x_(k+1) − x_k)/T, zero at the last.
+
+    """
     slope = np.zeros_like(signal)
     slope[:-1] = np.diff(signal) / period_s
     return slope
