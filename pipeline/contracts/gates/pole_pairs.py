@@ -48,18 +48,20 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _unit(count: float, u: float, from_whole: float, stated: int | None) -> str:
-    """The foreign unit in which the count would be a whole number, in words, or an empty text.
+    """The foreign units in which the count would be a whole number, in words, or an empty text.
 
     That number has to be the nameplate's, or the count below one half, which no motor has: a slip
-    or a gear may meet a unit's factor by chance.
+    or a gear may meet a unit's factor by chance. Whatever is whole in rpm is so in degrees too, so
+    the one that makes the nameplate's number goes first.
     """
+    found: list[tuple[bool, str]] = []
     for factor, words in UNITS.items():
         cycles = count * factor
         whole = round(cycles)
         near = abs(cycles - whole) <= from_whole + 2.0 * u * factor
         if near and u * factor < 0.1 and whole > 0 and (whole == stated or count < 0.5):
-            return f"{words}, which makes {cycles:.3f}"
-    return ""
+            found.append((whole == stated, f"{words}, which makes {cycles:.3f}"))
+    return ", or ".join(words for same, words in found if same or not any(one for one, _ in found))
 
 
 GATE = Gate(
