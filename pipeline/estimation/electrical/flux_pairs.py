@@ -57,7 +57,6 @@ def _matched(points: Sequence[Point]) -> tuple[list[tuple[Point, Point]], float]
         if one.group == other.group
         and abs(one.id_a - other.id_a) < policy().flux_pairs.same_current * largest
         and abs(one.iq_a + other.iq_a) < policy().flux_pairs.same_current * largest
-        and (one is not other or abs(one.iq_a) < policy().flux_pairs.same_current * largest)
     ]
     return matched, largest
 
