@@ -287,11 +287,11 @@ def test_a_skip_stands_out_of_the_scatter_eight_times(sigmas: float, expected: s
 
 
 def test_only_rows_near_a_gap_are_looked_at() -> None:
-    """A turn of the speed 26 rows before the gap is beyond the line, 24 rows before it is not."""
+    """The line is through 25 rows: a bend before them does not count, one of the first does."""
     rows = np.arange(200.0)
     t_s = np.where(rows < 100, rows, rows + 9.0)
     options = GATES["clock_jump"].options
-    for back, there in ((26, True), (10, False)):
+    for back, there in ((25, True), (24, False)):
         bend = np.where(rows < 100 - back, 30.0 * (100 - back - rows), 0.0)
         made = capture("drive", t_s=t_s, theta_mech_rad=rows + bend)
         table = made.tables[0]
@@ -820,3 +820,79 @@ def test_a_sum_within_three_of_its_noise_is_any_channels(times: float, expected:
     lines = turned(AMPS, phase, 40.0)
     lines["ia_a"] = lines["ia_a"] + white + times
     assert said("phase_sum", capture("drive", **lines)) == expected
+
+
+@pytest.mark.parametrize(("upper", "expected"), [(1.0515, "warned"), (1.0575, "")])
+def test_levels_of_current_a_twentieth_apart(upper: float, expected: str) -> None:
+    """0.049 and 0.054 of the larger."""
+    current = np.repeat([1.0, upper], 500)
+    made = capture("resistance", ia_a=-current, vab_v=-current)
+    assert said("current_coverage", made) == expected
+
+
+def test_two_levels_of_both_currents_make_a_flux_map() -> None:
+    two, one = np.array([0.0, 1.0, 0.0, 1.0]), np.zeros(4)
+    assert said("current_coverage", capture("flux_map", id_a=two, iq_a=two[::-1])) == ""
+    assert said("current_coverage", capture("flux_map", id_a=one, iq_a=two)) == "refused"
+    assert said("current_coverage", capture("flux_map", id_a=two, iq_a=one)) == "refused"
+    assert said("current_coverage", capture("flux_map", id_a=two)) == ""
+
+
+def test_a_line_without_current_is_passed_over() -> None:
+    """A dead first line: the pair's other one tells the resistance."""
+    for volts, expected in ((1.0, ""), (1e-3, "warned")):
+        made = capture("resistance", vab_v=np.full(99, volts), ia_a=0.0, ib_a=-1.0)
+        assert said("plausible_terminals", made) == expected
+
+
+@pytest.mark.parametrize(("u", "expected"), [(0.097, "warned"), (0.103, "")])
+def test_a_count_that_is_known_to_a_tenth(u: float, expected: str) -> None:
+    """Blocks of equal travel of 7.3 ± d cycles a turn: u = d/sqrt(n - 1)."""
+    blocks, each = 200, 20
+    d = u * math.sqrt(blocks - 1)
+    step = np.repeat(7.3 + d * (-1.0) ** np.arange(blocks), each) * 0.01
+    angle = np.arange(blocks * each + 1) * 0.01
+    phase = np.concatenate([[0.0], np.cumsum(step)])
+    made = capture("open_circuit", theta_mech_rad=angle, **turned(VOLTS, phase))
+    found = turning(made)
+    assert found is not None
+    assert found.u == pytest.approx(u, rel=0.01)
+    assert said("pole_pairs", made) == expected
+
+
+def test_fewer_rows_than_blocks_say_nothing_of_the_torque() -> None:
+    for rows, expected in ((99, ""), (100, "refused")):
+        x = np.cos(np.arange(rows) * 0.7)
+        made = capture("torque_map", iq_a=x, torque_shaft_nm=-x)
+        assert said("torque_sign", made) == expected
+
+
+def test_a_shaft_that_rests_at_first_still_shows_its_count() -> None:
+    angle = np.concatenate([np.zeros(2000), np.linspace(0.0, 20.0, 4000)])
+    found = turning(capture("open_circuit", theta_mech_rad=angle, **turned(VOLTS, 7.0 * angle)))
+    assert found is not None
+    assert found.cycles_per_turn == pytest.approx(7.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("gate", ["stuck_channel", "saturation"])
+def test_a_run_is_by_chance_at_one_in_a_million(gate: str) -> None:
+    """Half of the samples repeat: a run just shorter than 1 + log(1e-6/n)/log(p) is chance."""
+    from pipeline.contracts.waveform import longest_likely_run
+
+    found = {}
+    for repeats in range(340, 410):
+        rng = np.random.default_rng(repeats)
+        values = rng.uniform(-1.0, 1.0, 1000)
+        pairs = rng.permutation(np.r_[1:440:2, 601:1000:2])[:repeats]  # none beside the run
+        values[pairs] = values[pairs - 1]
+        for length in range(22, 30):
+            one = values.copy()
+            one[500 : 500 + length] = 0.3 if gate == "stuck_channel" else 1.5
+            inside = one if gate == "stuck_channel" else one[one != 1.5]
+            inside = inside if gate == "stuck_channel" else inside[inside != inside.min()]
+            found[repeats, length] = (longest_likely_run(inside, 1e-6) - length, one)
+    near = {k: v for k, v in found.items() if abs(v[0]) < 0.12}
+    assert {v[0] > 0.0 for v in near.values()} == {True, False}
+    rows_of_ = {"stuck_channel": stuck_channel.frozen_rows, "saturation": saturation.clipped_rows}
+    for over, values in near.values():
+        assert bool(rows_of_[gate](values, OPTIONS[gate]).any()) is (over < 0.0)

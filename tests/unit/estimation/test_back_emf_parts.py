@@ -22,6 +22,8 @@ from pipeline.estimation.electrical.back_emf import (
     read_spin,
     steady_stretches,
 )
+from pipeline.estimation.electrical.spin_angle import Group, angle_offset, count_pole_pairs
+from pipeline.estimation.estimators.open_circuit import METHOD
 from pipeline.numerics.least_squares import autocorrelation_time
 from tests.unit.estimation.signals import capture
 
@@ -341,3 +343,54 @@ def test_below_six_of_the_noise_the_rotor_stands(sigmas: float, there: bool) -> 
     found, spinning = back_emf._stretches(spin, 0.02)
     assert spinning == pytest.approx(5000 + 15000 * seen, rel=0.03)
     assert bool([s for s in found if s.speed_rad_s < 2.0 * slow]) is there
+
+
+# What the speeds of several captures say of the shaft
+
+
+def group_of(name, ratio, *, offset=0.3, speed=300.0, theta=True, start=0.0):
+    """One speed whose electrical angle is ratio times the shaft's, d axis ahead by `offset`."""
+    t, phase, v = even(speed, start=start)
+    sense = math.copysign(1.0, speed)
+    axis = phase - sense * math.pi / 2.0
+    shaft = (axis - offset) / ratio
+    spin = spin_of(t, v, theta=shaft if theta else None)
+    part = Stretch(np.arange(t.size), phase, np.full(t.size, speed))
+    made = capture("open_circuit", name, t_s=t)
+    return Group(made, spin, part, flux_of(spin, part, ()), 25.0)
+
+
+@pytest.mark.parametrize("order", [1.0, -1.0])
+def test_pole_pairs_phase_order_and_angle_of_several_speeds(order: float) -> None:
+    """Offsets 0.28 and 0.32: their mean, and sd/sqrt(2) of it."""
+    groups = [
+        group_of("a", 7.0 * order, offset=0.28),
+        group_of("b", 7.0 * order, offset=0.32, speed=-500.0),
+    ]
+    pairs, sense = count_pole_pairs(METHOD, groups)
+    assert (pairs.value, sense.value) == (7, order)
+    assert pairs.captures == ("a", "b")
+    angle = angle_offset(METHOD, groups, pairs, sense)
+    assert angle.number == pytest.approx(0.30, abs=1e-6)
+    apart = np.array([-0.02, 0.02])
+    assert angle.u_a == pytest.approx(apart.std(ddof=1) / math.sqrt(2.0), rel=1e-4)
+    assert [p.dof for p in angle.budget] == [1.0]
+    alone = angle_offset(METHOD, groups[:1], pairs, sense)
+    assert alone.u_a == pytest.approx(math.pi / 100.0)
+    blind = [group_of("a", 7.0, theta=False)]
+    assert not angle_offset(METHOD, blind, pairs, sense).known
+    assert not count_pole_pairs(METHOD, blind)[0].known
+
+
+def test_captures_that_disagree_on_the_count_or_the_order() -> None:
+    pairs, order = count_pole_pairs(METHOD, [group_of("a", 7.0), group_of("b", 5.0)])
+    assert "7.00000, 5.00000" in pairs.note
+    assert not pairs.known
+    assert order.value == 1
+    pairs, order = count_pole_pairs(METHOD, [group_of("a", 7.0), group_of("b", -7.0)])
+    assert pairs.value == 7
+    assert "disagree on the phase order" in order.note
+    pairs, _ = count_pole_pairs(METHOD, [group_of("a", 7.01)])
+    assert pairs.value == 7
+    assert "7.01000; 0.01 from the whole number" in pairs.note
+    assert not count_pole_pairs(METHOD, [group_of("a", 7.03)])[0].known

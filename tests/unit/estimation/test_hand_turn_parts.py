@@ -78,7 +78,12 @@ def test_the_golden_section_finds_either_ends_side() -> None:
     for at in (0.137, 0.5, 0.91):
         assert _least(lambda x, at=at: (x - at) ** 2, 0.0, 1.0) == pytest.approx(at, abs=2e-6)
     calls: list[float] = []
-    _least(lambda x: calls.append(x) or (x - 0.3) ** 2, -1.0, 1.0)  # type: ignore[func-returns-value]
+
+    def counted(x: float) -> float:
+        calls.append(x)
+        return (x - 0.3) ** 2
+
+    _least(counted, -1.0, 1.0)
     # 2 shrinks by the golden ratio to 1e-6 in 31 steps of one value each, two to begin with
     assert len(calls) == 2 + math.ceil(math.log(2.0 / 1e-6) / math.log((1.0 + math.sqrt(5.0)) / 2))
 

@@ -37,8 +37,11 @@ from pipeline.estimation.electrical.operating_points import (
 )
 from pipeline.estimation.estimators import resistance
 from pipeline.estimation.estimators.inductance_rated import (
+    Result,
     _direct,
+    _evidence,
     _hold_doubt,
+    _Look,
     _other_side,
     _quadrature,
 )
@@ -770,3 +773,31 @@ def test_the_imbalance_is_the_range_over_the_mean() -> None:
     assert found.number == pytest.approx(0.3 / 2.0)
     u = math.sqrt(1e-4 + 4e-4 - 1e-4) / 2.0 * 3.314 / (1.960 * math.sqrt(2.0))
     assert found.u_a == pytest.approx(u)
+
+
+# Plots and doubts of rated inductances
+
+
+def test_what_the_fastest_point_turns_while_currents_are_late() -> None:
+    look = _Look([point(1.0, w=50.0), point(1.0, w=-300.0)], P, 0.0, [], 0.1, 2e-5)
+    assert look.behind_rad == pytest.approx(2e-5 * P * 300.0)
+
+
+def test_lines_of_a_published_inductance_go_through_the_flux_at_no_current() -> None:
+    fluxes = flux_pairs(GRID, P)
+    q, d = _evidence(fluxes, Result(LD, 0.0, -10.0, 5.0), Result(LQ, 0.0, 0.0, 10.0))
+    for plot, slope in ((q, LQ), (d, LD)):
+        assert len(plot.series) == 3
+        for series in plot.series:
+            assert np.all(np.diff(series.x) >= 0.0)
+            if series.fitted.size > 1:
+                assert np.diff(series.fitted) == pytest.approx(slope * np.diff(series.x))
+            if np.any(np.abs(series.x) < 0.3) or plot is q:
+                near = np.abs(series.x) < 0.3
+                assert series.fitted[near] == pytest.approx(series.measured[near])
+    labels = [series.label for series in q.series]
+    assert labels == ["id_a -10 A", "id_a -5 A", "id_a 0 A"]
+    zero = q.series[2]
+    assert zero.x.tolist() == [0.0, 5.0, 10.0]
+    assert zero.fitted == pytest.approx(zero.measured)
+    assert _evidence([], None, None) == ()

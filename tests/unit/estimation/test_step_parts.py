@@ -8,7 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.estimation.electrical.step_budget import birge_ratio, unexplained
+from pipeline.estimation.electrical.step_budget import (
+    birge_ratio,
+    gains,
+    rotor_angles,
+    unexplained,
+)
 from pipeline.estimation.electrical.step_fit import (
     _white_power,
     between_models,
@@ -44,9 +49,10 @@ from pipeline.estimation.electrical.step_wave import (
     noise_of,
     waveform_of,
 )
+from pipeline.estimation.estimators import current_step
 from pipeline.estimation.estimators.current_step import inductances
 from pipeline.numerics.least_squares import autocorrelation_time
-from tests.unit.estimation.signals import capture
+from tests.unit.estimation.signals import capture, estimates
 
 R, L = 1.2, 1.8e-3
 PERIOD = 2e-5
@@ -517,6 +523,9 @@ def solution():
 def test_a_fit_finds_both_axes_and_their_noise(solution) -> None:
     assert solution.parameters[[LD, LQ]] == pytest.approx([5e-4, 1e-3], rel=2e-3)
     assert not solution.free[LD + 1 : LQ].any()
+    assert solution.free[len(SHARED) :].all()
+    for at in solution.model.layout.starts:
+        assert solution.parameters[at] == pytest.approx(R, rel=2e-3)
     assert np.array(solution.sigmas) == pytest.approx(2e-3, rel=0.15)
     assert solution.scatter == pytest.approx(1.0, rel=0.15)
     assert price_of(solution.model) == pytest.approx(math.log(3 * 1200))
@@ -540,6 +549,48 @@ def test_captures_that_disagree_widen_the_mean_to_what_they_scatter_by() -> None
     assert u == pytest.approx(values.std(ddof=1) / math.sqrt(3.0), rel=0.25)
     assert together.parameters[LD] == pytest.approx(values.mean(), rel=2e-3)
     assert birge_ratio(singles[0]) == 1.0
+    alike = [replace(one, path=f"{k}") for k, one in enumerate((steps[0],) * 3)]
+    assert birge_ratio(solve(model_of(*alike), ("ld_h",))) == 1.0
+
+
+def test_an_angle_that_is_off_moves_an_inductance_by_its_equation() -> None:
+    """2 (cos^2 g Ld + sin^2 g Lq) of two rotor angles, solved anew with one of them turned."""
+    ld, lq, u = 5e-4, 1e-3, 0.02
+    angles = (-15.0, 50.0)
+    axes = [-math.pi / 6.0 - math.radians(a) for a in angles]
+
+    def pair(g):
+        return 2.0 * (math.cos(g) ** 2 * ld + math.sin(g) ** 2 * lq)
+
+    steps = [step(k, noise=1e-4, theta=a, path=f"{k}", l=pair(g))
+             for k, (a, g) in enumerate(zip(angles, axes, strict=True))]  # fmt: skip
+    found = solve(model_of(*steps), ("ld_h", "lq_h"))
+    assert found.parameters[[LD, LQ]] == pytest.approx([ld, lq], rel=5e-3)
+    for place, name in enumerate(("ld_h", "lq_h")):
+        parts = {p.source: p.u for p in rotor_angles(name, found, u)}
+        for k, angle in enumerate(angles):
+            ends = []
+            for side in (-u, u):
+                turned = [g + side * (k == n) for n, g in enumerate(axes)]
+                mix = [[2 * math.cos(g) ** 2, 2 * math.sin(g) ** 2] for g in turned]
+                ends.append(np.linalg.solve(mix, [pair(g) for g in axes])[place] - (ld, lq)[place])
+            odd, even = 0.5 * (ends[1] - ends[0]), 0.5 * (ends[1] + ends[0])
+            expected = math.copysign(math.hypot(odd, math.sqrt(3.0) * even), odd)
+            assert parts[f"theta_elec:{angle:g}@s"] == pytest.approx(expected, rel=0.04)
+
+
+def test_a_gain_scales_the_inductance() -> None:
+    """L goes with v/i: one day in full; of two days half the variance of each gain is its own."""
+    steps = [step(k, noise=1e-4, path=f"{k}", l=1e-3) for k in range(2)]
+    days = [replace(one, meta=replace(one.meta, started_at=f"2026-03-0{k + 1}T08:00:00Z"))
+            for k, one in enumerate(steps)]  # fmt: skip
+    value = 5e-4
+    same = {p.source: p.u for p in gains("ld_h", solve(model_of(*steps), ("ld_h",)))}
+    assert same == pytest.approx({"voltage@s": 1e-3 * value, "current@s": -2e-3 * value}, rel=0.02)
+    parts = {p.source: p.u for p in gains("ld_h", solve(model_of(*days), ("ld_h",)))}
+    assert parts["voltage@s"] == pytest.approx(1e-3 * value / math.sqrt(2.0), rel=0.02)
+    own = parts["voltage@s:2026-03-01"] + parts["voltage@s:2026-03-02"]
+    assert own == pytest.approx(1e-3 * value / math.sqrt(2.0), rel=0.02)
 
 
 def test_the_spread_between_models_is_weighted_by_their_bic(solution) -> None:
@@ -551,3 +602,13 @@ def test_the_spread_between_models_is_weighted_by_their_bic(solution) -> None:
     expected = math.sqrt((worse * 4e-12 + 1e-12) / (2.0 + worse))
     assert between_models(solution, offers) == pytest.approx(expected)
     assert between_models(solution, []) == 0.0
+
+
+def test_the_largest_current_of_an_axis_is_that_of_its_own_steps() -> None:
+    """3 V on d and 6 V on q of 1.2 ohm: 2/sqrt(3) of 2.5 and of 5 A."""
+    found = estimates(current_step.ESTIMATOR, step(1, volts=3.0, noise=1e-3, path="d"),
+                      step(2, noise=1e-3, theta=60.0, path="q"))  # fmt: skip
+    for name, amps in (("ld_h", 2.5), ("lq_h", 5.0)):
+        largest = found[name].at["current_largest_a"]
+        assert largest == pytest.approx(2.0 / math.sqrt(3.0) * amps, rel=5e-3)
+        assert f"no saturation seen up to {largest:.3g} A" in found[name].note

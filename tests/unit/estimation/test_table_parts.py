@@ -17,6 +17,7 @@ from pipeline.estimation.estimators import (
     holding_current,
     lcr,
     open_circuit,
+    soak,
     torque_table,
 )
 from pipeline.estimation.estimators.current_step import along_ramp, inductances
@@ -357,7 +358,7 @@ def test_inductances_bend_with_their_own_flux() -> None:
 
 
 def test_inductance_along_a_ramp() -> None:
-    """L = L0/(1 + a y) of the d axis: i = (y + a y^2/2)/L0, so 1/(1 + a y) = 1/sqrt(1 + 2 a L0 i)."""
+    """L = L0/(1 + a y) of the d axis: i L0 = y + a y^2/2: 1 + a y = sqrt(1 + 2 a L0 i)."""
     shared = np.array([1e-3, 40.0, 0, 0, 0, 2e-3, 0, 0, 0, 0])
     ramp = np.linspace(0.0, 5.0, 200)
     found = along_ramp(shared, 1.0, ramp)
@@ -384,8 +385,11 @@ def test_flux_and_its_coefficient_from_steady_speeds() -> None:
     found = open_circuit._flux_estimates(groups, used, [], options)
     psi, alpha = found["psi_pm_wb"], found["temp_coeff_magnet_1_k"]
     excess = np.array([0.0, 20.0, 40.0])
-    fit = linear_fit(np.column_stack([np.ones(3), excess]),
-                     np.array([0.01000, 0.00981, 0.00959]), np.array([1e-6, 2e-6, 1e-6]))  # fmt: skip
+    fit = linear_fit(
+        np.column_stack([np.ones(3), excess]),
+        np.array([0.01000, 0.00981, 0.00959]),
+        np.array([1e-6, 2e-6, 1e-6]),
+    )
     value, slope = fit.coefficients
     assert psi.number == pytest.approx(value)
     assert alpha.number == pytest.approx(slope / value)
@@ -783,3 +787,42 @@ def test_a_coefficient_of_each_regime_relative_to_the_common_one() -> None:
     assert _of_partition(made, 0, told, Partition("few", enough, ("one", "other"))) is not None
     alone_ = Partition("all", np.zeros(120, dtype=np.int64), ("one", "other"))
     assert _of_partition(made, 0, told, alone_) is None
+
+
+# Soak
+
+
+def soaked(temp, alpha=0.0038, pair="ab", noise=0.0, seed=0):
+    rng = np.random.default_rng(seed)
+    i = np.repeat([1.0, 2.0, -1.0, -2.0], 200) + 1e-6 * rng.standard_normal(800)
+    v = 0.8 * (1.0 + alpha * (temp - 25.0)) * i + noise * rng.standard_normal(800)
+    columns = {f"v{pair}_v": v, f"i{pair[0]}_a": i, "temp_winding_degc": np.full(800, temp)}
+    return capture("resistance", f"{pair}{temp}", pair=pair, t_s=np.arange(800) * 1e-3, **columns)
+
+
+@pytest.mark.parametrize(("span", "there"), [(9.9, False), (10.1, True)])
+def test_copper_of_a_soaked_pair(span: float, there: bool) -> None:
+    """Of the pairs that were measured ten kelvin apart; another pair does not count."""
+    runs = [
+        soaked(20.0, noise=1e-5),
+        soaked(20.0 + span, noise=1e-5, seed=1),
+        soaked(20.0, 0.009, "bc"),
+    ]
+    found = estimates(soak.ESTIMATOR, *runs)["temp_coeff_copper_1_k"]
+    assert found.known is there
+    if there:
+        assert found.number == pytest.approx(0.0038, rel=1e-3)
+        assert (found.at["temp_low_degc"], found.at["temp_high_degc"]) == pytest.approx(
+            (20.0, 30.1)
+        )
+        parts = {p.source: p.u for p in found.budget}
+        assert parts["temperature@s"] == pytest.approx(0.0038**2 * 0.5, rel=5e-3)
+        assert abs(parts.get("voltage@s", 0.0)) < 1e-8
+
+
+def test_a_coefficient_that_the_scatter_hides_is_not_published() -> None:
+    """Within a fifth of itself it is."""
+    rough = [soaked(20.0, noise=0.2, seed=3), soaked(31.0, noise=0.2, seed=4)]
+    assert not estimates(soak.ESTIMATOR, *rough)["temp_coeff_copper_1_k"].known
+    allowed = estimates(soak.ESTIMATOR, *rough, worst_u_rel=50.0)["temp_coeff_copper_1_k"]
+    assert allowed.u_a > 0.2 * abs(allowed.number)
