@@ -31,7 +31,6 @@ from pipeline.estimation.electrical.operating_points import (
     _settled,
     _steady,
     _whole_cycles,
-    magnet_temperature,
     operating_points,
     pole_pairs_of,
 )
@@ -491,8 +490,9 @@ def test_points_of_one_speed_and_of_one_angle_are_one_group() -> None:
 
 
 def test_a_point_as_an_instrument_that_is_off_shows_it() -> None:
-    one = point(3.0, -2.0).shifted({"current@s": 0.1, "voltage@s": 0.2, "torque@s": -0.5,
-                                    "temperature@s": 4.0})  # fmt: skip
+    warm = capture("torque_map", t_s=np.arange(3.0), temp_magnet_degc=np.full(3, 25.0))
+    off = {"current@s": 0.1, "voltage@s": 0.2, "torque@s": -0.5, "temperature@s": 4.0}
+    one = point(3.0, -2.0, source=warm).shifted(off)
     plain = point(3.0, -2.0)
     assert (one.iq_a, one.id_a) == pytest.approx((3.3, -2.2))
     assert (one.vd_v, one.vq_v) == pytest.approx((1.2 * plain.vd_v, 1.2 * plain.vq_v))
@@ -501,8 +501,6 @@ def test_a_point_as_an_instrument_that_is_off_shows_it() -> None:
 
 
 def test_temperature_and_pole_pairs_where_nobody_measured_them() -> None:
-    assert magnet_temperature(MAP)[0] == 25.0
-    assert magnet_temperature(replace(MAP, meta=replace(MAP.meta, ambient_degc=31.0)))[0] == 31.0
     assert pole_pairs_of(Constants((known_value("pole_pairs", 6.99),)), 5) == 7
     assert pole_pairs_of(Constants(), 5) == 5
     assert pole_pairs_of(Constants(), "5") is None

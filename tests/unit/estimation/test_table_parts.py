@@ -372,7 +372,8 @@ def test_inductance_along_a_ramp() -> None:
 
 
 def group(psi, u, temp=25.0, harmonics=None, u_harmonic=1e-3, **meta):
-    made = capture("open_circuit", f"{psi}", t_s=np.arange(2.0), **meta)
+    logged = {"temp_magnet_degc": np.full(2, temp)}
+    made = capture("open_circuit", f"{psi}", t_s=np.arange(2.0), **logged, **meta)
     flux = StretchFlux(psi, u, harmonics or {}, u_harmonic, 100.0, temp, 1.0)
     return Group(made, None, None, flux, temp)  # type: ignore[arg-type]
 
@@ -380,9 +381,8 @@ def group(psi, u, temp=25.0, harmonics=None, u_harmonic=1e-3, **meta):
 def test_flux_and_its_coefficient_from_steady_speeds() -> None:
     """Three temperatures with their own u: weighted line, alpha by the ratio's gradient."""
     groups = [group(0.01000, 1e-6), group(0.00981, 2e-6, 45.0), group(0.00959, 1e-6, 65.0)]
-    used = tuple(g.capture for g in groups)
     options = open_circuit.ESTIMATOR.options
-    found = open_circuit._flux_estimates(groups, used, [], options)
+    found = open_circuit._flux_estimates(groups, [], options)
     psi, alpha = found["psi_pm_wb"], found["temp_coeff_magnet_1_k"]
     excess = np.array([0.0, 20.0, 40.0])
     fit = linear_fit(
@@ -407,9 +407,7 @@ def test_flux_and_its_coefficient_from_steady_speeds() -> None:
 @pytest.mark.parametrize(("span", "measured"), [(7.9, False), (8.1, True)])
 def test_a_coefficient_needs_eight_kelvin(span: float, measured: bool) -> None:
     groups = [group(0.01, 1e-9), group(0.01 * (1.0 - 0.002 * span), 1e-9, 25.0 + span)]
-    found = open_circuit._flux_estimates(
-        groups, tuple(g.capture for g in groups), [], open_circuit.ESTIMATOR.options
-    )
+    found = open_circuit._flux_estimates(groups, [], open_circuit.ESTIMATOR.options)
     assert found["temp_coeff_magnet_1_k"].known is measured
 
 
@@ -420,9 +418,7 @@ def test_a_coefficient_is_known_to_three_ten_thousandths(share: float, measured:
     both = math.hypot(1.0, 1.0 + 20.0 * alpha)
     u = share * 3e-4 * 20.0 * 0.01 / both
     groups = [group(0.01, u), group(0.01 * (1.0 + 20.0 * alpha), u, 45.0)]
-    found = open_circuit._flux_estimates(
-        groups, tuple(g.capture for g in groups), [], open_circuit.ESTIMATOR.options
-    )
+    found = open_circuit._flux_estimates(groups, [], open_circuit.ESTIMATOR.options)
     assert found["temp_coeff_magnet_1_k"].known is measured
 
 
@@ -430,7 +426,7 @@ def test_an_assumed_coefficient_acts_by_its_lever() -> None:
     """One temperature, 20 K above: psi25 = psi/(1 + 20 alpha), and d psi25/d alpha over it."""
     groups = [group(0.0098, 1e-6, 45.0)]
     options = open_circuit.ESTIMATOR.options
-    found = open_circuit._flux_estimates(groups, (groups[0].capture,), [], options)["psi_pm_wb"]
+    found = open_circuit._flux_estimates(groups, [], options)["psi_pm_wb"]
     factor = 1.0 - 0.0011 * 20.0
     assert found.number == pytest.approx(0.0098 / factor)
     parts = {p.source: p.u for p in found.budget}
