@@ -17,7 +17,7 @@ from pipeline.estimation.electrical.step_budget import (
 from pipeline.estimation.electrical.step_fit import (
     _white_power,
     between_models,
-    price_of,
+    bic_penalty,
     row_variance,
     solve,
 )
@@ -528,7 +528,7 @@ def test_a_fit_finds_both_axes_and_their_noise(solution) -> None:
         assert solution.parameters[at] == pytest.approx(R, rel=2e-3)
     assert np.array(solution.sigmas) == pytest.approx(2e-3, rel=0.15)
     assert solution.scatter == pytest.approx(1.0, rel=0.15)
-    assert price_of(solution.model) == pytest.approx(math.log(3 * 1200))
+    assert bic_penalty(solution.model) == pytest.approx(math.log(3 * 1200))
     u = np.sqrt(np.diag(solution.covariance()))
     assert abs(solution.parameters[LD] - 5e-4) < 4.0 * u[LD]
     assert u[LD + 1] == 0.0
@@ -595,7 +595,7 @@ def test_a_gain_scales_the_inductance() -> None:
 
 def test_the_spread_between_models_is_weighted_by_their_bic(solution) -> None:
     """One that gains as much as it costs weighs 1: sqrt(change^2 / 2)."""
-    price = price_of(solution.model)
+    price = bic_penalty(solution.model)
     assert between_models(solution, [(price, 1, 2e-6)]) == pytest.approx(2e-6 / math.sqrt(2.0))
     worse = math.exp(-0.5 * 4.0)
     offers = [(price - 4.0, 1, 2e-6), (price + 9.0, 2, 1e-6)]
