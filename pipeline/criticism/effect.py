@@ -340,9 +340,37 @@ ClockHook = Callable[[str, Values], float]
 DiscriminatorHook = Callable[[Sequence[FullLog], Values], Discrimination | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Effect:
-    """One effect. Every hook gets the parameters by name, in their own units.
+@dataclass(frozen=True, kw_only=True)
+class Description:
+    """What is said of an effect to people.
+
+    `words` is its formula in a line, `signature` what it looks like, `headline` what a person says
+    of it, with sizes in braces (`criticism.library.headline`); name and parameters without one.
+    """
+
+    words: str
+    signature: str
+    reference: str
+    headline: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What shows an effect: `signals` are the capture columns without which it cannot be seen,
+    `tests` those that excite it, the best first, and `experiment` the one to record.
+
+    `rivals`: other effects and the test or calibration that parts them from this.
+    """
+
+    tests: tuple[str, ...]
+    experiment: str
+    signals: tuple[str, ...] = ()
+    rivals: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hooks:
+    """Where an effect enters the equations. Every hook gets the parameters by name, in their units.
 
     coenergy(x, q): co-energy over 1.5 [Wb·A] as an analytic function of `x.id_a`, `x.iq_a`,
         `x.eps_rad`, which arrive complex: flux is its gradient by the currents, torque gains
@@ -360,25 +388,8 @@ class Effect:
 
     discriminator(logs, q): which of the effects that share this very function it is;
         None where full logs do not say. For effects whose equations differ in what windows smooth.
-
-    `parameters`, or `expand(machine)` where their number depends on the machine. `signals` are
-    capture columns without which the effect cannot be seen, `tests` those that excite it, the
-    best first. `rivals`: other effects and the test or calibration that parts them from this.
-    `left_out`: the numbers of the optional terms that this copy of the effect does without.
-    `headline`: what a person says of it, with sizes in braces (`criticism.library.headline`); its
-    name and its parameters where it has none.
     """
 
-    name: str
-    words: str
-    signature: str
-    tests: tuple[str, ...]
-    experiment: str
-    reference: str
-    parameters: tuple[Parameter, ...] = ()
-    expand: Callable[[Machine], tuple[Parameter, ...]] | None = None
-    signals: tuple[str, ...] = ()
-    rivals: Mapping[str, str] = field(default_factory=dict)
     coenergy: CoenergyHook | None = None
     drop: DropHook | None = None
     torque: TorqueHook | None = None
@@ -391,8 +402,6 @@ class Effect:
     speed: Callable[[Array, Values, float], Array] | None = None
     clock: ClockHook | None = None
     discriminator: DiscriminatorHook | None = None
-    left_out: tuple[int, ...] = ()
-    headline: str = ""
 
     @property
     def hook(self) -> str:
@@ -402,6 +411,20 @@ class Effect:
         if self.coenergy is not None:
             return "flux"
         return "torque" if self.torque is not None else "sensor"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect(Description, Evidence, Hooks):
+    """One effect: what it is called, where it acts, what shows it and what is said of it.
+
+    `parameters`, or `expand(machine)` where their number depends on the machine. `left_out`: the
+    numbers of the optional terms that this copy of the effect does without.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...] = ()
+    expand: Callable[[Machine], tuple[Parameter, ...]] | None = None
+    left_out: tuple[int, ...] = ()
 
     def parameters_of(self, machine: Machine) -> tuple[Parameter, ...]:
         """The parameters for one machine, `expand`ed where their number depends on it."""

@@ -59,7 +59,7 @@ capture = Capture("turn.csv", "0", "verified", meta, (table,))
 campaign = Campaign("m", (capture,))
 machine = machine_of(campaign, Constants())
 made = segments(campaign, machine)
-fitted, _ = first_fit(made, rough_fit(made, Model(machine, ())))
+fitted = first_fit(rough_fit(made, Model(machine, ()))).fit
 left = residual(made[0], fitted.model, fitted.values)[0, 50:-50]
 print(json.dumps([made[0].kind, fitted.values["psi_wb"], float(np.std(left))]))
 """

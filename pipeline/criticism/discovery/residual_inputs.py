@@ -237,8 +237,22 @@ def _port(
     times = carriers[0].words
     words = f"{word} as a curve of {variable.name}" + (f" times {times}" if times else "")
     title = f"port:{hook}:{'+'.join(signals)}:{variable.name}:{times}:{count}"
-    effect = Effect(title, words, "", (), "", "", _parameters(names, hook), **hooks)
+    effect = _effect(title, words, _parameters(names, hook), **hooks)
     return Port(effect, hook, variable, basis, carriers, signals)
+
+
+def _effect(name: str, words: str, parameters: tuple[Parameter, ...], **hooks: Any) -> Effect:
+    """An effect that nobody is told of by its name."""
+    return Effect(
+        name=name,
+        words=words,
+        parameters=parameters,
+        signature="",
+        reference="",
+        tests=(),
+        experiment="",
+        **hooks,
+    )
 
 
 def _flux_map() -> Port:
@@ -251,14 +265,6 @@ def _flux_map() -> Port:
         weights = zip(powers, q.values(), strict=True)
         return size * sum(c * d**a * i**b for (a, b), c in weights if c)
 
-    effect = Effect(
-        "port:flux:current",
-        "co-energy as a polynomial of the currents",
-        "",
-        (),
-        "",
-        "",
-        _parameters(names, "flux"),
-        coenergy=coenergy,
-    )
+    words = "co-energy as a polynomial of the currents"
+    effect = _effect("port:flux:current", words, _parameters(names, "flux"), coenergy=coenergy)
     return Port(effect, "flux", None, None, (), ("psi_d_wb", "psi_q_wb"), powers)

@@ -23,6 +23,7 @@ from pipeline.criticism.effect import (
     CoenergyHook,
     Complex,
     Effect,
+    Hooks,
     Machine,
     Operating,
     Parameter,
@@ -178,7 +179,7 @@ def flux_of(current: Complex, base: Values) -> Complex:
     return flux
 
 
-def effect_flux(effect: Effect, x: Operating, q: Values) -> tuple[Complex, Array]:
+def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]:
     """Flux ∂W/∂i (complex) [Wb] and ∂W/∂ε [Wb·A] of one effect, by complex steps.
 
     f'(x) = Im f(x + ih)/h is exact to rounding for an analytic f.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Effect
+from pipeline.criticism.effect import Hooks
 from pipeline.criticism.library.equations import equation_of
 
 
@@ -14,7 +14,7 @@ def observes_sensor(segment: Segment, sensor: str) -> bool:
     return sensor in equation_of(segment).observes.sensors
 
 
-def observes(segment: Segment, effect: Effect) -> bool:
+def observes(segment: Segment, effect: Hooks) -> bool:
     """Whether what an effect does is in a segment's equation at all."""
     if effect.hook == "sensor":
         return any(observes_sensor(segment, sensor) for sensor in _sensors_of(effect))
@@ -26,7 +26,7 @@ def observes(segment: Segment, effect: Effect) -> bool:
     return effect.hook in seen.hooks
 
 
-def _sensors_of(effect: Effect) -> tuple[str, ...]:
+def _sensors_of(effect: Hooks) -> tuple[str, ...]:
     hooks = {
         "angle": (effect.angle,),
         "current": (effect.current,),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Effect
+from pipeline.criticism.effect import Effect, Evidence
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.segments import known_tests
@@ -60,13 +60,13 @@ def unexcited(
     return tuple(found)
 
 
-def _holds(campaign: Campaign, effect: Effect, test: str) -> bool:
+def _holds(campaign: Campaign, effect: Evidence, test: str) -> bool:
     """Whether some capture is of a test and has every signal that shows an effect."""
     captures = campaign.of(test)
     return any(all(capture.has(name) for name in effect.signals) for capture in captures)
 
 
-def _missing(campaign: Campaign, effect: Effect, tests: Sequence[str]) -> tuple[str, ...]:
+def _missing(campaign: Campaign, effect: Evidence, tests: Sequence[str]) -> tuple[str, ...]:
     """Signals of an effect that no capture of these tests has, none where there is no capture."""
     captures = campaign.of(*tests)
     if not captures:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from pipeline.criticism.effect import SCALES as SCALED
-from pipeline.criticism.effect import Effect, Machine
+from pipeline.criticism.effect import Machine
 from pipeline.criticism.effects.angle_eccentricity import EFFECT as ECCENTRIC
 from pipeline.criticism.effects.cogging import EFFECT as COGGING
 from pipeline.criticism.library.headline import UNKNOWN_SIZE, amplitude, headline
@@ -51,7 +52,7 @@ def test_what_is_not_determined_is_of_unknown_size() -> None:
 
 
 def test_an_effect_without_words_tells_its_name_and_its_numbers() -> None:
-    own = Effect("seal_drag", "drag", "drag", (), "a test", "none")
+    own = replace(COGGING, name="seal_drag", headline="")
     assert headline(own, {"torque_nm": (0.01, 1e-4, "N·m")}) == (
         "seal_drag (torque_nm 10.00 ± 0.20 mN·m)"
     )

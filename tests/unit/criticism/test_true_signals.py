@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Discrimination, Effect, Operating, Parameter, Values
+from pipeline.criticism.effect import Discrimination, Operating, Parameter, Values
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
 from pipeline.criticism.regression.fit import Fit
@@ -139,8 +139,9 @@ def test_a_drop_may_ask_for_the_flux_whatever_the_ripple():
     def drop(x: Operating, q: Values) -> np.ndarray:
         return q["share"] * x.flux_wb
 
-    amplitude = (Parameter("share", "1", 0.1, 0.01),)
-    own = Effect("flux_drop", "", "", (), "", "", amplitude, drop=drop)
+    flux_drop = (Parameter("share", "1", 0.1, 0.01),)
+    own = replace(effects()["cogging"], name="flux_drop", parameters=flux_drop, expand=None)
+    own = replace(own, torque=None, drop=drop)
     model = Model(machine(), (own,))
     values = {**BASE, "flux_drop.share": 0.1, "ripple_slope": 0.1}
     assert evaluate(model, operating(), values).drop_v.shape == (60,)

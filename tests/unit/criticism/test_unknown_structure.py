@@ -79,17 +79,17 @@ def _softening(seed, fall_h_k):
     segment = log(noise=1.0, seed=seed)
     columns = {"temp_winding_degc": warm, "temp_magnet_degc": np.full(segment.size, 25.0)}
     segment = replace(segment, recorded={**segment.recorded, **columns})
-    noise_ratio = Effect(
-        "soft",
-        "L_q falls",
-        "",
-        (),
-        "",
-        "",
-        (Parameter("fall_h_k", "H/K", 1.0, 0.1),),
+    falling = Effect(
+        name="soft",
+        words="L_q falls",
+        signature="",
+        reference="",
+        tests=(),
+        experiment="",
+        parameters=(Parameter("fall_h_k", "H/K", 1.0, 0.1),),
         coenergy=lambda x, q: -0.5 * q["fall_h_k"] * x.winding_k * x.iq_a * x.iq_a,
     )
-    plain, model = Model(machine(), ()), Model(machine(), (noise_ratio,))
+    plain, model = Model(machine(), ()), Model(machine(), (falling,))
     values = {**BASE, "soft.fall_h_k": fall_h_k}
     more = residual(segment, plain, BASE) - residual(segment, model, values)
     added = dict(zip(segment.channels, more, strict=True))
