@@ -420,7 +420,7 @@ def test_zeros_count_where_the_signal_drops_to_them_from_afar(fall: float, froze
     values[1000:1200] = 0.0
     rows = stuck_channel.frozen_rows(values, OPTIONS["stuck_channel"])
     assert np.count_nonzero(rows) == (200 if frozen else 0)
-    start = np.concatenate([np.zeros(200), values[:800], values[1200:]])
+    start = np.concatenate([np.zeros(200), values[:800], values[1200:-1], [4.9]])
     assert not stuck_channel.frozen_rows(start, OPTIONS["stuck_channel"]).any()
 
 
@@ -606,6 +606,9 @@ def test_the_unit_in_which_a_count_is_whole() -> None:
     assert unit(7.0 * degrees, 0.099 * degrees, 0.02, None) != ""
     assert unit(7.0 * degrees, 0.101 * degrees, 0.02, None) == ""
     assert unit(0.01 * degrees, 0.0, 0.02, None) == ""
+    # 28 and 29 degrees are below one half of a count, 30 are not
+    assert unit(28.0 * degrees, 0.0, 0.02, None) != ""
+    assert unit(30.0 * degrees, 0.0, 0.02, None) == ""
 
 
 # Duplicates
@@ -894,3 +897,40 @@ def test_a_run_is_by_chance_at_one_in_a_million(gate: str) -> None:
     rows_of_ = {"stuck_channel": stuck_channel.frozen_rows, "saturation": saturation.clipped_rows}
     for over, values in near.values():
         assert bool(rows_of_[gate](values, OPTIONS[gate]).any()) is (over < 0.0)
+
+
+def test_a_table_without_a_clock_and_a_clock_that_stands() -> None:
+    rows = np.arange(600.0)
+    made = capture("drive", t_s=rows * 1e-3, theta_mech_rad=rows * 0.01)
+    other = pl.DataFrame({"temp_case_degc": rows})
+    both = replace(made, tables=(other, *made.tables, made.tables[0].head(2)))
+    for gate in ("clock_jump", "dropped_samples", "isolated_readings"):
+        assert said(gate, both) == ""
+    speed = 50.0 + rows * 0.01
+    speed[200] = 0.0
+    still = capture("drive", t_s=np.zeros(600), omega_mech_rad_s=speed)
+    assert said("isolated_readings", still) == ""
+
+
+def test_noise_of_a_resting_speed_is_no_motion() -> None:
+    """The angle stands: integrated noise makes turns. It turns: the speed is held against it."""
+    white = 40.0 * noise(4000)
+    white -= white.mean()
+    t_s = np.arange(4000) * 0.05
+    resting = capture("drive", t_s=t_s, theta_mech_rad=np.zeros(4000), omega_mech_rad_s=white)
+    assert np.abs(integral(t_s, white)).max() > TURN
+    assert speed_against_angle.speed_over_angle(resting, 1.0) is None
+    angle = 1.0 * t_s
+    moving = capture("drive", t_s=t_s, theta_mech_rad=angle, omega_mech_rad_s=white)
+    assert speed_against_angle.speed_over_angle(moving, 1.0) is not None
+
+
+def test_one_value_is_no_dead_channel() -> None:
+    values = np.full(500, np.nan)
+    values[3] = 2.0
+    rng = np.random.default_rng(0)
+    one = capture("drive", iq_a=values, vq_v=rng.standard_normal(500))
+    assert said("stuck_channel", one) == ""
+    values[9] = 2.0
+    two = capture("drive", iq_a=values, vq_v=rng.standard_normal(500))
+    assert said("stuck_channel", two) == "refused"

@@ -153,8 +153,8 @@ def test_a_hand_that_moves_at_rest_is_in_the_offsets_uncertainty() -> None:
 @pytest.mark.parametrize(("before", "after"), [(2, 50), (50, 2)])
 def test_without_rest_at_both_ends_the_offset_is_the_mean(before: int, after: int) -> None:
     v = alternating(300, 1e-3)
-    loud = np.where(np.arange(300 - before - after) % 4 < 2, 3.0, -2.0)
-    v[before : 300 - after] += loud
+    v[before:150] += 3.0
+    v[150 : 300 - after] -= 2.0
     offset, u = _rest(v)
     assert offset == pytest.approx(float(v.mean()))
     assert u == pytest.approx(float(v.std()))
@@ -365,3 +365,57 @@ def test_a_voltage_is_loud_from_five_of_its_noise(height: float, there: bool) ->
     v[rows] = height * white_noise_sigma(v)
     assert float(np.quantile(np.abs(v), 0.9)) / white_noise_sigma(v) == pytest.approx(height)
     assert bool(turns_of(spin(t, theta, vab_v=v))) is there
+
+
+def test_a_hand_that_moves_at_one_end_alone() -> None:
+    """The inner third of the last rest 8 mV higher: as much as 4 mV at both."""
+    v = alternating(540, 1e-3)
+    v[-90:][:30] += 8e-3
+    v[90:-90] += 3.0
+    offset, u = _rest(v)
+    assert offset == pytest.approx(0.0, abs=1e-6)
+    expected = math.hypot(white_noise_sigma(v) / math.sqrt(60.0), 0.5 * 8e-3 / 6.0)
+    assert u == pytest.approx(expected, rel=1e-3)
+
+
+def test_fifty_knots_are_enough_of_an_angle() -> None:
+    for rows, count in ((50, 1), (49, 0)):
+        theta = np.linspace(0.0, TURN, rows)
+        t = np.arange(rows) * 0.01
+        v = -np.sin(theta) * TURN / t[-1]
+        made = spin(t, vab_v=v)
+        assert len(_by_angle(made, made.channels, theta)) == count
+
+
+@pytest.mark.parametrize(("times", "closes"), [(2.9, True), (3.1, False)])
+def test_a_record_closes_within_three_of_its_own_uncertainties(times: float, closes: bool) -> None:
+    """Extremes exact, so nothing widens it: u of end less start from the fit's covariance."""
+    t, flux, turning_ = half_waves(0.5, 0.5, 6)
+    apart = np.array([0.0, 0.0, -1.0, 1.0])
+    u = math.sqrt(apart @ _ends(t, flux, turning_, 1e-3, 1e-9).covariance @ apart)
+    flux[-1] += times * u
+    fit = _ends(t, flux, turning_, 1e-3, 1e-9)
+    assert fit.coefficients[3] - fit.coefficients[2] == pytest.approx(times * u, rel=1e-3)
+    assert (_cycles(fit, 6, 1.0, 1e-9) == 3.0) is closes
+
+
+def test_few_rows_a_cycle_are_the_uncertainty_of_an_extreme() -> None:
+    """(omega T)^2 / 12 of the amplitude, by the largest step of the flux."""
+    t, _, vab, _ = turning(2, n=201, rest=60)
+    smooth = vab - alternating(t.size, 1e-4) + alternating(t.size, 1e-9)
+    turn = _by_swings(spin(t, vab_v=smooth), spin(t, vab_v=smooth).channels[0])
+    assert turn is not None
+    step = float(np.abs(np.diff(turn.flux_wb)).max()) / turn.psi_wb
+    assert turn.cycles == 2.0
+    assert turn.u_psi_wb == pytest.approx(turn.psi_wb * step**2 / 12.0, rel=0.1)
+    assert turn.psi_wb == pytest.approx(2e-3, rel=step**2 / 8.0)
+
+
+def test_by_vector_a_centre_that_wanders_far_is_found() -> None:
+    """No rest, and offsets that move the centre by half the flux over the turn."""
+    t, _, vab, vbc = turning(3, rest=0)
+    slow = 4e-4 * np.linspace(-1.0, 1.0, t.size)
+    found = _by_vector(spin(t, vab_v=vab + 2e-3 + slow, vbc_v=vbc - 1e-3))
+    for turn in found:
+        assert turn.cycles == pytest.approx(3.0, abs=0.05)
+        assert turn.psi_wb == pytest.approx(2e-3, rel=0.02)
