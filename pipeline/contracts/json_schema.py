@@ -312,7 +312,7 @@ def comparison_schema() -> Schema:
 
 def diagnosis_schema() -> Schema:
     """`diagnosis/MOTOR.json`."""
-    told = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": NAME})
+    sized = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": NAME})
     rank = _object(
         {
             "effect": NAME,
@@ -323,7 +323,7 @@ def diagnosis_schema() -> Schema:
             "explanation": TEXT,
             "experiment": TEXT,
         },
-        {"parameters": _map(told)},
+        {"parameters": _map(sized)},
     )
     step = _object(
         {
@@ -333,7 +333,7 @@ def diagnosis_schema() -> Schema:
         },
         {
             "errors": _map(_object({"rmse": SPREAD, "noise_floor": SPREAD, "unit": TEXT})),
-            "parameters": _map(told),
+            "parameters": _map(sized),
             "maps": _list(_error_map()),
         },
     )

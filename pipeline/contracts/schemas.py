@@ -93,8 +93,8 @@ def broken(table: pl.LazyFrame, columns: tuple[str, ...]) -> list[tuple[str, str
     kept = table.select(
         RULES[code](column).all().alias(str(place)) for place, (column, code) in enumerate(asked)
     )
-    told = kept.collect().row(0) if asked else ()
-    return [one for one, holds in zip(asked, told, strict=True) if not holds]
+    answers = kept.collect().row(0) if asked else ()
+    return [one for one, holds in zip(asked, answers, strict=True) if not holds]
 
 
 def check_tables(capture: Capture) -> None:

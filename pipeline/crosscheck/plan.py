@@ -134,8 +134,8 @@ def _reasons(step: Step) -> list[str]:
     """One line a reason, for all doubts that share it; what `how` tells is not said again."""
     names: dict[str, list[str]] = {}
     for doubt in step.doubts:
-        told = doubt.words in step.experiments
-        names.setdefault("" if told else doubt.words, []).append(doubt.name)
+        covered = doubt.words in step.experiments
+        names.setdefault("" if covered else doubt.words, []).append(doubt.name)
     return [
         f"   for {', '.join(own)}" + (f": {words}" if words else "") for words, own in names.items()
     ]

@@ -62,7 +62,7 @@ def judged_model(
         key = "" if memory is None else memory.key(model, start)
         if memory is not None and diagnose != "true" and (known := memory.recall(key)) is not None:
             return Tested(known)
-        found, told = model_verdict(campaign, model, start, search=diagnose != "false")
+        found, document = model_verdict(campaign, model, start, search=diagnose != "false")
         if memory is not None:
             memory.keep(key, found)
     except (*BROKEN, MemoryError) as error:
@@ -72,4 +72,4 @@ def judged_model(
         return Tested(
             ModelVerdict("not_tested", model.name, model.effects, note=message), (broken,)
         )
-    return Tested(found, (), told if diagnose == "true" else None)
+    return Tested(found, (), document if diagnose == "true" else None)

@@ -167,10 +167,10 @@ class ModelVerdict:
 
     def _found(self) -> str:
         """The effects found with their sizes, and what adding them does to the error."""
-        told = [one.headline or name.replace("_", " ") for name, one in self.missing.items()]
-        text = " and ".join(filter(None, (", ".join(told[:-1]), told[-1])))
+        headlines = [one.headline or name.replace("_", " ") for name, one in self.missing.items()]
+        text = " and ".join(filter(None, (", ".join(headlines[:-1]), headlines[-1])))
         if self.held_out is not None and self.held_out_with is not None:
-            them = {1: "it", 2: "both"}.get(len(told), f"all {len(told)}")
+            them = {1: "it", 2: "both"}.get(len(headlines), f"all {len(headlines)}")
             text += f"; with {them}, the error falls from {number(self.held_out)} to "
             text += f"{number(self.held_out_with)} noise floors"
         if self.verdict == "unknown":

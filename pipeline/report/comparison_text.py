@@ -18,11 +18,11 @@ def comparison_text(result: Comparison) -> str:
     if not result.errors:
         return lines[0]
     lines += [f"  note: {safe(note)}" for note in result.notes]
-    told = [*_errors(view), *(f"  {safe(place)}" for place in view.places)]
+    facts = [*_errors(view), *(f"  {safe(place)}" for place in view.places)]
     if view.unknown:
-        told.append(f"  not identifiable from these captures: {', '.join(view.unknown)}")
-    told += [f"  but {expression} = {text}" for expression, text in view.together]
-    return "\n".join([*lines, *told, *_moves(view)])
+        facts.append(f"  not identifiable from these captures: {', '.join(view.unknown)}")
+    facts += [f"  but {expression} = {text}" for expression, text in view.together]
+    return "\n".join([*lines, *facts, *_moves(view)])
 
 
 def _errors(view: ComparisonView) -> list[str]:

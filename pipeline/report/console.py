@@ -15,7 +15,7 @@ from pipeline.views.status_text import status_lines
 from pipeline.views.table_text import NONE, blocks
 
 FEW = 20
-"""So many motors are told with all their key constants; of more, those that fit one table."""
+"""So many motors are shown with all their key constants; of more, those that fit one table."""
 LONGEST = 20
 """Characters of a motor's id and of a lot's name in a table."""
 
@@ -68,14 +68,16 @@ def summary(
 
 def _unexplained(datasheets: Sequence[Datasheet], folder: str) -> list[str]:
     """A line on the motors whose model misses something, with the one it misses most of."""
-    told = [s for s in datasheets if s.model is not None and s.model.tested and not s.model.passed]
-    if not told:
+    unexplained = [
+        s for s in datasheets if s.model is not None and s.model.tested and not s.model.passed
+    ]
+    if not unexplained:
         return []
-    worst = max(told, key=lambda sheet: (sheet.model and sheet.model.residual) or 0.0)
+    worst = max(unexplained, key=lambda sheet: (sheet.model and sheet.model.residual) or 0.0)
     words = model_words(worst.model, worst.motor_id, folder)
     who = printable(worst.motor_id)
-    if len(told) > 1:
-        who = f"{len(told)} motors are not explained down to the noise, {who} least"
+    if len(unexplained) > 1:
+        who = f"{len(unexplained)} motors are not explained down to the noise, {who} least"
     text, does = (words.add, "adds what is missing") if words.add else (words.command, "tells more")
     # the folder's name is put in last and may stand for another until then
     command = folder.join(printable(part) for part in text.split(folder))

@@ -58,12 +58,12 @@ def _cells(one: ErrorMap, reach: float, panel: Panel) -> Iterator[str]:
     for row, column in zip(*np.nonzero(np.isfinite(one.mean)), strict=True):
         left, right, low, high = *across[column : column + 2], *down[row : row + 2]
         mean, p_value = float(one.mean[row, column]), float(one.p_value[row, column])
-        told = f"{quantity(mean, one.unit, 3)}, n {one.count[row, column]}"
-        told += "" if math.isnan(p_value) else f", p {p_value:.2g}"
+        hover = f"{quantity(mean, one.unit, 3)}, n {one.count[row, column]}"
+        hover += "" if math.isnan(p_value) else f", p {p_value:.2g}"
         sure = p_value * int(np.isfinite(one.mean).sum()) < SURE
         mark = f'<path class="sure" d="M{(left + right) / 2:.1f} {(low + high) / 2:.1f}h0"/>'
         yield (
-            f'<g><title>{escape(told)}</title><rect fill="{colour(mean / reach if reach else 0)}" '
+            f'<g><title>{escape(hover)}</title><rect fill="{colour(mean / reach if reach else 0)}" '
             f'x="{left:.1f}" y="{high:.1f}" width="{right - left + 0.3:.1f}" '
             f'height="{low - high + 0.3:.1f}"/>{mark if sure else ""}</g>'
         )

@@ -27,7 +27,7 @@ from pipeline.views.ladder import (
     reaches,
 )
 from pipeline.views.names import quantity_words, unit_of
-from pipeline.views.notes import told_and_folded
+from pipeline.views.notes import shown_and_folded
 
 MOST_RANKED = 12
 
@@ -57,7 +57,7 @@ def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Lin
     """
     view = ladder_view(result, folder)
     reach = reaches(result.ladder)
-    notes, folded = told_and_folded(result)
+    notes, folded = shown_and_folded(result)
     ranked = [_ranked(one) for one in result.ranking]
     return render(
         "ladder.html.jinja",
@@ -143,7 +143,7 @@ def _ranked(one: RankedEffect) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """An unknown structure: its terms, and and where told its curve, formula and rivals."""
+    """An unknown structure: its terms, and, where there is one, its curve, formula and rivals."""
 
     terms: tuple[tuple[str, str], ...]
     curve: str
@@ -154,15 +154,15 @@ class Sketch:
 def _sketch(result: Diagnosis) -> Sketch | None:
     if result.unknown is None:
         return None
-    told = result.unknown.document()
-    points, sketch = told.get("curve", []), told["sketch"]
+    remainder = result.unknown.document()
+    points, sketch = remainder.get("curve", []), remainder["sketch"]
     unit = sketch[0]["unit"] if sketch else "1"
     return Sketch(
         tuple((t["term"], quantity(t["coefficient"], t["unit"], 4)) for t in sketch),
-        curve_chart(told["variables"][0], unit, points) if len(points) > 1 else "",
-        told.get("expression", ""),
+        curve_chart(remainder["variables"][0], unit, points) if len(points) > 1 else "",
+        remainder.get("expression", ""),
         tuple(
             f"{', '.join(one['variables'])} ({100 * one['share']:.0f} %)"
-            for one in told.get("alternatives", [])
+            for one in remainder.get("alternatives", [])
         ),
     )

@@ -20,7 +20,7 @@ from pipeline.report.page import render
 from pipeline.report.status_block import status_block
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
 from pipeline.views.model_words import model_words
-from pipeline.views.motor import CHECK_ORDER, TOLD, check_number, motor_rows, ordered_checks
+from pipeline.views.motor import CHECK_ORDER, LEAST_SHARE, check_number, motor_rows, ordered_checks
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ def render_motor(
         cards=[check for check in checks if check.status in ("fail", "marginal")],
         key_rows=[rows[n] for n in KEY_CONSTANTS if n in rows and rows[n].reading],
         groups=[(title, [rows[n] for n in names]) for title, names in grouped(rows)],
-        told=TOLD,
+        least_share=LEAST_SHARE,
         checks=checks,
         check_counts=[(status, counts[status]) for status in CHECK_ORDER if counts[status]],
         check_number=check_number,

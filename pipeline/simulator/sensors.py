@@ -177,12 +177,12 @@ class Session:
 
         """
         t_s = np.arange(n) / rate_hz
-        told = t_s * (self.instruments.clock * (1.0 + self.bench.clock_rel))
+        clock_s = t_s * (self.instruments.clock * (1.0 + self.bench.clock_rel))
         if self.bench.jitter_s <= 0.0:
-            return t_s, told
+            return t_s, clock_s
         limit = 0.45 / rate_hz
         scatter = self.bench.jitter_s * self.rng.standard_normal(n)
-        return t_s, told + np.clip(scatter, -limit, limit)
+        return t_s, clock_s + np.clip(scatter, -limit, limit)
 
     def line_current(self, i_a: Array, phase: int, t_s: Array) -> Array:
         """A line current [n] as measured."""

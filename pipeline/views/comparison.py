@@ -111,12 +111,12 @@ def headline(result: Comparison) -> str:
     effects = ", ".join(result.effects) or "no effects"
     out = any(error.split == "held_out" for error in result.errors)
     what = "held-out error" if out else "error of the fit, none held out,"
-    told = (
+    summary = (
         f"model {result.name} with {effects}: {what} {result.held_out:.4g} (1 is the noise floor)"
     )
     if result.bare is not None:
-        told += f"; without what was added: {number(result.bare)}"
-    return told
+        summary += f"; without what was added: {number(result.bare)}"
+    return summary
 
 
 def ratio_of(error: SignalError) -> float:
@@ -176,10 +176,10 @@ def _places(result: Comparison) -> list[str]:
     for signal in dict.fromkeys(d.signal for d in result.where if d.signal in over):
         sure = [d for d in result.where if d.signal == signal and _surely(d)]
         sure.sort(key=lambda d: -d.explained)
-        told = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
+        depends = [f"{d.variable} ({100 * d.explained:.0f} %)" for d in sure[:4]]
         worst = next((_worst(m) for m in result.maps if m.signal == signal and m.y is not None), "")
-        if told or worst:
-            lines.append(f"{signal} depends on {', '.join(told) or 'nothing surely'}{worst}")
+        if depends or worst:
+            lines.append(f"{signal} depends on {', '.join(depends) or 'nothing surely'}{worst}")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""All motors beside each other: key constants on one scale each, and every reason told once."""
+"""All motors beside each other: key constants on one scale each, and every reason stated once."""
 
 from __future__ import annotations
 
@@ -117,13 +117,13 @@ def _row(
 ) -> MotorRow:
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     common = {reason.text: number for number, reason in enumerate(reasons, 1)}
-    told = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
-    own = [reason for reason, kind in told if kind not in common]
+    parted = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
+    own = [reason for reason, kind in parted if kind not in common]
     return MotorRow(
         sheet,
         current,
         "; ".join((*status_lines(current), *own)),
-        tuple(sorted({common[kind] for _, kind in told if kind in common})),
+        tuple(sorted({common[kind] for _, kind in parted if kind in common})),
         failed,
         model_words(sheet.model, sheet.motor_id),
         tuple(_cell(sheet.constants.get(column.name), column.scale) for column in columns),

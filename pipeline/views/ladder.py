@@ -64,8 +64,8 @@ class Doubt:
 class LadderView:
     """A diagnosis: `headline` in a few sentences; the commands to go on with; the rungs.
 
-    `signals` are those told on every rung, the one farthest over its floor on the first rung first,
-    those of which no floor is told last.
+    `signals` are those shown on every rung, the one farthest over its floor on the first one
+    first, those of which no floor is known last.
     """
 
     tone: str
@@ -80,8 +80,8 @@ class LadderView:
 
 def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
     """The view of one diagnosis of the captures in a `folder`."""
-    signals = told_signals(result)
-    told = {one.effect: one for one in result.ranking}
+    signals = shown_signals(result)
+    ranked = {one.effect: one for one in result.ranking}
     words = f"input={shlex.quote(folder)} motor={shlex.quote(result.motor_id)}"
     effects = ",".join((*result.asked, *result.missing))
     model = "" if result.model == "standard" else f" model={result.model}"
@@ -92,7 +92,7 @@ def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
         headline(result),
         f"motor-datasheets compare {words}{model}" if result.missing else "",
         f"motor-datasheets run input={shlex.quote(folder)}{model}" if result.missing else "",
-        tuple(_doubt(told[name]) for name in result.missing if told[name].confused_with),
+        tuple(_doubt(ranked[name]) for name in result.missing if ranked[name].confused_with),
         tuple(f"{r.effect} is {r.shortfall}" for r in result.ranking if r.slight and quiet),
         signals,
         tuple(_rung(result, n, signals) for n in range(len(result.ladder))),
@@ -101,8 +101,8 @@ def ladder_view(result: Diagnosis, folder: str = "FOLDER") -> LadderView:
 
 def headline(result: Diagnosis) -> str:
     """The verdict in words with sizes, in sentences: what is missing, and what adding it does."""
-    told = {one.effect: one for one in result.ranking}
-    names = [told[name].headline or name for name in result.missing if name in told]
+    ranked = {one.effect: one for one in result.ranking}
+    names = [ranked[name].headline or name for name in result.missing if name in ranked]
     found = f"{sentence(_listed(names))}. {_fall(result)}" if names else ""
     if result.verdict == "insufficient":
         return "The captures cannot tell; what to record is named below."
@@ -139,27 +139,30 @@ def _doubt(one: RankedEffect) -> Doubt:
     return Doubt(one.effect, ", ".join(one.confused_with), tuple(tests) or (one.experiment,))
 
 
-def told_signals(result: Diagnosis) -> tuple[str, ...]:
-    """Signals told on every rung, the one farthest over its floor on the first rung first, those
-    of which no floor is told last.
+def shown_signals(result: Diagnosis) -> tuple[str, ...]:
+    """Signals shown on every rung, the one farthest over its floor on the first rung first, those
+    of which no floor is known last.
     """
     if not result.ladder:
         return ()
     first = result.ladder[0]
-    told = dict.fromkeys([*first.errors, *first.signals])
-    names = [n for n in told if all(n in r.errors or n in r.signals for r in result.ladder)]
+    names = [
+        n
+        for n in dict.fromkeys([*first.errors, *first.signals])
+        if all(n in r.errors or n in r.signals for r in result.ladder)
+    ]
     return tuple(sorted(names, key=lambda n: (n not in first.errors, -over_floor(first, n), n)))
 
 
 def mapped_signals(result: Diagnosis) -> tuple[str, ...]:
     """Signals with a floor on every rung, those with a map over speed and current first."""
-    names = [n for n in told_signals(result) if all(n in rung.errors for rung in result.ladder)]
+    names = [n for n in shown_signals(result) if all(n in rung.errors for rung in result.ladder)]
     flat = [n for n in names if result.ladder[0].map_of(n, SPEED, CURRENT) is not None]
     return (*flat, *(n for n in names if n not in flat))
 
 
 def over_floor(rung: LadderRung, name: str) -> float:
-    """A signal's error over its noise floor, 0 where none is told."""
+    """A signal's error over its noise floor, 0 where it is not known."""
     error = rung.errors.get(name)
     return 0.0 if error is None else error.rmse / max(error.noise_floor, 1e-300)
 
@@ -185,15 +188,15 @@ def _rung(result: Diagnosis, place: int, signals: Sequence[str]) -> RungView:
     came = tuple(e for e in rung.effects if below is None or e not in below.effects)
     gone = [e for e in below.effects if e not in rung.effects] if below is not None else []
     title = " ".join([*(f"+ {e}" for e in came), *(f"{MINUS} {e}" for e in gone)])
-    told = {one.effect: one for one in result.ranking}
+    ranked = {one.effect: one for one in result.ranking}
     shown = [(name, number_text(*value)) for name, value in rung.parameters.items()]
     own = tuple(one for one in shown if one[0].split(".")[0] in came)
     return RungView(
         place,
         title or result.whole_model,
         came,
-        tuple(sentence(told[e].headline) for e in came if e in told and told[e].headline),
-        tuple(told[e].explanation for e in came if e in told),
+        tuple(sentence(ranked[e].headline) for e in came if e in ranked and ranked[e].headline),
+        tuple(ranked[e].explanation for e in came if e in ranked),
         f"{rung.held_out:.4g}",
         "" if below is None else percent(rung.held_out, below.held_out),
         own,
@@ -218,7 +221,7 @@ def _cell(rung: LadderRung, below: LadderRung | None, name: str) -> ErrorCell | 
 
 
 def _rmse(rung: LadderRung, name: str) -> float | None:
-    """A signal's error, whether its floor is told or not [its unit]."""
+    """A signal's error, whether its floor is known or not [its unit]."""
     if name in rung.errors:
         return rung.errors[name].rmse
     return rung.signals.get(name)

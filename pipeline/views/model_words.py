@@ -80,7 +80,7 @@ def _rows(said: ModelVerdict) -> list[tuple[str, str]]:
         rows.append(("where", f"{said.worst.description}, {size} beyond the noise"))
         rows.append(("places over their floor", str(said.over)))
     for effect, found in said.missing.items():
-        sizes = (f"{name} {number_text(*told)}" for name, told in found.parameters.items())
+        sizes = (f"{name} {number_text(*reading)}" for name, reading in found.parameters.items())
         rows.append((effect.replace("_", " "), "; ".join(sizes)))
         if found.confused_with:
             others = ", ".join(found.confused_with).replace("_", " ")

@@ -19,7 +19,7 @@ NEGLIGIBLE = 1e-3
 CHECK_ORDER = ("fail", "marginal", "not_evaluated", "pass")
 SCATTER, DISAGREEMENT, ASSUMED = "scatter", "disagreement", "assumptions"
 _KINDS = {"scatter": SCATTER, "between": DISAGREEMENT, "assumed": ASSUMED, "lcr": "LCR meter"}
-TOLD = 0.05
+LEAST_SHARE = 0.05
 """Share of u² from which on a source is named beside its bar."""
 
 

@@ -10,7 +10,7 @@ FEW = 3
 """So many effects that no test excites are told in full."""
 
 
-def told_and_folded(result: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def shown_and_folded(result: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Notes to tell, and those on single effects that a few lines among the former stand for.
 
     Each effect goes with one test that would excite it, the tests that would excite most first.

@@ -1,4 +1,4 @@
-"""Reasons that several motors or constants have, each told once."""
+"""Reasons that several motors or constants have, each stated once."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 SHARED = 2
-"""Members from which on a reason is told once for all of them."""
+"""Members from which on a reason is stated once for all of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,10 +17,10 @@ class Reason:
     members: tuple[str, ...]
 
 
-def shared_reasons(told: Iterable[tuple[str, str]]) -> tuple[Reason, ...]:
+def shared_reasons(reasons: Iterable[tuple[str, str]]) -> tuple[Reason, ...]:
     """Reasons of two members or more, the commonest first, of (member, reason) pairs."""
     members: dict[str, dict[str, None]] = {}
-    for member, text in told:
+    for member, text in reasons:
         members.setdefault(text, {})[member] = None
     found = [Reason(text, tuple(own)) for text, own in members.items() if len(own) >= SHARED]
     return tuple(sorted(found, key=lambda reason: (-len(reason.members), reason.text)))

@@ -34,9 +34,9 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     off = abs(count - whole)
     if whole == 0 or off > options["from_whole"] + 2.0 * seen.u:
         words = f"the back-EMF makes {count:.3f} cycles a turn of the shaft, no whole number"
-        told = _unit(count, seen.u, options["from_whole"], stated)
-        if told:
-            raise CaptureError(CODE, f"{words}: {told}", "map the unit in conf/source")
+        cause = _unit(count, seen.u, options["from_whole"], stated)
+        if cause:
+            raise CaptureError(CODE, f"{words}: {cause}", "map the unit in conf/source")
         remedy = "check the angle's unit, for slip of its coupling, and for a gear"
         return Passed(findings=(warning(capture, CODE, words, remedy),))
     if stated is not None and stated != whole:

@@ -255,9 +255,9 @@ def _chord(record: StepRecord, drive: Drive) -> float:
     return 1.0 / float(fit.coefficients[0]) if fit.coefficients[0] != 0.0 else math.nan
 
 
-def _evidence(solution: Solution, told: Sequence[str]) -> list[Evidence]:
+def _evidence(solution: Solution, labels: Sequence[str]) -> list[Evidence]:
     model = solution.model
-    found = [_saturation_plot(solution, told)]
+    found = [_saturation_plot(solution, labels)]
     predicted = model.predict([solution.parameters[None, :]] * len(model.records))
     for record, current in zip(model.records, predicted, strict=True):
         rows = decimated(record.t_s.size)

@@ -340,8 +340,8 @@ def _estimates(
         parts.append(Contribution(f"assumed:{METHOD.name}:nuisances", float(moved[i]), "B"))
         doubt = doubts[i]
         parts += [] if doubt is None else [doubt.part(f"{METHOD.name}:{name}", value)]
-        told = [] if doubt is None else [doubt.words("the value")]
-        note = "; ".join([*told, *words])
+        remarks = [] if doubt is None else [doubt.words("the value")]
+        note = "; ".join([*remarks, *words])
         if not all(c.has(place[name]) for c in rows.captures):
             unsure = value * per_kelvin[name] * policy().magnet.unlogged_k
             parts.append(Contribution(f"assumed:{place[name]}", unsure, "B"))

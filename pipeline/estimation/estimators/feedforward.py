@@ -234,12 +234,12 @@ def _noise_v(rows: Rows) -> Array:
     return sigma
 
 
-def _partitions(rows: Rows, paths: Sequence[str], told: Array) -> list[Partition]:
+def _partitions(rows: Rows, paths: Sequence[str], weights: Array) -> list[Partition]:
     """Regimes of the rows by speed, sense, acceleration and capture."""
     speed, every = rows.design[:, 1], np.ones(rows.voltage_v.size, dtype=bool)
     gaining = rows.design[:, 2] * np.sign(speed)
     return [
-        halves("speed", np.abs(speed), "slow", "fast", told, every),
+        halves("speed", np.abs(speed), "slow", "fast", weights, every),
         signs("sense of rotation", speed, "backward", "forward", every),
         signs("acceleration", gaining, "braking", "accelerating", every),
         Partition("capture", rows.capture, tuple(f"in {path}" for path in paths)),

@@ -207,7 +207,7 @@ def _at_unknown_angle(table: Table) -> Found | None:
     low one is low by its noise as well: a swing that scatters as noise alone does is none, and
     both are their mean, to half of it.
     """
-    first, second, told = [], [], []
+    first, second, has_angle = [], [], []
     for row in np.unique(table.row):
         mine = np.flatnonzero(table.row == row)
         read = {float(table.axis_rad[k]): float(table.l_h[k]) for k in mine}
@@ -218,11 +218,11 @@ def _at_unknown_angle(table: Table) -> Found | None:
         exchanged = math.isfinite(theta) and math.cos(2.0 * (theta - place)) < 0.0
         first.append(high if exchanged else low)
         second.append(low if exchanged else high)
-        told.append(math.isfinite(theta))
+        has_angle.append(math.isfinite(theta))
     if not first:
         return None
     values = {}
-    unparted = _swing_of_noise(np.array(second) - np.array(first)) and not any(told)
+    unparted = _swing_of_noise(np.array(second) - np.array(first)) and not any(has_angle)
     means = 0.5 * (np.array(first) + np.array(second))
     for name, found in (("ld_h", first), ("lq_h", second)):
         count = len(found)
@@ -235,7 +235,7 @@ def _at_unknown_angle(table: Table) -> Found | None:
     note = ""
     if unparted:
         note = "the three pairs differ by noise alone: Ld and Lq are not told apart"
-    elif not all(told):
+    elif not all(has_angle):
         note = (
             "rotor angle unknown: the low inductance is taken as d, as with interior magnets; "
             "a back-EMF or an alignment would tell"

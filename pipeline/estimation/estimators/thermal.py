@@ -175,8 +175,8 @@ def _start(double: LinearFit, body: LinearFit) -> tuple[Array | None, bool]:
     k, b = (float(v) for v in double.coefficients[1:3])
     a = float(double.coefficients[3]) if direct else 0.0
     c, d = (float(v) for v in body.coefficients[1:])
-    told = double.full_rank and body.full_rank and min(k, b, c, d) > 0.0
-    if not told or b < 3.0 * double.u(2) or c < 3.0 * body.u(1):
+    determined = double.full_rank and body.full_rank and min(k, b, c, d) > 0.0
+    if not determined or b < 3.0 * double.u(2) or c < 3.0 * body.u(1):
         return None, direct
     return np.array([k, a, b, c, d]), direct
 

@@ -80,6 +80,8 @@ def drag_disagreements(
     regression = Regression(found.design, found.target, found.sigma, rows.cluster)
     names = ("torque",) if found.free else ("torque", "coulomb", "viscous")
     split = partial(shaft_partitions, rows)
-    told = [disagreement(regression, found.names.index(name), split, level) for name in names]
-    inertia, coulomb, viscous, *_ = (*told, None, None)
+    disagreements = [
+        disagreement(regression, found.names.index(name), split, level) for name in names
+    ]
+    inertia, coulomb, viscous, *_ = (*disagreements, None, None)
     return inertia, coulomb, viscous

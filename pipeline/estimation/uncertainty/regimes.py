@@ -134,8 +134,8 @@ def information(regression: Regression, column: int) -> Array:
     """
     others = np.delete(regression.design, column, axis=1)
     own = linear_fit(others, regression.design[:, column], regression.sigma).residuals
-    told: Array = (own / regression.sigma) ** 2
-    return told / max(float(told.sum()), 1e-300)
+    weights: Array = (own / regression.sigma) ** 2
+    return weights / max(float(weights.sum()), 1e-300)
 
 
 def disagreement(
@@ -164,15 +164,15 @@ def disagreement(
         coefficient is fitted once a regime, with all else common.
 
     """
-    told = information(regression, column)
-    tried = [_of_partition(regression, column, told, p) for p in partitions(told)]
+    weights = information(regression, column)
+    tried = [_of_partition(regression, column, weights, p) for p in partitions(weights)]
     found = [one for one in tried if one is not None]
     beyond = [d for d in found if d.found.p_value * len(found) < level and d.found.sd > 0.0]
     return max(beyond, key=lambda d: d.found.sd, default=None)
 
 
 def _of_partition(
-    regression: Regression, column: int, told: Array, partition: Partition
+    regression: Regression, column: int, weights: Array, partition: Partition
 ) -> Disagreement | None:
     """The coefficient of a column in each regime, relative to the common one."""
     design, labels, y, sigma = (
@@ -182,7 +182,7 @@ def _of_partition(
         k
         for k in range(len(partition.names))
         if np.sum(labels == k) >= policy().evidence.rows
-        and told[labels == k].sum() >= policy().regimes.least_share
+        and weights[labels == k].sum() >= policy().regimes.least_share
     ]
     if len(present) < 2:
         return None

@@ -62,8 +62,8 @@ class ReadLimits:
                 f"{LEAST_MB} at least; 1024 is usual",
             )
         if self.memory_mb > MOST:
-            told = f"read_memory_mb={self.memory_mb} is more than there can be"
-            raise UsageError(told, "1024 is usual")
+            message = f"read_memory_mb={self.memory_mb} is more than there can be"
+            raise UsageError(message, "1024 is usual")
 
     def time_s(self, size_bytes: int) -> float:
         """Longest time for a file of that size [s]."""

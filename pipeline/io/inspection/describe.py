@@ -129,8 +129,8 @@ def _unused(path: Path, report: InspectReport, sources: Mapping[str, SourceMap])
     if answer.entry is not None:
         return _metadata_faults(answer.entry.said)
     if answer.findings or report.faults or not report.streams:
-        told = (f"{finding.message}; {finding.remedy}" for finding in answer.findings)
-        return [words for words in told if words not in report.faults]
+        remarks = (f"{finding.message}; {finding.remedy}" for finding in answer.findings)
+        return [words for words in remarks if words not in report.faults]
     remedy = f"state `contract: {CONTRACT_VERSION}` in its metadata or NAME{SIDECAR_SUFFIX}"
     remedy += ", or finish the source map below" if report.starter else ": it lacks nothing else"
     return [f"`run` takes it for no capture, for nothing states `contract`; {remedy}"]
@@ -289,18 +289,18 @@ def _stream(table: RawTable, encoding: str, answers: Mapping[str, str]) -> Strea
 
 def _clock_words(steps: NDArray[np.float64], step: float) -> str:
     """Jitter and gaps of a clock, steps [s] against their median, where there are any."""
-    told = []
+    remarks = []
     jitter = float(np.nanmedian(np.abs(steps - step))) / step
     if jitter > _WORTH_TELLING:
-        told.append(f"steps vary by {jitter:.1%}")
+        remarks.append(f"steps vary by {jitter:.1%}")
     gaps = int(np.count_nonzero(steps > _GAP * step))
     if gaps:
         longest = float(np.nanmax(steps))
-        told.append(f"{counted(gaps, 'gap')}, the longest {longest:.4g} s")
+        remarks.append(f"{counted(gaps, 'gap')}, the longest {longest:.4g} s")
     back = int(np.count_nonzero(steps <= 0))
     if back:
-        told.append(f"it stands or goes back at {counted(back, 'row')}")
-    return "; ".join(told)
+        remarks.append(f"it stands or goes back at {counted(back, 'row')}")
+    return "; ".join(remarks)
 
 
 def _time_s(table: RawTable, fields: Sequence[FieldSeen]) -> NDArray[np.float64] | None:

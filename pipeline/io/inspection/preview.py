@@ -25,8 +25,8 @@ def preview(folder: Path, file: str, map_text: str, rows: int) -> list[str]:
     }
     answer = look(folder, Question(file, None, ()), maps)
     if answer.entry is None:
-        told = [f"{one.message}; {one.remedy}" for one in answer.findings]
-        return [f"{printable(file)}: {one}" for one in told or ["the map does not recognise it"]]
+        faults = [f"{one.message}; {one.remedy}" for one in answer.findings]
+        return [f"{printable(file)}: {one}" for one in faults or ["the map does not recognise it"]]
     try:
         tables = read_capture(folder, answer.entry).tables
     except CaptureError as fault:

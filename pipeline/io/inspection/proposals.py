@@ -170,12 +170,12 @@ _ANGLES = ("theta_mech_rad", "theta_elec_rad", "theta_elec_deg")
 
 def _why(name: str, found: Evidence) -> str:
     """What the numbers of a field show, in words."""
-    told = [f"starts again after {span:g}" for field, span in found.wraps if field == name]
+    reasons = [f"starts again after {span:g}" for field, span in found.wraps if field == name]
     for relation in found.relations:
         if relation.field == name:
             kind = "the integral of " if relation.integral else ""
-            told.append(f"is {relation.factor:.6g} times {kind}{relation.other!r}")
-    return "; ".join(told)
+            reasons.append(f"is {relation.factor:.6g} times {kind}{relation.other!r}")
+    return "; ".join(reasons)
 
 
 def _with_units(

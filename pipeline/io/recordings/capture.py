@@ -83,8 +83,8 @@ def recording_bytes(
     """One capture's .rrd, footer included."""
     own = own_evidence(capture, evidence)
     traces, fits = list(capture_traces(capture)), list(fit_traces(own))
-    told = (residual_maps(capture, one) for one in first_of_each(own))
-    maps = tuple(islice((one for one in told if one is not None), MOST_MAPS))
+    drawn = (residual_maps(capture, one) for one in first_of_each(own))
+    maps = tuple(islice((one for one in drawn if one is not None), MOST_MAPS))
     name = f"{capture.meta.motor_id} {PurePosixPath(capture.path).stem}"
     table = sample_table(traces)
     shown = Shown(traces, fits, maps, has_lanes(capture), datasheet is not None, table)
@@ -119,8 +119,8 @@ def has_lanes(capture: Capture) -> tuple[str, ...]:
     """Entities of the lanes that this capture has."""
     from pipeline.io.recordings.capture_lanes import ASIDE, REGIME, capture_regimes, rows_aside
 
-    told = ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture)))
-    return tuple(entity for entity, stretches in told if stretches)
+    lanes = ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture)))
+    return tuple(entity for entity, stretches in lanes if stretches)
 
 
 def _send_maps(stream: RecordingStream, maps: ResidualMaps) -> None:

@@ -74,25 +74,25 @@ def lines_of(
     capture: Capture, evidence: Sequence[Evidence], findings: Sequence[Finding]
 ) -> list[Line]:
     """(level, words, row) of findings, rows set aside and largest residuals, the worst first."""
-    told: list[Line] = []
+    messages: list[Line] = []
     for one in sorted(findings):
         level = "ERROR" if one.severity == "refused" else "WARN"
-        told.append((level, _finding(one), 0 if one.rows is None else one.rows[0]))
+        messages.append((level, _finding(one), 0 if one.rows is None else one.rows[0]))
     for mask in capture.masks:
         if mask.dropped and mask.table == 0:
             first = int(np.flatnonzero(~mask.keep)[0])
-            told.append(("WARN", f"{mask.dropped} rows set aside by {mask.gate}", first))
+            messages.append(("WARN", f"{mask.dropped} rows set aside by {mask.gate}", first))
     for one_fit in evidence:
-        told += _residual(capture, one_fit)
-    return told or [("INFO", "nothing was found in this capture", 0)]
+        messages += _residual(capture, one_fit)
+    return messages or [("INFO", "nothing was found in this capture", 0)]
 
 
 def send_lanes(stream: RecordingStream, capture: Capture) -> tuple[str, ...]:
     """Sends the lanes that have something to say; returns their entities."""
     sent = []
-    for entity, told in ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture))):
-        if told:
-            _send_lane(stream, entity, capture, told)
+    for entity, lane in ((REGIME, capture_regimes(capture)), (ASIDE, rows_aside(capture))):
+        if lane:
+            _send_lane(stream, entity, capture, lane)
             sent.append(entity)
     return tuple(sent)
 
@@ -113,11 +113,11 @@ def send_lines(stream: RecordingStream, capture: Capture, lines: Sequence[Line])
 
 
 def _send_lane(
-    stream: RecordingStream, entity: str, capture: Capture, told: Sequence[Stretch]
+    stream: RecordingStream, entity: str, capture: Capture, lane: Sequence[Stretch]
 ) -> None:
     import rerun as rr
 
-    names = list(dict.fromkeys(one.state for one in told))
+    names = list(dict.fromkeys(one.state for one in lane))
     style = rr.StateConfiguration(
         values=[drawable(name) for name in names],
         labels=[drawable(name) for name in names],
@@ -126,8 +126,8 @@ def _send_lane(
     stream.log(entity, style, static=True)
     rr.send_columns(
         entity,
-        indexes=[_index(capture, [one.start for one in told])],
-        columns=rr.StateChange.columns(state=[drawable(one.state) for one in told]),
+        indexes=[_index(capture, [one.start for one in lane])],
+        columns=rr.StateChange.columns(state=[drawable(one.state) for one in lane]),
         recording=stream,
     )
 

@@ -47,7 +47,7 @@ class ResidualMaps:
 
 
 def residual_maps(capture: Capture, evidence: Evidence) -> ResidualMaps | None:
-    """Maps of one series fitted over time; None where neither speed nor angle is told."""
+    """Maps of one series fitted over time; None where neither speed nor angle is recorded."""
     series = evidence.series[0]
     error = series.measured - series.fitted
     at = dict(_variables(capture, series.x))
@@ -140,14 +140,14 @@ def _map(signal: str, error: Array, cell: NDArray[np.int64], x: Bins, y: Bins | 
     shape = (x.count,) if y is None else (y.count, x.count)
     visit = visits_of(cell, np.zeros(cell.size, dtype=np.int64))
     found = cell_means(error, np.ones(error.size), cell, visit, int(np.prod(shape)))
-    told = np.where(found.count < FEWEST_SAMPLES, np.nan, found.mean)
+    means = np.where(found.count < FEWEST_SAMPLES, np.nan, found.mean)
     return ErrorMap(
         signal,
         _unit(signal),
         x,
         y,
         found.count.reshape(shape),
-        told.reshape(shape),
+        means.reshape(shape),
         found.p_value.reshape(shape),
         found.explained,
         found.p_all,

@@ -22,8 +22,10 @@ def rung_markdown(result: Diagnosis, place: int) -> str:
     if place == len(view.rungs) - 1:
         lines += ["", f"**{result.verdict}**: {plain(view.headline)}"]
         for doubt in view.doubts:
-            told = f"{doubt.effect} could as well be {doubt.rivals}: {'; '.join(doubt.tests)}"
-            lines += ["", plain(told)]
+            alternatives = (
+                f"{doubt.effect} could as well be {doubt.rivals}: {'; '.join(doubt.tests)}"
+            )
+            lines += ["", plain(alternatives)]
         if result.unknown is not None:
             one = result.unknown
             lines += ["", f"Left over in {plain(one.signal)}: {plain(one.shape)}"]
@@ -34,13 +36,13 @@ def rung_markdown(result: Diagnosis, place: int) -> str:
 
 
 def _table(view: LadderView, place: int) -> list[str]:
-    """The rungs so far, of the signals whose noise floor is told."""
-    told = [n for n, cell in enumerate(view.rungs[0].errors) if cell is not None and cell.floor]
+    """The rungs so far, of the signals whose noise floor is known."""
+    columns = [n for n, cell in enumerate(view.rungs[0].errors) if cell is not None and cell.floor]
     names = [cell.signal for cell in view.rungs[0].errors if cell is not None and cell.floor]
     lines = ["| rung | model | held out | " + " | ".join(map(plain, names)) + " |"]
     lines.append("| --- | --- | --- |" + " --- |" * len(names))
     for rung in view.rungs[: place + 1]:
-        cells = [cell.rmse if (cell := rung.errors[n]) else "" for n in told]
+        cells = [cell.rmse if (cell := rung.errors[n]) else "" for n in columns]
         last = "**" if rung.number == place else ""
         change = f" ({rung.change})" if rung.change else ""
         lines.append(
@@ -48,6 +50,6 @@ def _table(view: LadderView, place: int) -> list[str]:
             + " | ".join(cells)
             + " |"
         )
-    floors = [cell.floor if (cell := view.rungs[place].errors[n]) else "" for n in told]
+    floors = [cell.floor if (cell := view.rungs[place].errors[n]) else "" for n in columns]
     lines.append("|  | noise floor | 1 | " + " | ".join(floors) + " |")
     return lines

@@ -98,10 +98,10 @@ def _send_histograms(stream: RecordingStream, one: ConstantResult) -> None:
 
 
 def _send_drift(stream: RecordingStream, one: ConstantResult) -> None:
-    told = drift(one)
-    if told is not None:
-        index = pl.Series(PLACE, np.arange(told.height, dtype=np.int64))
-        send_trace(stream, Trace(f"/drift/{one.name}", PLACE, told.insert_column(0, index)))
+    moving = drift(one)
+    if moving is not None:
+        index = pl.Series(PLACE, np.arange(moving.height, dtype=np.int64))
+        send_trace(stream, Trace(f"/drift/{one.name}", PLACE, moving.insert_column(0, index)))
 
 
 def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
@@ -125,11 +125,11 @@ def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
             row[one.name] = motor.value
     if not rows:
         return
-    told = [rows[name] for name in sorted(rows, key=lambda n: (rows[n]["side"], n))]
+    ordered = [rows[name] for name in sorted(rows, key=lambda n: (rows[n]["side"], n))]
     texts: dict[str, Any] = {
-        key: [drawable(str(row[key])) for row in told] for key in ("motor", "lot", "side")
+        key: [drawable(str(row[key])) for row in ordered] for key in ("motor", "lot", "side")
     }
-    numbers = {one.name: [row.get(one.name) for row in told] for one in shown}
+    numbers = {one.name: [row.get(one.name) for row in ordered] for one in shown}
     frame = pl.DataFrame(texts | numbers, schema=_types(texts, numbers))
     index = pl.Series(PLACE, np.arange(frame.height, dtype=np.int64))
     send_trace(stream, Trace("/motors", PLACE, frame.insert_column(0, index)))

@@ -110,13 +110,13 @@ def overview(campaign: Campaign, evidence: Sequence[Evidence]) -> Iterator[Strip
     Against each capture's own reach, a torque of nothing but cogging would seem all wrong.
     """
     found = [(c.path, first_of_each(own_evidence(c, evidence))) for c in campaign.captures]
-    told = [(number, *one) for number, one in enumerate(one for one in found if one[1])]
+    drawn = [(number, *one) for number, one in enumerate(one for one in found if one[1])]
     reach: dict[str, float] = {}
-    for _, _, own in told:
+    for _, _, own in drawn:
         for one in own:
             here = signal_floor(one.series[0].measured) / FULL_COLOUR_SHARE
             reach[one.y_name] = max(here, reach.get(one.y_name, 0.0))
-    for number, path, own in told:
+    for number, path, own in drawn:
         for one in own:
             series = one.series[0]
             percent = 100.0 * (series.measured - series.fitted) / reach[one.y_name]
@@ -139,22 +139,22 @@ def signals_of(strips: Sequence[Strip]) -> tuple[str, ...]:
 
 def _send_constants(stream: RecordingStream, datasheet: Datasheet) -> None:
     """One row a constant; text where there is no number, so that no row is dropped."""
-    told = [est for _, est in sorted(datasheet.constants.items())]
+    estimates = [est for _, est in sorted(datasheet.constants.items())]
     numbers = pl.DataFrame(
         {
-            "value": [None if e.value is None else float(e.value) for e in told],
-            "u": [e.u if e.known else None for e in told],
+            "value": [None if e.value is None else float(e.value) for e in estimates],
+            "u": [e.u if e.known else None for e in estimates],
         },
         schema={"value": pl.Float64, "u": pl.Float64},
     )
     texts: dict[str, list[str]] = {
-        "name": [e.name for e in told],
-        "unit": [e.unit for e in told],
-        "status": [e.status for e in told],
-        "method": [e.method for e in told],
+        "name": [e.name for e in estimates],
+        "unit": [e.unit for e in estimates],
+        "status": [e.status for e in estimates],
+        "method": [e.method for e in estimates],
     }
     frame = pl.DataFrame({k: [drawable(t) for t in v] for k, v in texts.items()})
-    index = pl.Series(ROW, np.arange(len(told), dtype=np.int64))
+    index = pl.Series(ROW, np.arange(len(estimates), dtype=np.int64))
     whole = pl.concat([frame, numbers], how="horizontal").insert_column(0, index)
     send_trace(stream, Trace("/constants", ROW, whole))
 
@@ -236,10 +236,10 @@ def _send_findings(
     import rerun as rr
 
     order = {strip.capture: int(strip.places[0]) for strip in reversed(strips)}
-    told = sorted(findings)
-    lines = [drawable(f"{_stem(f.file)}: {f.message}; {f.remedy} [{f.code}]") for f in told]
-    levels = ["ERROR" if f.severity == "refused" else "WARN" for f in told]
-    places = [order.get(f.file, 0) for f in told]
+    ordered = sorted(findings)
+    lines = [drawable(f"{_stem(f.file)}: {f.message}; {f.remedy} [{f.code}]") for f in ordered]
+    levels = ["ERROR" if f.severity == "refused" else "WARN" for f in ordered]
+    places = [order.get(f.file, 0) for f in ordered]
     rr.send_columns(
         "/findings",
         indexes=[rr.TimeColumn(CAPTURE, sequence=places or [0])],

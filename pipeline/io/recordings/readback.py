@@ -49,7 +49,7 @@ class FleetShape:
 
 def fleet_shape(motors: Sequence[Path]) -> FleetShape:
     """Quantities that the overview of any of these motors shows, and the most captures of one."""
-    told = {name for path in motors for name in entities(path) if name.startswith(_OVERVIEW)}
+    overviews = {name for path in motors for name in entities(path) if name.startswith(_OVERVIEW)}
     counts = [recording_property(path, "motor", "captures") for path in motors]
-    signals = tuple(sorted(name.removeprefix(_OVERVIEW) for name in told))
+    signals = tuple(sorted(name.removeprefix(_OVERVIEW) for name in overviews))
     return FleetShape(signals, max((int(count[0]) for count in counts if count), default=1))

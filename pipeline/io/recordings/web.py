@@ -92,8 +92,10 @@ class PageServer(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, port: int, recordings: Sequence[Path], inner: int, told: str) -> None:
-        self.recordings, self.inner, self.told = tuple(recordings), inner, told
+    def __init__(
+        self, port: int, recordings: Sequence[Path], inner: int, content_policy: str
+    ) -> None:
+        self.recordings, self.inner, self.content_policy = tuple(recordings), inner, content_policy
         super().__init__((HERE, port), PageHandler)
 
 
@@ -148,6 +150,6 @@ class PageHandler(BaseHTTPRequestHandler):
         self.send_response(status)
         for name, value in headers.items():
             self.send_header(name, value)
-        self.send_header("Content-Security-Policy", self.server.told)
+        self.send_header("Content-Security-Policy", self.server.content_policy)
         self.send_header("Referrer-Policy", "no-referrer")
         self.end_headers()

@@ -227,8 +227,8 @@ class EventTable:
             return
         for folder in (self.folder, self.folder / "_delta_log"):
             if folder.is_dir() and not os.access(folder, os.W_OK | os.X_OK):
-                told = f"registry {self.place}: {folder.name} cannot be written"
-                raise MachineError(told, "is it open to you?")
+                message = f"registry {self.place}: {folder.name} cannot be written"
+                raise MachineError(message, "is it open to you?")
 
     def _committed(self, table: DeltaTable, rows: Sequence[Row]) -> bool:
         """Whether the rows were added to exactly the events that `table` was opened with."""

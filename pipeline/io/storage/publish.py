@@ -98,10 +98,10 @@ def output_folder(output: str) -> Path:
         with TemporaryFile(dir=folder):
             return folder
     except OSError as error:
-        told = f"output={output} cannot be written: {error.strerror}"
+        message = f"output={output} cannot be written: {error.strerror}"
         if error.errno in FULL:
-            raise MachineError(told, _remedy(error)) from error
-        raise UsageError(told, remedy) from error
+            raise MachineError(message, _remedy(error)) from error
+        raise UsageError(message, remedy) from error
 
 
 def partial_owner(path: Path) -> int | None:

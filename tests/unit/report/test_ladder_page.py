@@ -17,7 +17,7 @@ from pipeline.report.curve_chart import curve_chart
 from pipeline.report.heatmap import angle_bars, colour, heatmap
 from pipeline.report.ladder_page import render_ladder
 from pipeline.report.rung_chart import rung_chart
-from pipeline.views.notes import told_and_folded
+from pipeline.views.notes import shown_and_folded
 from tests.unit.ladders import make_diagnosis, make_map, make_turn
 
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>'
@@ -77,7 +77,7 @@ UNEXCITED = (
 def test_effects_that_no_test_excites_are_told_by_the_test_to_record() -> None:
     """Thirty lines of one kind bury the verdict; a few are told as they are."""
     result = replace(make_diagnosis(), notes=("odd in iq_a",), unexcited=UNEXCITED)
-    told, single = told_and_folded(result)
+    told, single = shown_and_folded(result)
     assert told == (
         "odd in iq_a",
         "no test here excites 4 effects, of which nothing can be said:",
@@ -93,7 +93,7 @@ def test_effects_that_no_test_excites_are_told_by_the_test_to_record() -> None:
     )
     assert single == words
     few = replace(result, unexcited=UNEXCITED[:3])
-    assert told_and_folded(few) == (("odd in iq_a", *words[:3]), ())
+    assert shown_and_folded(few) == (("odd in iq_a", *words[:3]), ())
     assert result.document()["notes"] == ["odd in iq_a", *words]
     box, each = render_ladder(result).split("how to excite each of the 4")
     assert "record drive to excite backlash, windage" in box
@@ -301,5 +301,5 @@ def test_a_curve_has_its_band_around_it() -> None:
 def test_a_test_that_lacks_a_signal_is_told_with_it() -> None:
     lacking = [replace(one, signals=("torque_shaft_nm",)) for one in UNEXCITED[-1:]]
     result = replace(make_diagnosis(), unexcited=(*UNEXCITED[:3], *lacking))
-    told, _ = told_and_folded(result)
+    told, _ = shown_and_folded(result)
     assert told[-1] == "record torque_map with torque_shaft_nm to excite torque_lag"

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Separation
 from pipeline.report.ladder_text import ladder_text
-from pipeline.views.ladder import headline, ladder_view, mapped_signals, told_signals
+from pipeline.views.ladder import headline, ladder_view, mapped_signals, shown_signals
 from tests.unit.ladders import make_diagnosis, make_rung
 
 
@@ -88,9 +88,9 @@ def test_rungs_tell_what_came_its_numbers_and_the_fall() -> None:
 
 
 def test_the_signal_farthest_over_its_floor_comes_first_and_one_without_map_last() -> None:
-    assert told_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
+    assert shown_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
     assert mapped_signals(make_diagnosis()) == ("vq_v", "v_pair_v")
-    assert told_signals(replace(make_diagnosis(), ladder=())) == ()
+    assert shown_signals(replace(make_diagnosis(), ladder=())) == ()
 
 
 @pytest.mark.parametrize("words", ["Encoder disc off-centre", "next: motor-datasheets compare"])
