@@ -26,8 +26,8 @@ def cogging_order(slots: int, pole_pairs: int) -> int:
 
     Examples
     --------
-    >>> cogging_order(12, 7)
-    84
+    >>> cogging_order(12, 7), cogging_order(9, 4)
+    (84, 72)
 
     """
     return math.lcm(slots, 2 * pole_pairs)

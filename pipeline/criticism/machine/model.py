@@ -180,10 +180,32 @@ def flux_of(current: Complex, base: Values) -> Complex:
 
 
 def effect_flux(effect: Hooks, x: Operating, q: Values) -> tuple[Complex, Array]:
-    """Flux ∂W/∂i (complex) [Wb] and ∂W/∂ε [Wb·A] of one effect, by complex steps.
+    """Flux linkage of one effect from its co-energy W, by complex steps.
 
+    Parameters
+    ----------
+    effect
+        With or without a co-energy.
+    x
+        State of the machine [n].
+    q
+        Parameters of the effect by their short names.
+
+    Returns
+    -------
+    flux [n], complex
+        ∂W/∂i_d + j ∂W/∂i_q [Wb].
+    slope [n]
+        ∂W/∂ε [Wb·A], for the torque.
+
+    Notes
+    -----
     f'(x) = Im f(x + ih)/h is exact to rounding for an analytic f.
-    References: [1] Squire & Trapp, SIAM Review 40 (1998).
+
+    References
+    ----------
+    Squire and Trapp, SIAM Review 40(1), 1998, 110, doi:10.1137/S003614459631241X.
+
     """
     hook = effect.coenergy
     shape = x.omega_rad_s.shape
@@ -211,7 +233,26 @@ def _turns(hook: CoenergyHook, x: Operating, q: Values) -> bool:
 
 
 def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
-    """1.5 p [ψ_d i_q − ψ_q i_d + ∂W/∂ε] [N·m]."""
+    """Torque of the air gap.
+
+    Parameters
+    ----------
+    x
+        State of the machine, its currents [n, A].
+    psi_wb
+        Flux linkage [n, Wb].
+    slope_wb
+        ∂W/∂ε of the co-energy [n, Wb·A].
+
+    Returns
+    -------
+    array [n, N·m]
+
+    Notes
+    -----
+    T = 1.5 p [ψ_d i_q − ψ_q i_d + ∂W/∂ε]
+
+    """
     torque: Array = (
         1.5 * x.machine.pole_pairs * (psi_wb.real * x.iq_a - psi_wb.imag * x.id_a + slope_wb)
     )
@@ -221,9 +262,24 @@ def air_gap_torque(x: Operating, psi_wb: Complex, slope_wb: Array) -> Array:
 def mean_current(x: Operating, values: Values) -> Operating:
     """Where the drops of a sample period act: at its mean current, not at the sampled one.
 
+    Parameters
+    ----------
+    x
+        State at the samples [n].
+    values
+        With the nuisances `ripple_slope` and `ripple_mean` [1].
+
+    Returns
+    -------
+    Operating
+        Currents and electrical angle of the period's mean; `x` itself without an inverter.
+
+    Notes
+    -----
     A voltage is held in the stationary frame while the rotor turns, so that the flux follows chords
     instead of arcs. So the current ripples, and its mean is that of another instant and is below
-    its samples. Nuisances of the fit say by how much: `ripple_slope` and `ripple_mean`.
+    its samples. The nuisances of the fit say by how much.
+
     """
     if not x.inverter or not (values["ripple_slope"] or values["ripple_mean"]):
         return x
@@ -242,11 +298,28 @@ def mean_current(x: Operating, values: Values) -> Operating:
 
 
 def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]:
-    """Flux linkage [n, Wb] and current [n, A] that a period's means are below the samples.
+    """What a period's means of flux and current are below the samples.
 
-    A voltage v that is held while the rotor turns by ω_e T_s in a period makes the flux ripple by
-    v T_s ω_e T_s. The mean is off the sample by `part` of that: 1/12 for samples where the voltage
-    changes, −1/24 for samples half a period from there.
+    Parameters
+    ----------
+    x
+        State at the samples [n].
+    part
+        Share [1]: 1/12 for samples where the voltage changes, −1/24 for samples half a period from
+        there.
+    values
+        Constants of the base.
+
+    Returns
+    -------
+    flux [n, Wb], current [n, A]
+        Complex, d + jq.
+
+    Notes
+    -----
+    A voltage v that is held while the rotor turns by φ = ω_e T_s in a period makes the flux ripple
+    by v T_s φ; the means are `part` of that below, −j v T_s φ with v = R i + j ω_e ψ.
+
     """
     turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
     flux = part * turn * (turn * base_flux(x, values) - 1j * x.ts_s * values["r_ohm"] * x.i_a)

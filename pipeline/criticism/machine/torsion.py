@@ -108,7 +108,19 @@ class _Window:
 
 
 def law_of_twist(shafts: Iterable[Shaft]) -> Law | None:
-    """Softness and gap that explain the angle best; None where no torque changes its sign."""
+    """Softness and gap of a coupling that explain the angle best.
+
+    Parameters
+    ----------
+    shafts
+        Whole captures of one shaft.
+
+    Returns
+    -------
+    Law or None
+        None where no torque changes its sign.
+
+    """
     told: list[_Window] = []
     inertia = 0.0
     for shaft in shafts:

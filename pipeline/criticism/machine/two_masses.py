@@ -7,7 +7,7 @@ The far angle is θ less the twist, so that with a load at the far end
 
 while a dynamometer that holds the far end, or a transducer in the coupling, reads S itself,
 [T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S, that
-of a spring or of a spring behind a gap, which `closer` tells from whole logs. A coasting shaft
+of a spring or of a spring behind a gap, which `discriminator` finds from whole logs. A coasting shaft
 passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
@@ -41,10 +41,29 @@ _NO_GAP_RAD = 2e-4
 
 
 def passed_on(x: Operating, share: float) -> Array:
-    """Torque S [n] that the motor's side passes on [N·m], drags left out, which change slowly.
+    """Torque that the motor's side of a coupling passes on, drags left out, which change slowly.
 
-    `share` of the inertia is at the far end. Three running means keep the encoder's rounding out
-    of S. They are twiced [3], so that a ringing up to a seventh of 1/block passes to one per cent.
+    Parameters
+    ----------
+    x
+        State of the machine, with its torque [n, N·m] and angle [n, rad].
+    share
+        Of the inertia that is at the far end [1].
+
+    Returns
+    -------
+    array [n, N·m]
+        S = T − (1 − share) J θ″; 0 at either end, where the means do not reach.
+
+    Notes
+    -----
+    Three running means keep the encoder's rounding out of S. They are twiced, so that a ringing up
+    to a seventh of 1/block passes to one per cent.
+
+    References
+    ----------
+    J. W. Tukey, Exploratory Data Analysis, Addison-Wesley, 1977, ch. 16 (twicing).
+
     """
     block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
     block -= 1 - block % 2
@@ -62,9 +81,25 @@ def passed_on(x: Operating, share: float) -> Array:
 
 
 def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
-    """Twist [n] of a spring and damper side by side, by the torque they pass on [rad].
+    """Twist of a spring and damper side by side, by the torque they pass on.
 
+    Parameters
+    ----------
+    x
+        State of the machine.
+    q
+        `twist_rad` at the machine's torque [rad], `damping_s` = c/k [s].
+    through_nm
+        Torque S [n, N·m].
+
+    Returns
+    -------
+    array [n, rad]
+
+    Notes
+    -----
     S = k (twist + c/k twist′), so the twist lags S by c/k, to first order in it.
+
     """
     late = through_nm - q["damping_s"] / x.ts_s * np.gradient(through_nm)
     twist: Array = q["twist_rad"] / x.machine.scales["torque_nm"] * late
@@ -72,10 +107,29 @@ def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
 
 
 def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
-    """What a far inertia takes from the shaft torque [n] beyond a rigid shaft's [N·m].
+    """What a far inertia takes from the shaft torque beyond a rigid shaft's.
 
-    `between`: the transducer stands between the two parts, and reads S whether or not the far end
-    is held. The twist is not smoothed before it is differenced: the weak form's windows do that.
+    Parameters
+    ----------
+    x
+        State of the machine.
+    share
+        Of the inertia that is at the far end [1].
+    between
+        Whether the transducer stands between the two parts, and so reads S whether or not the far
+        end is held.
+    twist_rad
+        Gives the twist [n, rad] where it is needed.
+
+    Returns
+    -------
+    array [n, N·m]
+        −share J θ″ or −share J twist″; 0 of a shaft that no inverter drives.
+
+    Notes
+    -----
+    The twist is not smoothed before it is differenced: the weak form's windows do that.
+
     """
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
@@ -87,10 +141,25 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
 
 
 def side_of(through_nm: Array, least_nm: float) -> Array:
-    """Side of a gap [n], −1 to 1, that the torque passed on presses to.
+    """Side of a gap that the torque passed on presses to.
 
-    Below `least_nm` the gap is open. If the torque comes back with the other sign, the gap is
-    crossed in between: slowly at first, at an even acceleration.
+    Parameters
+    ----------
+    through_nm
+        Torque S [n, N·m].
+    least_nm
+        Torque below which the gap is open [N·m].
+
+    Returns
+    -------
+    array [n]
+        −1 to 1. If the torque comes back with the other sign, the gap is crossed in between: slowly
+        at first, at an even acceleration.
+
+    References
+    ----------
+    Nordin and Gutman, Automatica 38(10), 2002, 1633, doi:10.1016/S0005-1098(02)00047-X.
+
     """
     closed = np.flatnonzero(np.abs(through_nm) > least_nm)
     if closed.size == 0:
@@ -108,8 +177,20 @@ def side_of(through_nm: Array, least_nm: float) -> Array:
 def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     """Backlash or compliance, from drive logs in which the torque changes its sign.
 
-    It is a gap if the gap is surely there, and wider than the spring's twist at the torque passed
-    on. It is a spring if such a gap is surely not there. Else neither is told.
+    Parameters
+    ----------
+    logs
+        Whole logs with currents, angle and the load's torque.
+    q
+        `share` of the inertia at the far end [1], and whether the transducer is `between`.
+
+    Returns
+    -------
+    Discrimination or None
+        A gap if it is surely there, and wider than the spring's twist at the torque passed on; a
+        spring if such a gap is surely not there; else None. Surely is `_SURE` standard
+        uncertainties.
+
     """
     between, share = q["between"] > 0.0, q["share"]
     if share <= 0.0 or not logs:

@@ -21,10 +21,23 @@ _AT = 1e-9
 
 
 def limits_of(model: Model) -> dict[str, tuple[float, float]]:
-    """Lowest and highest value [unit of the name] of what has bounds.
+    """Lowest and highest value of what has bounds.
 
+    Parameters
+    ----------
+    model
+        Machine and effects.
+
+    Returns
+    -------
+    dict
+        Bounds [unit of the name] by the parameter's name; infinite on a side without.
+
+    Notes
+    -----
     A resistance or inductance below zero, or an inertia next to nothing, would stand for an effect
     that is not in the model.
+
     """
     limits = dict.fromkeys(("r_ohm", "ld_h", "lq_h"), (0.0, np.inf))
     limits["j_kgm2"] = (
@@ -50,10 +63,26 @@ Best = Callable[[NDArray[np.int64]], Step]
 
 
 def bounded_step(best: Best, columns: Sequence[Column], model: Model, values: Values) -> Array:
-    """Best step [P] along all columns that moves no parameter beyond a bound it stands at.
+    """Best step along all columns that moves no parameter beyond a bound it stands at.
 
-    `best` gives the best step along some of the columns. A parameter that would leave its bound is
-    taken out, and the others step anew without it.
+    Parameters
+    ----------
+    best
+        Gives the best step along some of the columns, by their places.
+    columns
+        All columns [P].
+    model, values
+        Whose bounds and values count.
+
+    Returns
+    -------
+    array [P]
+        A parameter that would leave its bound is taken out, and the others step anew without it.
+
+    References
+    ----------
+    Nocedal and Wright, Numerical Optimization, 2nd ed., Springer, 2006, 16.5 (active sets).
+
     """
     limits = limits_of(model)
     live = np.arange(len(columns))

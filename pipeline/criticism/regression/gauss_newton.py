@@ -39,10 +39,30 @@ def start_values(model: Model, machine: Machine) -> dict[str, float]:
 
 
 def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
-    """Fits a model's own parameters; returns the system around the fit, which it holds.
+    """Fits a model's own parameters.
 
+    Parameters
+    ----------
+    fit
+        Where to begin, with the noise floors that the rows are weighed by.
+    before
+        A system around a near fit, whose columns may serve.
+
+    Returns
+    -------
+    LinearSystem
+        Around the fit, which it holds.
+
+    Notes
+    -----
     A step that makes the deviance worse is shortened. Columns stay as they are while steps do about
-    what they promise [2]; a fit is at its end where columns made anew promise nothing.
+    what they promise (chord method); a fit is at its end where columns made anew promise nothing.
+
+    References
+    ----------
+    Marquardt, J. SIAM 11(2), 1963, 431, doi:10.1137/0111030.
+    Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations, Academic Press, 1970, ch. 7.
+
     """
     policy = fit.policy.fit
     system, fresh = linear_system(fit, before=before), True
@@ -111,10 +131,26 @@ def _ridge(fit: Fit, columns: Sequence[Column]) -> Array:
 
 
 def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = None) -> Fit:
-    """Fits a model from orders of magnitude, or from the values that are `known`.
+    """Fits a model to a few windows of each segment, every equation by the machine's own scale.
 
-    Every equation counts by the machine's own scale. By its noise floor, one that is far off would
-    be given up before the constants are near. A few windows of each segment are enough.
+    Parameters
+    ----------
+    segments
+        All segments.
+    model
+        Machine and effects.
+    known
+        Values to begin with; orders of magnitude where not given.
+
+    Returns
+    -------
+    Fit
+        Of all segments, with the scales for noise floors.
+
+    Notes
+    -----
+    By its noise floor, an equation that is far off would be given up before the constants are near.
+
     """
     values = {**start_values(model, model.machine), **(known or {})}
     few = tuple(sparse(segment) for segment in segments)

@@ -56,8 +56,22 @@ class HeldOut:
 def leave_out(system: LinearSystem) -> HeldOut:
     """Predicts every capture from all the others, by one weighted step from the full fit.
 
-    Of segments that are parted in blocks, every block is predicted from all else. This is to
-    first order: noise floors, weights and shapes stay those of the full fit.
+    Parameters
+    ----------
+    system
+        Around the full fit.
+
+    Returns
+    -------
+    HeldOut
+        Of segments that are parted in blocks, every block is predicted from all else. A capture
+        that alone carries a constant stays in the fit.
+
+    Notes
+    -----
+    Δ = −(N − N_k)⁻¹ (s − s_k) with the normal matrix N and the gradient s of all rows, and those of
+    the capture k. To first order: noise floors, weights and shapes stay those of the full fit.
+
     """
     policy, own = system.policy.goodness, system.own.size
     places = np.flatnonzero(np.any(system.matrix[:, :own] != 0.0, axis=0))
@@ -95,8 +109,23 @@ def leave_out(system: LinearSystem) -> HeldOut:
 def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
     """The same rows held out of several fits to the same captures, so that their errors compare.
 
+    Parameters
+    ----------
+    fits
+        Systems around the fits, of the same rows.
+    held
+        What each of them predicts.
+
+    Returns
+    -------
+    tuple of HeldOut
+        Rows that one of them could not hold out count in none.
+
+    Notes
+    -----
     A parameter that one capture alone carries keeps that capture in the fit. If it counted in one
     fit and not in the other, that would pass for a better prediction.
+
     """
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
     told = shared if shared.any() else np.ones(shared.size, dtype=bool)
@@ -158,11 +187,25 @@ def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
 
 
 def remainder(system: LinearSystem, large: bool = False) -> tuple[Remainder, ...]:
-    """Groups that are over their floor significantly and by a size that matters, the worst first.
+    """Groups that are over their floor significantly and by a size that matters.
 
-    With `large`, the size must matter to the machine as a whole. A floor from the recording itself
-    is good to a factor of 2 in variance, and nobody acts on an error below 5e-4 of the machine's
-    voltage or torque.
+    Parameters
+    ----------
+    system
+        Around a fit.
+    large
+        Whether the size must matter to the machine as a whole.
+
+    Returns
+    -------
+    tuple of Remainder
+        The worst first.
+
+    Notes
+    -----
+    A floor from the recording itself is good to a factor of 2 in variance, and nobody acts on an
+    error below 5e-4 of the machine's voltage or torque.
+
     """
     return tuple(one for one in over_floor(system, large) if one.matters)
 
@@ -223,9 +266,28 @@ def _highest_by_chance(n: float, sigmas: float) -> float:
 
 
 def material_size(segment: Segment, channel: str, fit: Fit, large: bool = False) -> float:
-    """Error [unit of the signal] below which nobody would act, or that is `large` for the machine.
+    """Error below which nobody would act.
 
+    Parameters
+    ----------
+    segment
+        Whose signal it is.
+    channel
+        The signal.
+    fit
+        For the machine's scales and the policy.
+    large
+        Whether the error shall be large for the machine, and not beside the readings.
+
+    Returns
+    -------
+    float
+        [unit of the signal]
+
+    Notes
+    -----
     Of a log at standstill the machine's own voltage is no measure: all of it is R times current.
+
     """
     one, policy = channel_of(segment, channel), fit.policy.goodness
     scale = channel_scale(segment, channel, fit.model.machine, fit.values)

@@ -48,13 +48,31 @@ class Known:
     rest: Array
 
     def u_of(self, gradient: Array, bent: bool = False) -> float:
-        """Standard uncertainty of a function with this gradient [own], `bent` where it is not
-        linear: from the samples' noise, or from leaving out one capture at a time, whichever is
-        larger, and from the rest; infinite where it is not identifiable.
+        """Standard uncertainty of a function of the parameters.
 
-        A form that is a little wrong, or noise that is not white, disturbs every capture in its
-        own way; a covariance from samples does not know that. References: [1] Efron & Stein, Ann.
-        Stat. 9 (1981), jackknife variance (K − 1)/K Σ (θ_k − mean)².
+        Parameters
+        ----------
+        gradient
+            By the parameters [own].
+        bent
+            Whether the function is not linear.
+
+        Returns
+        -------
+        float
+            The larger one of the samples' noise and of leaving out one capture at a time, with the
+            step that is still to be done; infinite where the function is not identifiable.
+
+        Notes
+        -----
+        Jackknife: u² = (K − 1)/K Σ (θ_k − mean)². A form that is a little wrong, or noise that is
+        not white, disturbs every capture in its own way; a covariance from samples does not know
+        that.
+
+        References
+        ----------
+        Efron and Stein, Ann. Statist. 9(3), 1981, 586, doi:10.1214/aos/1176345462.
+
         """
         noise = self.found.u_of_bent(gradient) if bent else self.found.u_of(gradient)
         count, moves = len(self.steps), self.steps @ gradient
@@ -70,10 +88,20 @@ class Known:
 
 
 def known(system: LinearSystem, held: HeldOut) -> Known:
-    """What a system and its priors say of a fit's own columns.
+    """What a system and its priors say of a fit's own parameters.
 
-    Nothing that only keeps steps short, or where the fit began, is in it. The columns are those of
-    the fit itself: one that stayed from a near fit would tell apart what nothing tells apart.
+    Parameters
+    ----------
+    system
+        Around a fit, with columns that were made at it.
+    held
+        What leaving out captures moves.
+
+    Returns
+    -------
+    Known
+        Without anything that only keeps steps short, or where the fit began.
+
     """
     return known_by(system, held, _sizes(system.fit, system.columns[: system.own.size]))
 
@@ -91,10 +119,23 @@ def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
 
 
 def surely_there(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
-    """Names of the parameters that are `least` standard uncertainties from zero, as they are or
-    over a constant that no motor is without.
+    """Parameters that are surely not zero, as they are or over a constant that no motor is without.
 
-    A coast tells that there is windage though it tells no more than windage over inertia.
+    Parameters
+    ----------
+    system
+        Around a fit.
+    held
+        What leaving out captures moves.
+    least
+        Standard uncertainties that they must be away from zero.
+
+    Returns
+    -------
+    set of str
+        Names. A coast shows that there is windage though it shows no more than windage over
+        inertia.
+
     """
     own = system.own.size
     fit = known(system, held)

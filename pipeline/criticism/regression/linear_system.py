@@ -183,12 +183,37 @@ class LinearSystem:
         )
 
     def after(self, places: NDArray[np.int64], step: Array) -> Array:
-        """The residual [R] after a step along some columns, to first order."""
+        """The residual after a step along some columns, to first order.
+
+        Parameters
+        ----------
+        places
+            Of the columns [k].
+        step
+            Change of their parameters [k].
+
+        Returns
+        -------
+        array [R]
+
+        """
         left: Array = self.residual + self.matrix[:, places] @ step
         return left
 
     def covariance(self, places: NDArray[np.int64]) -> Array:
-        """Covariance [k, k] of the parameters at `places` when they are fitted together."""
+        """Covariance of parameters when they are fitted together.
+
+        Parameters
+        ----------
+        places
+            Of their columns [k].
+
+        Returns
+        -------
+        array [k, k]
+            (A' W A + prior precision)⁻¹ with W = 1/max(1, χ²/n) of each row's group.
+
+        """
         weight = self.weights(self.reduced_chi2(self.residual))
         matrix = self.matrix[:, places]
         normal = (matrix * weight[:, None]).T @ matrix + np.diag(self.prior_precision[places])
@@ -203,8 +228,22 @@ def linear_system(
 ) -> LinearSystem:
     """Linearises every segment around a fit, along its own columns and those of candidates.
 
-    Columns that hold at this fit too (`_holds`) stay as they were in `before`, a system around a
-    near fit; with `chord` all that it has stay.
+    Parameters
+    ----------
+    fit
+        Model and values.
+    candidates
+        Columns of parameters that are not in the model.
+    before
+        A system around a near fit; its columns that hold at this fit too stay as they were.
+    chord
+        Whether all of its columns stay.
+
+    Returns
+    -------
+    LinearSystem
+        Residual and columns over the noise, the model's own columns first.
+
     """
     model, values = fit.model, fit.values
     own = own_columns(model)

@@ -25,11 +25,28 @@ from pipeline.criticism.residuals.residual import operate, residual
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:
-    """Standard deviation [groups] of the weak residual that the sensors' noise alone makes.
+    """What the sensors' noise alone makes of the weak residual.
 
+    Parameters
+    ----------
+    segment
+        With the noise and steps of its columns.
+    model, values
+        At which the residual is computed.
+    seed
+        Of the noise.
+
+    Returns
+    -------
+    array [groups]
+        Standard deviation of each (channel, order).
+
+    Notes
+    -----
     Noise is added to the recording and the residual computed again; the variance of the change is
-    pooled over the windows of one (channel, order). The noise is white, of each sensor's own level;
-    an angle that is rounded, and signals that are coarse, are rounded anew besides.
+    pooled over the windows. The noise is white, of each sensor's own level; an angle that is
+    rounded, and signals that are coarse, are rounded anew besides.
+
     """
     policy = model.policy.noise_floors
     group, _, valid, groups = row_index(segment)
@@ -96,11 +113,25 @@ def form_tolerance(
     added: Sequence[Effect],
     share: float | None = None,
 ) -> Array:
-    """What the forms of the effects that were added may be wrong by [groups], as weak samples.
+    """What the forms of the effects that were added may be wrong by.
 
-    No formula of an effect is right to better than a `share` of what the effect does, without one
-    the policy's.
-    Where a found effect acts, an error below that is one of its form, and names no further effect.
+    Parameters
+    ----------
+    segment
+        Where they act.
+    model, values
+        With these effects.
+    added
+        The effects.
+    share
+        Of what an effect does [1]; the policy's where not given.
+
+    Returns
+    -------
+    array [groups]
+        As weak samples. Where a found effect acts, an error below that is one of its form, and
+        names no further effect.
+
     """
     group, _, valid, groups = row_index(segment)
     total = np.zeros(len(groups))
@@ -118,12 +149,30 @@ def form_tolerance(
 def reading_error(
     segment: Segment, model: Model, values: Values, state: Operating | None = None
 ) -> Array:
-    """The error that any model of a bench is allowed, as weak samples [C, W, M]; `state` is the
-    segment's true state [n], where it is known already.
+    """The error that any model of a bench is allowed.
 
-    It is 5e-5 of the reading in a window, since no sensor is more linear, and for what happens
-    between samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. An
-    effect that hides in this is nobody's concern, and smaller structure names nothing.
+    Parameters
+    ----------
+    segment
+        Whose channels they are.
+    model, values
+        For scales and friction.
+    state
+        The segment's true state, where it is known already.
+
+    Returns
+    -------
+    array [C, W, M]
+        As weak samples.
+
+    Notes
+    -----
+    5e-5 of the reading in a window, since no sensor is more linear, and for what happens between
+    samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. Then what a
+    drive's log may have besides: jumps of the voltage, lines of the encoder, friction at
+    standstill. An effect that hides in this is nobody's concern, and smaller structure names
+    nothing.
+
     """
     weak, policy = segment.weak, model.policy.noise_floors
     if weak is None:
@@ -264,6 +313,18 @@ def offsets(
 
 
 def window_gain(segment: Segment) -> float:
-    """Weak sample that a constant of one makes in the plain window."""
+    """Weak sample that a constant of one makes in the plain window.
+
+    Parameters
+    ----------
+    segment
+        Whose windows they are.
+
+    Returns
+    -------
+    float
+        [1]; 1 of a table.
+
+    """
     weak = segment.weak
     return 1.0 if weak is None or weak.starts.size == 0 else float(weak.functions[0, 0].sum())

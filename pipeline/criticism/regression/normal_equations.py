@@ -111,9 +111,23 @@ class NormalEquations:
     def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int | None = None) -> Descent:
         """The step of least deviance.
 
-        Weighted least squares, the weights renewed until the deviance stays. There may be more than
-        one end: one start gives up a group that another would have saved. So it begins once for
-        each power in `starts`, with the weights of the residual at hand to that power.
+        Parameters
+        ----------
+        starts
+            Powers to which the weights of the residual at hand are taken to begin with.
+        rounds
+            Most renewals of the weights; the policy's where not given.
+
+        Returns
+        -------
+        Descent
+            The lowest of the ends.
+
+        Notes
+        -----
+        Weighted least squares, the weights 1/max(1, q) renewed until the deviance stays. There may
+        be more than one end: one start gives up a group that another would have saved.
+
         """
         now = np.maximum(self._spreads(self.power), 1.0)
         ends = [self._descended(now**power, rounds or self.policy.most_rounds) for power in starts]
@@ -142,13 +156,54 @@ class NormalEquations:
 
 
 def deviance_of(counts: Array, reduced_chi2: Array) -> float:
-    """Σ n [log max(1, q) + min(1, q) − 1]: −2 log likelihood of groups with χ²/n = q."""
+    """−2 log likelihood of groups of rows whose scatter is at least their noise floor.
+
+    Parameters
+    ----------
+    counts
+        Rows n of each group [G].
+    reduced_chi2
+        q = χ²/n of each group [G].
+
+    Returns
+    -------
+    float
+        Less constants.
+
+    Notes
+    -----
+    Σ n [log max(1, q) + min(1, q) − 1]: χ² where q < 1, and that of a normal distribution of
+    unknown variance where q > 1, so that a group which misses its floor counts 1/q.
+
+    Examples
+    --------
+    >>> deviance_of(np.array([10.0, 10.0]), np.array([1.0, np.e]))
+    10.0
+
+    """
     each = np.log(np.maximum(reduced_chi2, 1.0)) + np.minimum(reduced_chi2, 1.0) - 1.0
     return float((counts * each).sum())
 
 
 def pseudo_inverse(normal: Array) -> Array:
-    """Inverse of a normal matrix with directions that carry no information left at zero."""
+    """Inverse of a normal matrix, directions without information left at zero.
+
+    Parameters
+    ----------
+    normal
+        [k, k], symmetric and not negative.
+
+    Returns
+    -------
+    array [k, k]
+        A parameter that no row tells of has a row and a column of zeros.
+
+    Notes
+    -----
+    The matrix is scaled to a unit diagonal; directions below `_TIE` of the largest have no
+    information.
+
+    """
     told = np.diag(normal)
     # a parameter that no capture tells of stays where it is, exactly
     size = np.sqrt(np.where(told > 0.0, told, 1.0))
