@@ -31,7 +31,7 @@ def _is_time(column: str) -> pl.Expr:
 
 
 def _increases(column: str) -> pl.Expr:
-    """True on rows whose time is later than the row before; NaN is reported by `is_time`."""
+    """True on rows whose time is later than the row before; NaN is reported by `_is_time`."""
     step = pl.col(column).diff()
     return (step > 0.0) | step.is_null() | step.is_nan()
 

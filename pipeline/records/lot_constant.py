@@ -210,7 +210,8 @@ class Gauge:
 class StationBias:
     """A station's bias [unit] against the mean of the linked stations, with its uncertainty.
 
-    `referenced` by golden motors, or by lots that were measured on linked stations.
+    `by` golden motors, or lots that were measured on linked stations; `same_station` measured both
+    sides, `unreferenced` is linked to nothing.
     """
 
     station: str

@@ -19,6 +19,8 @@ EXAMPLES = [
     for path in FILES
     if ">>> " in path.read_text() and PUBLIC not in path.parents
 ]
+OF_OTHERS = {"ia_ma", "time_ms", "cogging_order_12"}
+"""Names that files of others may have, and examples of such."""
 PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-+\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
@@ -41,6 +43,30 @@ def wrong(source: str) -> Iterator[str]:
             yield f"{node.name}: {named(section[1])} for {taken}"
 
 
+def words_of(source: str) -> set[str]:
+    """Every name of the code: of functions, arguments, attributes, and in short texts."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        kinds = (ast.FunctionDef, ast.ClassDef, ast.Name, ast.Attribute, ast.arg, ast.keyword)
+        if isinstance(node, kinds):
+            found |= {str(getattr(node, key, "")) for key in ("name", "id", "attr", "arg")}
+        elif isinstance(node, ast.alias):
+            found |= set(node.name.split("."))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found |= set(re.findall(r"\w+", node.value)) if len(node.value) < 60 else set()
+    return found
+
+
+def quoted(source: str) -> Iterator[str]:
+    """Names in backticks in docstrings; those with capitals in them are patterns, as `u_NAME`."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Module)):
+            text = ast.get_docstring(node) or ""
+            for name in re.findall(r"`([A-Za-z_][\w.]*_[\w.]*)`", text):
+                if name.islower() or name.isupper():
+                    yield name.rpartition(".")[2]
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_examples_in_docstrings_run(name: str) -> None:
     result = doctest.testmod(importlib.import_module(name))
@@ -51,6 +77,18 @@ def test_the_examples_in_docstrings_run(name: str) -> None:
 def test_a_parameters_section_names_the_parameters_of_its_function() -> None:
     found = [f"{path}: {one}" for path in FILES for one in wrong(path.read_text())]
     assert found == []
+
+
+def test_a_docstring_names_nothing_that_is_gone() -> None:
+    """A function, field, option or column in backticks is in the code."""
+    known = {path.stem for path in FILES}.union(*(words_of(path.read_text()) for path in FILES))
+    gone = {
+        f"{path}: {name}"
+        for path in FILES
+        for name in quoted(path.read_text())
+        if name not in known | OF_OTHERS and not name.startswith("_")
+    }
+    assert gone == set()
 
 
 def test_a_section_that_does_not_fit_is_seen() -> None:

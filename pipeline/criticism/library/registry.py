@@ -23,7 +23,7 @@ def effects(effects_path: str | None = None) -> dict[str, Effect]:
 
     The folder is looked at anew every time, and files that have not changed are the same effects.
     Raises UsageError for a folder that is not there, a file that cannot be run or holds no
-    `EFFECT`, an effect that cannot be right (`own_effect`), a name taken twice.
+    `EFFECT`, an effect that cannot be right (`guarded`), a name taken twice.
     """
     return dict(_library(_user_files(effects_path)))
 

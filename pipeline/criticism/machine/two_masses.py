@@ -7,8 +7,8 @@ The far angle is θ less the twist, so that with a load at the far end
 
 while a dynamometer that holds the far end, or a transducer in the coupling, reads S itself,
 [T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S, that
-of a spring or of a spring behind a gap, which `discriminator` finds from whole logs. A coasting shaft
-passes on next to nothing.
+of a spring or of a spring behind a gap, which `discriminator` finds from whole logs. A coasting
+shaft passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
 (2002), backlash as a dead zone of the twist; [3] Tukey, Exploratory Data Analysis (1977), ch. 16.

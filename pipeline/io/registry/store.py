@@ -1,7 +1,7 @@
 """The registry: every datasheet version ever published, and what people decided of it.
 
-A Delta table of events (`registry_table`) that only grows, and a JSON file a version beside it
-(`registry_exports`). Nothing here reads a clock; whoever publishes or decides says when it is.
+A Delta table of events (`table`) that only grows, and a JSON file a version beside it
+(`exports`). Nothing here reads a clock; whoever publishes or decides says when it is.
 """
 
 from __future__ import annotations

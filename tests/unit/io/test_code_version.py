@@ -298,10 +298,10 @@ def test_datasheets_hang_on_every_plug_in_and_on_nothing_that_shows_them() -> No
         "lots",
         "export",
         "simulator",
-        "commands",
+        "cli",
         "settings",
     }
-    assert not any("registry_table" in m or "recordings" in m or m == RUN for m in closure)
+    assert not any("io.registry" in m or "recordings" in m or m == RUN for m in closure)
     assert closure < own_code().closure(RUN)
     assert own_code().closure(SURVEY) < own_code().closure(RUN)
     assert any(module.startswith("pipeline.report") for module in own_code().closure(RUN))
