@@ -245,9 +245,14 @@ def test_a_gate_that_breaks_refuses_by_name(
 
 
 def test_current_of_the_other_line(rng: np.random.Generator) -> None:
-    """Let through: the pair's current may be that of either of its two lines, not the third's."""
+    """Let through: the pair's current may be that of either of its two lines, not the third's.
+
+    What goes into one line comes out of the other.
+    """
     capture = resistance(MOTOR, rng)
-    other = capture.tables[0].rename({"ia_a": "ib_a"})
+    out = capture.tables[0].rename({"ia_a": "ib_a"})
+    assert refused(replace(capture, tables=(out,))).code == "power_sign"
+    other = out.with_columns(-pl.col("ib_a"))
     assert validate(replace(capture, tables=(other,)), {})[1] == ()
     third = capture.tables[0].rename({"ia_a": "ic_a"})
     assert refused(replace(capture, tables=(third,))).code == "missing_column"
