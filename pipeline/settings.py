@@ -189,6 +189,9 @@ class PlanSettings(ReadingSettings):
     limits: str = key(
         "default", "limits file of conf/limits/: constants a release must hold", place=True
     )
+    constants: dict[str, Any] = key(
+        {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
+    )
 
 
 @dataclass(kw_only=True)
@@ -288,6 +291,9 @@ class CompareSettings(ReadingSettings):
         {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
     )
     effects_path: str | None = key(None, "folder of your own effects, one file each", place=True)
+    constants: dict[str, Any] = key(
+        {}, "stated constants: constants.NAME=number and constants.u_NAME=its standard uncertainty"
+    )
 
 
 @dataclass(kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,10 @@ import polars as pl
 from pipeline.api import frames
 from pipeline.api.by_motor import ByMotor
 from pipeline.api.figure import Figure, figure
+from pipeline.api.options import check_constants
 from pipeline.api.recordings import Recordings, read
 from pipeline.execution.start import start_constants
+from pipeline.records.capture import Campaign
 from pipeline.records.comparison import Comparison, ModelSpec
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.errors import UsageError
@@ -239,6 +241,7 @@ def compare(
     *,
     effects_path: str | None = None,
     policy: Mapping[str, Any] | None = None,
+    constants: Mapping[str, float] | None = None,
 ) -> Comparisons:
     """Compares a model with measurements that it was not fitted to, signal by signal.
 
@@ -255,6 +258,9 @@ def compare(
     policy : mapping of mapping, optional
         Constants of judgement that differ from the defaults [units in docs/policy.md]:
         `{section: {field: number}}`.
+    constants : mapping of float, optional
+        Stated constants [units of the glossary], which are priors of the fit:
+        `{"kt_peak_nm_a": 0.118, "u_kt_peak_nm_a": 0.002}`.
 
     Returns
     -------
@@ -291,7 +297,7 @@ def compare(
     from pipeline.criticism.comparison import compare as compare_one
 
     spec = model_spec(model, effects, effects_path, policy)
-    campaigns = _recordings(recordings).campaigns
+    campaigns = _stated(_recordings(recordings).campaigns, constants)
     return Comparisons({n: compare_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
 
 
@@ -302,6 +308,7 @@ def diagnose(
     *,
     effects_path: str | None = None,
     policy: Mapping[str, Any] | None = None,
+    constants: Mapping[str, float] | None = None,
 ) -> Diagnoses:
     """Names the physical effects that a model lacks, or reports that no known effect explains it.
 
@@ -318,6 +325,9 @@ def diagnose(
     policy : mapping of mapping, optional
         Constants of judgement that differ from the defaults [units in docs/policy.md]:
         `{section: {field: number}}`.
+    constants : mapping of float, optional
+        Stated constants [units of the glossary], which are priors of the fit:
+        `{"kt_peak_nm_a": 0.118, "u_kt_peak_nm_a": 0.002}`.
 
     Returns
     -------
@@ -353,8 +363,16 @@ def diagnose(
     from pipeline.criticism.diagnosis import diagnose as diagnose_one
 
     spec = model_spec(model, effects, effects_path, policy)
-    campaigns = _recordings(recordings).campaigns
+    campaigns = _stated(_recordings(recordings).campaigns, constants)
     return Diagnoses({n: diagnose_one(c, spec, start_constants(c)) for n, c in campaigns.items()})
+
+
+def _stated(
+    campaigns: Mapping[str, Campaign], constants: Mapping[str, float] | None
+) -> dict[str, Campaign]:
+    """The campaigns with what is stated of their motors."""
+    check_constants(constants or {})
+    return {n: replace(c, stated={**c.stated, **(constants or {})}) for n, c in campaigns.items()}
 
 
 def model_spec(

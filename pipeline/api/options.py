@@ -24,7 +24,7 @@ def check_options(settings: RunSettings) -> None:
     """Refuses an option of an estimator, gate or check that there is not, a stated constant that
     there is not, and a value that none of them can take: none must be silent.
     """
-    _check_constants(settings.constants)
+    check_constants(settings.constants)
     if not (settings.fit or settings.gates or settings.crosscheck):
         return
     from pipeline.contracts.registry import gates
@@ -39,7 +39,8 @@ def check_options(settings: RunSettings) -> None:
     _check("crosscheck", settings.crosscheck, {r.name: r.options for r in rules()})
 
 
-def _check_constants(stated: Mapping[str, Any]) -> None:
+def check_constants(stated: Mapping[str, Any]) -> None:
+    """Refuses a stated constant that there is not, and a value that is no number."""
     for key, value in stated.items():
         name = key.removeprefix("u_")
         if not may_be_stated(name):

@@ -267,7 +267,7 @@ def comparison_schema() -> Schema:
             "unit": NAME,
             "at_bound": {"type": "boolean"},
         },
-        {"status": {"enum": ["measured", "not_identifiable"]}},
+        {"status": {"enum": ["measured", "stated", "not_identifiable"]}},
     )
     error = _object(
         {

@@ -13,7 +13,11 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
-from pipeline.criticism.regression.identifiability import reported_combinations, reported_parameters
+from pipeline.criticism.regression.identifiability import (
+    against_stated,
+    reported_combinations,
+    reported_parameters,
+)
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
@@ -70,6 +74,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         (
             *unused(campaign, system.segments),
             *at_ambient(system.segments, system.fit.model),
+            *against_stated(system, held),
             *hum_notes(begun.hum),
             *held.notes,
         ),

@@ -23,7 +23,7 @@ from pipeline.criticism.regression.goodness import (
     HeldOut,
     over_floor,
 )
-from pipeline.criticism.regression.identifiability import reported_combinations
+from pipeline.criticism.regression.identifiability import against_stated, reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
@@ -108,6 +108,7 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
         (
             *unused(campaign, found),
             *at_ambient(found, last.fit.model),
+            *against_stated(last, ladder.held[-1]),
             *hum_notes(ladder.begun.hum),
             *end.notes,
             *_together(together, ladder.steps[-1].added),

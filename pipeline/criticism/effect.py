@@ -93,7 +93,8 @@ class Machine:
     station's gains and thermometers, by the name of the nuisance that stands for each;
     `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none;
     `travel_turns` how far the shaft goes in any one capture: a wave of the angle shows where it is
-    gone through once at least.
+    gone through once at least. `stated`: what somebody states of the motor's constants, value and
+    standard uncertainty by the name of the parameter, in its unit.
     """
 
     pole_pairs: int
@@ -104,6 +105,7 @@ class Machine:
     encoder_rad: float = 0.0
     load_orders: tuple[float, ...] = ()
     travel_turns: float = math.inf
+    stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def cogging_order(self) -> int | None:

@@ -45,13 +45,14 @@ class ModelSpec:
 @dataclass(frozen=True, slots=True)
 class ModelParameter:
     """One fitted parameter with its standard uncertainty [unit]; both are None where the captures
-    and the station's priors do not determine it.
+    and the station's priors do not determine it. `stated`: nothing but what somebody states does.
     """
 
     value: float | None
     u: float | None
     unit: str
     at_bound: bool = False
+    stated: bool = False
 
     @property
     def known(self) -> bool:
@@ -59,9 +60,11 @@ class ModelParameter:
         return self.value is not None
 
     @property
-    def status(self) -> Literal["measured", "not_identifiable"]:
+    def status(self) -> Literal["measured", "stated", "not_identifiable"]:
         """As in a datasheet."""
-        return "measured" if self.known else "not_identifiable"
+        if not self.known:
+            return "not_identifiable"
+        return "stated" if self.stated else "measured"
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`."""

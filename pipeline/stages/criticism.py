@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from pipeline.api.options import check_constants
 from pipeline.criticism.policy.policy import policy_changes
 from pipeline.execution.segment_worker import segment_worker
 from pipeline.execution.start import start_constants
@@ -63,6 +64,7 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
 
         known_effects(settings.model.effects, settings.effects_path)
     changes = policy_changes(settings.policy)
+    check_constants(settings.constants)
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     watch, output = Stopwatch(), output_folder(settings.output)
     with waiting("reading") as line, segment_worker(settings.effects_path) as worker:
@@ -77,8 +79,9 @@ def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str)
         effects = tuple(settings.model.effects)
         spec = ModelSpec(settings.model.name, effects, settings.effects_path, changes)
         results = []
-        for number, campaign in enumerate(found.campaigns, 1):
-            line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(found.campaigns)}")
+        stated = [replace(one, stated=settings.constants) for one in found.campaigns]
+        for number, campaign in enumerate(stated, 1):
+            line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(stated)}")
             with worker.campaign():
                 start = start_constants(campaign)
                 task = Task(campaign, spec, start, settings.input, output, watch)

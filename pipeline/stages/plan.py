@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from pipeline.api.options import check_constants
 from pipeline.crosscheck.plan import Aims, Known, Plan, Way, make_plan
 from pipeline.crosscheck.registry import check_all, rules
 from pipeline.estimation.registry import estimators, fit_all
@@ -43,6 +44,7 @@ def main(settings: PlanSettings) -> Outcome:
 
     Raises UsageError where there is no such motor or limits file.
     """
+    check_constants(settings.constants)
     limits = limits_file(settings.limits, settings.config_dir)
     required = frozenset(required_constants(limits))
     if settings.input is not None:
@@ -61,7 +63,8 @@ def _of_captures(settings: PlanSettings, folder: str, required: frozenset[str]) 
     limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
     found = campaigns(folder, settings.source, settings.motor, limits, settings.config_dir)
     plans = []
-    for campaign in found.campaigns:
+    for recorded in found.campaigns:
+        campaign = replace(recorded, stated=settings.constants)
         constants = fit_all(campaign, {})[0]
         tests = frozenset(capture.meta.test for capture in campaign.captures)
         checks = check_all(constants, campaign, {})

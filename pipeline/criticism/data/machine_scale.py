@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.sensor_noise import rounding_step
+from pipeline.criticism.data.stated import stated_parameters
 from pipeline.criticism.data.traces import LINES_V, tellable
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.orders import TURN_RAD
@@ -18,6 +19,7 @@ from pipeline.physics.frames import vector_of_lines
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
+from pipeline.records.stated import stated_constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
 _TABLES = (*sorted(TESTS_WITHOUT_CLOCK), "holding_current")
@@ -71,12 +73,14 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
     flux = 0.0 if voltage else _largest(tables, ("psi_d_wb", "psi_q_wb"))
     voltage = voltage or flux * pole_pairs * speed
     # without a winding on record the torque's own size is all there is
+    known = stated_parameters(stated_constants(campaign), pole_pairs)
     shaft = 0.0 if current and voltage else _largest(campaign.captures, ("torque_shaft_nm",))
+    shaft = shaft or (0.0 if current and voltage else _stated_torque(known, speed))
     clamped = _largest(tables, ("torque_shaft_nm",))
     current, voltage = current or 1.0, voltage or 1.0
     psi = voltage / (pole_pairs * speed)
-    known = start.best("psi_pm_wb")
-    psi = known.number if known is not None else psi
+    fitted = start.best("psi_pm_wb")
+    psi = fitted.number if fitted is not None else known.get("psi_wb", (psi, 0.0))[0]
     period = min((_period(c) for c in logs), default=1e-4)
     scales = {
         "current_a": current,
@@ -100,7 +104,14 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
         stated,
         encoder_step(campaign),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
+        stated=known,
     )
+
+
+def _stated_torque(stated: Mapping[str, tuple[float, float]], speed: float) -> float:
+    """Torque [N·m] that stated constants of a shaft go with, as in `base_scales`; 0 without any."""
+    inertia = 10.0 * speed * stated.get("j_kgm2", (0.0, 0.0))[0]
+    return max(inertia, 10.0 * stated.get("coulomb_friction.torque_nm", (0.0, 0.0))[0])
 
 
 def _travel_turns(capture: Capture) -> float:

@@ -38,8 +38,9 @@ class Segment:
     even clock of period `ts_s`; `noise` the standard
     deviation of each one's sensor. `channels` are the equations: the recorded signal that each
     predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `pwm_s`, `vdc_v`,
-    `ke_v_s_rad`, `ambient_k`), `meter` and `ammeter` the nuisances that are the gains of its
-    voltmeter and of its current sensors; `angle_step_rad` is the resolution of an angle whose noise
+    `ke_v_s_rad`, `ambient_k`, 1 by the name of each unlogged temperature's nuisance), `meter` and
+    `ammeter` the nuisances that are the gains of its voltmeter and of its current sensors;
+    `angle_step_rad` is the resolution of an angle whose noise
     is its rounding. `blocks` [W] numbers the parts of a capture that are held out one by one where
     there is no other capture to predict it from; `offsets` [K, n] are offsets of the channel, of
     their prior size, that the capture may have; `runs_rad` the angles turned between reversals, of

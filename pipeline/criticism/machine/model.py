@@ -84,7 +84,12 @@ BASE: tuple[Constant, ...] = (
     Constant("gain_lcr", "1", "gain of the LCR meter", 0.01, hook="gain"),
     Constant("gain_clock", "1", "recorded time over true time, less one", 1e-4, hook="gain"),
     Constant("offset_temp_k", "K", "offset of the thermometers", 2.0, hook="gain"),
+    # most motors on a bench lie within twice that of their surroundings
+    Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", 20.0, hook="gain"),
+    Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", 20.0, hook="gain"),
 )
+UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
+"""Nuisance that stands for a temperature where a test that warms the machine did not record it."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
 GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
@@ -120,13 +125,20 @@ class Model:
 
     def priors(self) -> dict[str, tuple[float, float]]:
         """Centre and standard uncertainty of every nuisance: what the station states of its own
-        instruments, else the constant's own; and of what handbooks say of materials.
+        instruments, else the constant's own; of what handbooks say of materials; and of what
+        somebody states of this motor.
         """
         stated = self.machine.stated_u
         base = [c for c in base_of(self.machine) if c.prior != _FREE]
         sizes = {"1": 1.0, **self.machine.scales}
         own = {c.name: (c.center, stated.get(c.name, c.prior * sizes[c.scale])) for c in base}
-        return own | {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
+        own |= {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
+        return own | self.stated()
+
+    def stated(self) -> dict[str, tuple[float, float]]:
+        """What somebody states of the model's own parameters: value and standard uncertainty."""
+        own = {*PHYSICAL, *self.parameters()}
+        return {name: both for name, both in self.machine.stated.items() if name in own}
 
     def with_effects(self, *effects: Effect) -> Model:
         """This model and further effects."""

@@ -22,6 +22,8 @@ from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse
 
+_PINNED = 1e-3
+"""Share of its uncertainty by which a stated constant may move at first, by judgement."""
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
@@ -35,7 +37,7 @@ def start_values(model: Model, machine: Machine) -> dict[str, float]:
     values = {c.name: scales.get(c.name, c.center) for c in base_of(machine)}
     for effect in model.effects:
         values.update(zero(effect, model))
-    return values
+    return values | {name: value for name, (value, _) in model.stated().items()}
 
 
 def gauss_newton(fit: Fit, before: LinearSystem | None = None) -> LinearSystem:
@@ -155,18 +157,29 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
     values = {**start_values(model, model.machine), **(known or {})}
     few = tuple(sparse(segment) for segment in segments)
     rough = tuple(rough_floor(segment, model, values) for segment in few)
-    near = gauss_newton(Fit(few, model, values, rough, values)).fit
-    return replace(near, segments=tuple(segments))
+    near = gauss_newton(Fit(few, _pinned(model), values, rough, values)).fit
+    return replace(near, model=model, segments=tuple(segments))
+
+
+def _pinned(model: Model) -> Model:
+    """The model with stated constants all but fixed, until the others are near.
+
+    From orders of magnitude a step moves an inertia that nothing but its prior tells, and the way
+    back is a narrow curve of friction over inertia.
+    """
+    stated = {n: (value, _PINNED * u) for n, (value, u) in model.machine.stated.items()}
+    return replace(model, machine=replace(model.machine, stated=stated))
 
 
 def first_fit(near: Fit) -> LinearSystem:
     """Fits a model from a rough fit, every equation by its noise floor."""
     floor = floors(near.segments, near.model, near.values)
-    begun = replace(near, sigma=floor, near=near.values)
+    begun = replace(near, model=_pinned(near.model), sigma=floor, near=near.values)
     ends = [gauss_newton(begun)]
     if len(near.segments) <= near.policy.fit.short_programme:
         ends += [_one_side_first(begun, side) for side in _SIDES]
-    return min(ends, key=lambda end: end.deviance)
+    end = min(ends, key=lambda end: end.deviance)
+    return gauss_newton(replace(end.fit, model=near.model)) if near.model.stated() else end
 
 
 def rough_anew(fit: Fit) -> Fit:

@@ -30,6 +30,8 @@ from pipeline.records.comparison import KnownCombination, ModelParameter
 
 POSITIVE = ("psi_wb", "j_kgm2", "r_ohm", "ld_h", "lq_h")
 """Constants that no motor is without, in the order in which others are reported over them."""
+SURE = 2.5758
+"""Standard uncertainties beyond which a stated constant is spoken against: the 99 % interval."""
 _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
 
@@ -173,7 +175,7 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     beyond = _beyond(sure_of.u, system.prior_precision[: len(own)], fit.policy.fit)
     told = within(beyond, sure_of.found.sizes)
     sized = dict(zip(u, told.tolist(), strict=True))
-    limits = limits_of(model)
+    limits, stated = limits_of(model), model.stated()
     made = {}
     for c in BASE:
         if c.name in PHYSICAL:
@@ -181,13 +183,49 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
             bound = _at(value, limits.get(c.name))
             sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
             made[c.name] = _told(value, u[c.name], c.unit, sized[c.name] and sure, bound)
+            made[c.name] = _or_stated(made[c.name], stated.get(c.name))
     for name, (effect, p) in model.parameters().items():
         value = fit.values[name]
         beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
         sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
         bound = not p.choice and _at(value, limits[name])
         made[name] = _told(value, u.get(name, p.u), p.unit, sure, bound)
+        made[name] = _or_stated(made[name], stated.get(name))
     return made
+
+
+def _or_stated(one: ModelParameter, stated: tuple[float, float] | None) -> ModelParameter:
+    """The parameter, or what is stated of it where nothing else tells it."""
+    if one.known or stated is None:
+        return one
+    return replace(one, value=stated[0], u=stated[1], stated=True)
+
+
+def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
+    """Notes of the stated constants that the captures, without them, speak against.
+
+    Notes
+    -----
+    A fit θ ± u of data and prior s ± u_s is that of the data alone by 1/u² − 1/u_s² and
+    θ/u² − s/u_s², and data and prior agree within √(u_data² + u_s²).
+
+    """
+    stated, sure_of, notes = system.fit.model.stated(), known(system, held), []
+    policy = system.policy.fit
+    for place, column in enumerate(system.columns[: system.own.size]):
+        if column.name not in stated:
+            continue
+        (said, u_said), u = stated[column.name], float(sure_of.u[place])
+        alone = _beyond(np.array([u]), np.array([u_said**-2.0]), policy)[0]
+        if not math.isfinite(alone):
+            continue
+        value = alone**2 * (system.fit.values[column.name] / u**2 - said / u_said**2)
+        if abs(value - said) > SURE * math.hypot(alone, u_said):
+            notes.append(
+                f"{column.name} is stated as {said:.4g} ± {u_said:.2g}, and without that these "
+                f"captures say {value:.4g} ± {alone:.2g}"
+            )
+    return tuple(notes)
 
 
 def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
@@ -292,5 +330,6 @@ def _sizes(fit: Fit, columns: Sequence[Column]) -> Array:
         ]
         own = alike if p.amplitude else [abs(values[name])]
         known[name] = max(*own, p.typical * model.machine.scale(p), 1e-300)
-    known |= {c.name: priors[c.name][1] for c in base_of(model.machine) if c.name in priors}
+    nuisances = (c.name for c in base_of(model.machine) if c.name not in PHYSICAL)
+    known |= {name: priors[name][1] for name in nuisances if name in priors}
     return np.array([known.get(column.name, 1.0) for column in columns])

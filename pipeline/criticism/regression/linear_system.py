@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.machine_scale import base_scales
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array, Values
-from pipeline.criticism.machine.model import Model
+from pipeline.criticism.machine.model import UNLOGGED, Model
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.fit import Fit
@@ -391,7 +391,7 @@ def _linear(column: Column, model: Model) -> bool:
     """Whether the residual is linear along a column, whatever the other parameters are."""
     effect = column.effect
     if effect is None:
-        return column.name != "offset_temp_k"
+        return column.name not in ("offset_temp_k", *UNLOGGED.values())
     if effect not in model.effects:
         return True
     shaped = any(not (p.amplitude or p.choice) for p in effect.parameters_of(model.machine))

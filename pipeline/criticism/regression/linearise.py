@@ -17,6 +17,7 @@ from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
     STATE,
+    UNLOGGED,
     Model,
     Pieces,
     base_of,
@@ -229,6 +230,7 @@ class _Sampler:
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
+            **{one: one in self.segment.fixed for one in UNLOGGED.values()},
             "gain_clock": observes_sensor(self.segment, "clock"),
             self.segment.meter: observes_sensor(self.segment, "voltage"),
             self.segment.ammeter: observes_sensor(self.segment, "current"),
@@ -238,7 +240,7 @@ class _Sampler:
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        if column.name in (self.segment.ammeter, "offset_temp_k"):
+        if column.name in (self.segment.ammeter, "offset_temp_k", *UNLOGGED.values()):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
         there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step

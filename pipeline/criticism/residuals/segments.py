@@ -12,7 +12,9 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.data.sensor_noise import is_rounded
 from pipeline.criticism.data.traces import PAD, tellable
 from pipeline.criticism.effect import Machine
+from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equations
+from pipeline.criticism.machine.model import UNLOGGED
 from pipeline.records.capture import Campaign, Capture
 
 _FEW = 12
@@ -49,7 +51,17 @@ def _cut(capture: Capture, machine: Machine) -> Iterator[Segment]:
             continue
         segment = equation.cut(capture, machine)
         if segment is not None and (segment.weak is None or segment.weak.starts.size):
-            yield segment
+            yield replace(segment, fixed={**segment.fixed, **_unlogged(segment, equation)})
+
+
+def _unlogged(segment: Segment, equation: Equation) -> dict[str, float]:
+    """Nuisances of the temperatures that such a test changes and the capture did not record."""
+    hooks = {"temp_winding_degc": "drop", "temp_magnet_degc": "flux"}
+    return {
+        UNLOGGED[name]: 1.0
+        for name, hook in hooks.items()
+        if hook in equation.use.warms and name not in segment.recorded
+    }
 
 
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Effect, Evidence
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.model import Model
+from pipeline.criticism.machine.model import UNLOGGED, Model
 from pipeline.criticism.residuals.segments import known_tests
 from pipeline.criticism.selection.alternatives import detectable
 from pipeline.criticism.selection.score_test import Candidate
@@ -35,7 +35,8 @@ def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:
             cold = {s.capture for s in warmed if name not in s.recorded}
             if cold:
                 where = ", ".join(sorted(cold))
-                notes.append(f"no {name}, taken to be at ambient temperature: {where}")
+                u_k = model.priors()[UNLOGGED[name]][1]
+                notes.append(f"no {name}, taken to be at ambient temperature ± {u_k:g} K: {where}")
     return tuple(dict.fromkeys(notes))
 
 

@@ -20,7 +20,7 @@ from pipeline.criticism.effect import (
     Values,
     between,
 )
-from pipeline.criticism.machine.model import Model, clock_gain, values_of
+from pipeline.criticism.machine.model import UNLOGGED, Model, clock_gain, values_of
 
 _SPEED_S = 0.002
 """Length of the mean that makes a speed of differenced angles [s]. By judgement: shorter, and the
@@ -174,7 +174,8 @@ def _warmth(
     segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
 ) -> Array:
     if name not in signals:
-        return np.full(size, segment.fixed["ambient_k"])
+        warmed = segment.fixed.get(UNLOGGED[name], 0.0)
+        return np.full(size, segment.fixed["ambient_k"] + warmed * values[UNLOGGED[name]])
     return signals[name] - 25.0 - values["offset_temp_k"]
 
 
