@@ -88,8 +88,8 @@ def _loaded(point: EntryPoint, kind: type) -> Any:
     try:
         value = point.load()
     except Exception as error:
-        said = f"{type(error).__name__}: {error}"
-        raise UsageError(f"the plug-in {point.value} cannot be loaded: {said}", remedy) from error
+        cause = f"{type(error).__name__}: {error}"
+        raise UsageError(f"the plug-in {point.value} cannot be loaded: {cause}", remedy) from error
     if not isinstance(value, kind):
         raise UsageError(f"the plug-in {point.value} is no {kind.__name__}", remedy)
     return value

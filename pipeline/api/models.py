@@ -182,9 +182,9 @@ class Diagnoses(ByMotor[Diagnosis]):
             for step, at in enumerate(result.ladder):
                 before = result.ladder[step - 1].effects if step else ()
                 added = ", ".join(e for e in at.effects if e not in before)
-                said = {"motor_id": name, "step": step, "added": added, "held_out": at.held_out}
+                common = {"motor_id": name, "step": step, "added": added, "held_out": at.held_out}
                 rows += [
-                    {**said, "signal": signal, **error.document()}
+                    {**common, "signal": signal, **error.document()}
                     for signal, error in at.errors.items()
                 ]
         return frames.frame(rows, LADDER_SCHEMA)

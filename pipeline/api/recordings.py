@@ -187,7 +187,7 @@ def read(
     found = survey(Path(place), sources, recover=recover)
     entries: dict[str, list[Entry]] = {}
     for entry in found.entries:
-        entries.setdefault(entry.said["motor_id"], []).append(entry)
+        entries.setdefault(entry.stated["motor_id"], []).append(entry)
     if motor is not None and motor not in entries:
         there = f"there are {', '.join(sorted(entries))}" if entries else "there is none"
         raise UsageError(f"no capture of motor {motor} in {place}", there)

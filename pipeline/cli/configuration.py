@@ -75,19 +75,19 @@ def load_settings(
 
 def _text(command: Command, key: str, text: str, kind: Any) -> str | None:
     """The value of a text key; raises UsageError for one that it cannot take."""
-    said = f"{command.name}: {key.rstrip('_')}={text}"
+    setting = f"{command.name}: {key.rstrip('_')}={text}"
     about = next(f.metadata for f in fields(command.settings) if f.name == key)
     if text == "null":
         if kind is str:
-            raise UsageError(f"{said} is nothing", f"it takes {about['words']}")
+            raise UsageError(f"{setting} is nothing", f"it takes {about['words']}")
         return None
     if about["one_of"] and text not in about["one_of"]:
-        raise UsageError(f"{said} is unknown", f"it is {' or '.join(about['one_of'])}")
+        raise UsageError(f"{setting} is unknown", f"it is {' or '.join(about['one_of'])}")
     if not about["place"]:
         return text
     if not text.strip():
         here = "; `.` is the current folder" if key in ("input", "output") else ""
-        raise UsageError(f"{said} is empty", f"it takes {about['words']}{here}")
+        raise UsageError(f"{setting} is empty", f"it takes {about['words']}{here}")
     # a shell expands no ~ after `=`
     return str(Path(text).expanduser()) if text == "~" or text.startswith("~/") else text
 

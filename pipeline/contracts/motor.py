@@ -69,15 +69,15 @@ def _statements(campaign: Campaign) -> list[Finding]:
     findings = []
     for used in stated_constants(campaign):
         for capture in campaign.captures:
-            said = capture.meta.extra.get(used.name)
-            if said is None or capture.path in used.captures or used.name in campaign.stated:
+            given = capture.meta.extra.get(used.name)
+            if given is None or capture.path in used.captures or used.name in campaign.stated:
                 continue
             findings.append(
                 Finding(
                     capture.path,
                     "warning",
                     "statement_contradiction",
-                    f"{used.name} is stated as {said}, but as {used.number:g} ± {used.u:.2g} in "
+                    f"{used.name} is stated as {given}, but as {used.number:g} ± {used.u:.2g} in "
                     f"{used.captures[0]}{_beside(len(used.captures))}, which counts",
                     f"correct {used.name} or u_{used.name} of one of them",
                 )

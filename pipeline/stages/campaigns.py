@@ -79,7 +79,7 @@ def _of_files(found: Survey, only: Collection[str] | None) -> Survey:
 def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
     motors: dict[str, list[Entry]] = {}
     for entry in found.entries:
-        motors.setdefault(entry.said["motor_id"], []).append(entry)
+        motors.setdefault(entry.stated["motor_id"], []).append(entry)
     if motor is not None and motor not in motors:
         raise UsageError(f"no capture of motor {motor} in {folder}", meant(motor, sorted(motors)))
     wanted = sorted(motors) if motor is None else [motor]

@@ -240,7 +240,7 @@ def _answers(
 def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
     motors: dict[str, list[Entry]] = {}
     for entry in found.entries:
-        motors.setdefault(entry.said["motor_id"], []).append(entry)
+        motors.setdefault(entry.stated["motor_id"], []).append(entry)
     required, model_gates = release_conditions(limits)
     changes = policy_changes(settings.policy)
     model = ModelSpec(settings.model.name, tuple(settings.model.effects), policy=changes)

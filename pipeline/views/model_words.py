@@ -40,53 +40,53 @@ class ModelWords:
 
 def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER") -> ModelWords:
     """What the residual test of a motor came to; None is a datasheet of before there was one."""
-    said = model or OLD
-    verdict = " ".join((said.verdict.replace("_", " "), *_names(said)))
-    floors = "" if said.residual is None else f"{number(said.residual)} floors"
+    model = model or OLD
+    verdict = " ".join((model.verdict.replace("_", " "), *_names(model)))
+    floors = "" if model.residual is None else f"{number(model.residual)} floors"
     return ModelWords(
         short=", ".join(filter(None, (verdict, floors))),
         verdict=verdict,
         floors=floors,
-        tone=TONES[said.verdict],
-        sentence=sentence(said.headline()),
-        command=said.command(motor_id, folder) if said.tested and not said.passed else "",
-        add=said.adding(folder),
-        rows=tuple(_rows(said)),
-        sort=repr(said.residual or 0.0),
-        passed=said.passed,
+        tone=TONES[model.verdict],
+        sentence=sentence(model.headline()),
+        command=model.command(motor_id, folder) if model.tested and not model.passed else "",
+        add=model.adding(folder),
+        rows=tuple(_rows(model)),
+        sort=repr(model.residual or 0.0),
+        passed=model.passed,
     )
 
 
-def _names(said: ModelVerdict) -> tuple[str, ...]:
+def _names(model: ModelVerdict) -> tuple[str, ...]:
     """The effects that are missing, two at most by name."""
-    names = [name.replace("_", " ") for name in said.missing]
-    if said.verdict != "missing" or not names:
+    names = [name.replace("_", " ") for name in model.missing]
+    if model.verdict != "missing" or not names:
         return ()
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return (", ".join(names[:MOST_NAMED]) + more,)
 
 
-def _rows(said: ModelVerdict) -> list[tuple[str, str]]:
-    if said.residual is None or said.held_out is None:
+def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
+    if model.residual is None or model.held_out is None:
         return []
     rows = [
-        ("largest residual", f"{number(said.residual)} noise floors"),
-        ("error of captures held out", f"{number(said.held_out)} noise floors"),
+        ("largest residual", f"{number(model.residual)} noise floors"),
+        ("error of captures held out", f"{number(model.held_out)} noise floors"),
     ]
-    if said.held_out_with is not None:
-        rows.append(("the same with what was found", f"{number(said.held_out_with)} noise floors"))
-    if said.worst is not None:
-        size = quantity(said.worst.size, said.worst.unit, 2)
-        rows.append(("where", f"{said.worst.description}, {size} beyond the noise"))
-        rows.append(("places over their floor", str(said.over)))
-    for effect, found in said.missing.items():
+    if model.held_out_with is not None:
+        rows.append(("the same with what was found", f"{number(model.held_out_with)} noise floors"))
+    if model.worst is not None:
+        size = quantity(model.worst.size, model.worst.unit, 2)
+        rows.append(("where", f"{model.worst.description}, {size} beyond the noise"))
+        rows.append(("places over their floor", str(model.over)))
+    for effect, found in model.missing.items():
         sizes = (f"{name} {number_text(*reading)}" for name, reading in found.parameters.items())
         rows.append((effect.replace("_", " "), "; ".join(sizes)))
         if found.confused_with:
             others = ", ".join(found.confused_with).replace("_", " ")
             rows.append(("which could as well be", f"{others}; to tell: {found.experiment}"))
-    if said.unknown:
-        rows.append(("not explained", said.unknown))
-    if said.note:
-        rows.append(("cannot be shown", said.note))
+    if model.unknown:
+        rows.append(("not explained", model.unknown))
+    if model.note:
+        rows.append(("cannot be shown", model.note))
     return rows

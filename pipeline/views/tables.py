@@ -42,7 +42,7 @@ def constant_rows(
     rows = []
     for one in estimates:
         low, high = one.interval() if one.known else (None, None)
-        said = one.document()
+        document = one.document()
         rows.append(
             {
                 "motor_id": motor_id,
@@ -51,10 +51,10 @@ def constant_rows(
                 "constant": one.name,
                 "value": None if one.value is None else one.number,
                 "unit": one.unit,
-                "u": said["u"],
-                "u_a": said["u_a"],
-                "u_b": said["u_b"],
-                "dof": said["dof"],
+                "u": document["u"],
+                "u_a": document["u_a"],
+                "u_b": document["u_b"],
+                "dof": document["dof"],
                 "low_95": low,
                 "high_95": high,
                 "status": one.status,

@@ -37,7 +37,7 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     data = read_whole(folder / entry.path)
     if hashlib.sha256(data).hexdigest() != entry.sha256:
         raise CaptureError("changed", "the file changed while it was read", "run again")
-    meta = capture_meta(entry.said)
+    meta = capture_meta(entry.stated)
     if entry.form == "mcap":
         raw, source, verified = _read_mcap(data, entry)
     elif entry.form == "foreign":
@@ -88,7 +88,7 @@ def wanted(source: SourceMap | None, name: str) -> bool:
 def _read_mcap(data: bytes, entry: Entry) -> tuple[list[RawTable], SourceMap | None, bool]:
     layout = scan(data, recover=entry.recovered)
     source = entry.source
-    joint = entry.said.get("joint") or (source.joint if source else None)
+    joint = entry.stated.get("joint") or (source.joint if source else None)
     tables = read_tables(layout, lambda _topic, name: wanted(source, name), joint)
     form = "auto" if source is None else source.messages
     for table in tables:

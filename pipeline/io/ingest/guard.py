@@ -23,7 +23,7 @@ from pipeline.records.naming import printable
 
 READER_FAILED = "reader_failed"
 PANIC = "PanicException"
-MOST_SAID = 200
+LONGEST_REASON = 200
 _MB = 2**20
 _TIMEOUT = b"Timeout"
 LEAST_MB = 80
@@ -151,10 +151,10 @@ def refusing(what: str = "its reader") -> Iterator[None]:
 def _broken(what: str, error: BaseException) -> CaptureError:
     frames = traceback.extract_tb(error.__traceback__)
     place = f" in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
-    said = printable(str(error)[:MOST_SAID])
+    reason = printable(str(error)[:LONGEST_REASON])
     return CaptureError(
         READER_FAILED,
-        f"{what} broke on it: {type(error).__name__}{place}: {said}",
+        f"{what} broke on it: {type(error).__name__}{place}: {reason}",
         "leave the file out, and report it with this line",
     )
 

@@ -1,4 +1,4 @@
-"""What is said of a capture: in the file, beside it, in the manifest, in the source map."""
+"""What is stated of a capture: in the file, beside it, in the manifest, in the source map."""
 
 from __future__ import annotations
 
@@ -52,25 +52,25 @@ def merge(
         A warning for each contradiction; numbers that are equal do not contradict each other.
 
     """
-    said: dict[str, str] = {}
+    stated: dict[str, str] = {}
     origin: dict[str, str] = {}
     findings: list[Finding] = []
     for name, values in sources:
         for key, value in values.items():
-            if key not in said:
-                said[key], origin[key] = value, name
-            elif not _same(said[key], value):
+            if key not in stated:
+                stated[key], origin[key] = value, name
+            elif not _same(stated[key], value):
                 findings.append(
                     Finding(
                         path,
                         "warning",
                         "metadata_contradiction",
-                        f"{name} says {key} is {value!r}, {origin[key]} says {said[key]!r}, "
+                        f"{name} says {key} is {value!r}, {origin[key]} says {stated[key]!r}, "
                         f"which counts",
                         "correct one of the two",
                     )
                 )
-    return said, findings
+    return stated, findings
 
 
 def _same(one: str, other: str) -> bool:

@@ -1,4 +1,4 @@
-"""Which files of a folder are captures, and what is said of each: looked at once, not decoded.
+"""Which files of a folder are captures, and what is stated of each: looked at once, not decoded.
 
 What is asked of one file (`Question`) and what is found (`Answer`) are plain data, so that a
 stranger's bytes can be parsed in another process than the one that puts the batch together.
@@ -47,7 +47,7 @@ _FIRST_BYTES = 2**16
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A file that is a capture: where it is, what it is, and all that is said of it.
+    """A file that is a capture: where it is, what it is, and all that is stated of it.
 
     `source` is None for the contract's own form. `path` is relative with forward slashes.
     `recovered` is a file that is cut off, of which the good part is to be used. `part` are the
@@ -71,7 +71,7 @@ class Entry:
         return path.with_name(f"{path.stem} {self.part.name}{path.suffix}").as_posix()
 
     @property
-    def said(self) -> dict[str, str]:
+    def stated(self) -> dict[str, str]:
         """The merged metadata as texts."""
         return dict(self.metadata)
 
@@ -171,8 +171,8 @@ def _parts(entry: Entry) -> list[Entry]:
     parts = () if entry.source is None else entry.source.parts_of(entry.path)
     if not parts:
         return [entry]
-    said = [tuple(sorted((entry.said | dict(part.metadata)).items())) for part in parts]
-    return [replace(entry, part=p, metadata=own) for p, own in zip(parts, said, strict=True)]
+    stated = [tuple(sorted((entry.stated | dict(part.metadata)).items())) for part in parts]
+    return [replace(entry, part=p, metadata=own) for p, own in zip(parts, stated, strict=True)]
 
 
 def _preferred(folder: Path, first: Entry, second: Entry) -> tuple[Entry, Entry]:
@@ -233,7 +233,7 @@ def _may_be_capture(
     beside: Mapping[str, str],
     sources: Mapping[str, SourceMap],
 ) -> bool:
-    """Whether the name, the first bytes or what is said of a file make it worth reading."""
+    """Whether the name, the first bytes or what is stated of a file make it worth reading."""
     if path.lower().endswith(_MCAP_SUFFIX) or _is_text(path, listed, beside, sources):
         return True
     head = read_head(folder / path, _FIRST_BYTES)
@@ -268,7 +268,7 @@ def _manifests(
     folder: Path, paths: Iterable[str], findings: list[Finding]
 ) -> dict[str, dict[str, str]]:
     """What all manifests say, by path; a manifest that cannot be read is a finding."""
-    said: dict[str, dict[str, str]] = {}
+    stated: dict[str, dict[str, str]] = {}
     for path in paths:
         if PurePosixPath(path).name == MANIFEST:
             try:
@@ -280,8 +280,8 @@ def _manifests(
                 findings.append(Finding.refusal(path, fault))
                 continue
             for file, values in found.items():
-                said[file] = values | said.get(file, {})
-    return said
+                stated[file] = values | stated.get(file, {})
+    return stated
 
 
 def _entry(
@@ -322,12 +322,12 @@ def _entry(
         (f"NAME{SIDECAR_SUFFIX}", beside),
         (MANIFEST, listed),
     ]
-    said, contradictions = merge(path, statements)
+    stated, contradictions = merge(path, statements)
     findings += contradictions
-    said = fixed | said
-    check_texts(said)
-    belongs(said)
-    return Entry(path, digest, form, source, tuple(sorted(said.items())), recovered)
+    stated = fixed | stated
+    check_texts(stated)
+    belongs(stated)
+    return Entry(path, digest, form, source, tuple(sorted(stated.items())), recovered)
 
 
 def _may_read(
@@ -382,7 +382,7 @@ def _is_text(
     beside: Mapping[str, str],
     sources: Mapping[str, SourceMap],
 ) -> bool:
-    """Whether a file's name, or what is said of it, makes it worth reading as text."""
+    """Whether a file's name, or what is stated of it, makes it worth reading as text."""
     suffix = PurePosixPath(path).suffix.lower()
     named = any(source.files and source.recognises_name(path) for source in sources.values())
     written = suffix in _TEXT_SUFFIXES or _is_packed(path)

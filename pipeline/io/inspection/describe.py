@@ -127,7 +127,7 @@ def _unused(path: Path, report: InspectReport, sources: Mapping[str, SourceMap])
     """Why `run` does not use a file that states no contract, where its faults do not say."""
     answer = look(path.parent, question_of(path), sources)
     if answer.entry is not None:
-        return _metadata_faults(answer.entry.said)
+        return _metadata_faults(answer.entry.stated)
     if answer.findings or report.faults or not report.streams:
         remarks = (f"{finding.message}; {finding.remedy}" for finding in answer.findings)
         return [words for words in remarks if words not in report.faults]

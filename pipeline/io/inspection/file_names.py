@@ -67,7 +67,7 @@ def _test(path: str) -> tuple[str, str] | None:
     flat = plain(stem)
     if len(flat) != len(stem):
         return None
-    words = [(word, test) for test, said in TESTS.items() for word in plain(said).split()]
+    words = [(word, test) for test, names in TESTS.items() for word in plain(names).split()]
     for word, test in sorted(words, key=lambda one: -len(one[0])):
         pattern = re.escape(word).replace("_", f"{_BREAK}?")
         if word.isascii() and len(word) < _LEAST_INSIDE:

@@ -139,8 +139,8 @@ def _of_dimension(stem: str, dimensions: set[str]) -> tuple[str, ...]:
     if "not measured" in marks:
         return ()
     names = [name for name, (unit, _) in QUANTITIES.items() if unit in dimensions]
-    said = [name for name, stems in _quantities().items() if matches(words, stems)]
-    if said:  # the words say another quantity than the unit does
+    known = [name for name, stems in _quantities().items() if matches(words, stems)]
+    if known:  # the words say another quantity than the unit does
         return ()
     return tuple(dict.fromkeys(column for name in names for column in _of(name, marks)))
 

@@ -228,15 +228,15 @@ _SCALAR: dict[str, Any] = {"type": ["string", "number", "boolean"]}
 
 
 def _leaf(key: Key) -> dict[str, Any]:
-    said: dict[str, Any] = {"description": key.words}
+    schema: dict[str, Any] = {"description": key.words}
     if isinstance(key.kind, tuple):
         numbers = [int(word) for word in key.kind if word.lstrip("-").isdigit()]
-        return {**said, "enum": numbers or list(key.kind)}
+        return {**schema, "enum": numbers or list(key.kind)}
     if key.kind in ("texts", "patterns"):
         items = {"type": "array", "items": {"type": "string"}}
-        return {**said, "anyOf": [{"type": "string"}, items]}
+        return {**schema, "anyOf": [{"type": "string"}, items]}
     kinds = {"number": "number", "whole": "integer", "flag": "boolean", "maps": "array"}
-    return {**said, "type": kinds.get(key.kind, "string")}
+    return {**schema, "type": kinds.get(key.kind, "string")}
 
 
 def metadata_properties() -> dict[str, Any]:

@@ -60,8 +60,10 @@ def read(data: bytes) -> tuple[RawTable, ...]:
                         fields.setdefault(signal.name, values)
                         units.setdefault(signal.name, signal.unit or "")
                 if fields:
-                    said = tuple((name, unit) for name, unit in units.items() if unit)
-                    found.append(RawTable(f"group {number}", fields, units=(("time", "s"), *said)))
+                    stated = tuple((name, unit) for name, unit in units.items() if unit)
+                    found.append(
+                        RawTable(f"group {number}", fields, units=(("time", "s"), *stated))
+                    )
     except CaptureError:
         raise
     except Exception as fault:

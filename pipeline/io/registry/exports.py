@@ -162,5 +162,5 @@ def _failure(place: str, error: OSError) -> MachineError:
 def one_line(error: Exception) -> str:
     """One line of an error that object stores print as a coloured tree: its root and its cause."""
     lines = [TREE.sub("", line).strip() for line in str(error).strip().splitlines()]
-    said = dict.fromkeys([lines[0], lines[-1]]) if lines else [type(error).__name__]
-    return ": ".join(line[:LONGEST_REASON] for line in said)
+    reasons = dict.fromkeys([lines[0], lines[-1]]) if lines else [type(error).__name__]
+    return ": ".join(line[:LONGEST_REASON] for line in reasons)

@@ -63,13 +63,13 @@ class Verification:
 class _Sheet:
     """A datasheet document on its way in."""
 
-    said: Mapping[str, Any]
+    document: Mapping[str, Any]
     content: bytes
     sha256: str
 
     @property
     def key(self) -> Key:
-        return self.said["motor_id"], self.said["version"]
+        return self.document["motor_id"], self.document["version"]
 
 
 class Registry:
@@ -311,15 +311,15 @@ def one_of(versions: Sequence[Version], wanted: Selection, place: str) -> Versio
     """The only version that is meant; raises UsageError for none or several."""
     if len(versions) == 1:
         return versions[0]
-    said = f"motor {wanted.motor_id!r}"
+    name = f"motor {wanted.motor_id!r}"
     if wanted.revision is not None:
-        said += f" revision {wanted.revision}"
+        name += f" revision {wanted.revision}"
     if wanted.version is not None:
-        said += f" version {wanted.version}"
+        name += f" version {wanted.version}"
     if not versions:
-        raise UsageError(f"no {said} in {place}", "`registry list` shows what there is")
+        raise UsageError(f"no {name} in {place}", "`registry list` shows what there is")
     numbers = ", ".join(str(version.revision) for version in versions)
-    raise UsageError(f"{said} is revisions {numbers}", "name one by revision=")
+    raise UsageError(f"{name} is revisions {numbers}", "name one by revision=")
 
 
 def _allowed(kind: str, version: Version) -> None:
@@ -338,7 +338,7 @@ def _sheet(given: Mapping[str, Any] | bytes) -> _Sheet:
     try:
         document = json.loads(given) if isinstance(given, bytes) else given
         motor_id, version = document["motor_id"], document["version"]
-        _said(document)
+        _event_fields(document)
     except (LookupError, TypeError, ValueError) as error:
         raise UsageError(f"no datasheet: {error!r}", "publish what `run` wrote") from error
     if not isinstance(motor_id, str) or not DIGEST.fullmatch(str(version)):
@@ -370,14 +370,14 @@ def _rows(events: Sequence[Event], new: Sequence[_Sheet], now: datetime) -> list
             version,
             revisions[motor_id],
             content_sha256=sheet.sha256,
-            **_said(sheet.said),
+            **_event_fields(sheet.document),
         ).linked(chain)
         chain = event.chain
         rows.append((event, sheet.content.decode()))
     return rows
 
 
-def _said(document: Mapping[str, Any]) -> dict[str, Any]:
+def _event_fields(document: Mapping[str, Any]) -> dict[str, Any]:
     """What a row repeats of its datasheet, so that a search needs not read it."""
     captures = document["provenance"]["captures"]
     stations = {capture.get("station") for capture in captures} - {None}
@@ -394,10 +394,14 @@ def _agrees(event: Event, text: str) -> bool:
     """Whether a row says what its datasheet says."""
     try:
         document = json.loads(text)
-        said = {"motor_id": document["motor_id"], "version": document["version"], **_said(document)}
+        wanted = {
+            "motor_id": document["motor_id"],
+            "version": document["version"],
+            **_event_fields(document),
+        }
     except (ValueError, LookupError, TypeError):
         return False
-    return all(getattr(event, name) == value for name, value in said.items())
+    return all(getattr(event, name) == value for name, value in wanted.items())
 
 
 def _utc(moment: datetime) -> datetime:

@@ -99,8 +99,8 @@ class EventTable:
         try:
             DeltaTable(self.place, storage_options=self.options or None)
         except (DeltaError, OSError, ValueError) as error:
-            said = str(error).lower()
-            if "scheme" not in said and "recognise url" not in said:
+            reason = str(error).lower()
+            if "scheme" not in reason and "recognise url" not in reason:
                 return
             known = ", ".join(sorted(USUAL_SCHEMES))
             words = f"registry {self.place}: no registry can be at such an address"

@@ -175,9 +175,9 @@ class Code:
 
     def _syntax(self, content: bytes) -> Syntax:
         sha256 = hashlib.sha256(content).hexdigest()
-        said = self._kept.get(sha256)
-        if said is not None:
-            digest, imports, libraries = said
+        noted = self._kept.get(sha256)
+        if noted is not None:
+            digest, imports, libraries = noted
             return Syntax(digest, tuple(Import(*i) for i in imports), tuple(libraries))
         found = syntax_of(content, self.root.name)
         self._new[sha256] = astuple(found)

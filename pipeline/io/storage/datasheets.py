@@ -82,47 +82,51 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
     )
 
 
-def _superseded(said: Mapping[str, Any] | None) -> Superseded | None:
-    return None if said is None else Superseded(said["version"], said["by"], said["why"])
-
-
-def _check(said: Mapping[str, Any]) -> Check:
-    return Check(
-        name=said["name"],
-        status=said["status"],
-        meaning=said["meaning"],
-        value=said["value"],
-        limit=said["limit"],
-        unit=said["unit"],
-        suspect=said["suspect"],
+def _superseded(document: Mapping[str, Any] | None) -> Superseded | None:
+    return (
+        None
+        if document is None
+        else Superseded(document["version"], document["by"], document["why"])
     )
 
 
-def _estimate(name: str, said: Mapping[str, Any]) -> Estimate:
-    bounds = said.get("bounds")
+def _check(document: Mapping[str, Any]) -> Check:
+    return Check(
+        name=document["name"],
+        status=document["status"],
+        meaning=document["meaning"],
+        value=document["value"],
+        limit=document["limit"],
+        unit=document["unit"],
+        suspect=document["suspect"],
+    )
+
+
+def _estimate(name: str, document: Mapping[str, Any]) -> Estimate:
+    bounds = document.get("bounds")
     return Estimate(
         name=name,
-        value=said["value"],
-        unit=said["unit"],
-        status=said["status"],
-        method=said["method"],
-        budget=_budget(said),
-        at=said["at"],
-        captures=tuple(said["captures"]),
-        note=said["note"],
+        value=document["value"],
+        unit=document["unit"],
+        status=document["status"],
+        method=document["method"],
+        budget=_budget(document),
+        at=document["at"],
+        captures=tuple(document["captures"]),
+        note=document["note"],
         bounds=None if bounds is None else (bounds[0], bounds[1]),
-        at_bound=said.get("at_bound", False),
-        settled=said.get("settled", False),
+        at_bound=document.get("at_bound", False),
+        settled=document.get("settled", False),
         orders=tuple(
             Order(one["order"], one["amplitude"], one["u"], one["phase_rad"])
-            for one in said.get("orders", ())
+            for one in document.get("orders", ())
         ),
     )
 
 
-def _budget(said: Mapping[str, Any]) -> Budget:
-    parts = said.get("budget", ())
-    dof = said["dof"]
+def _budget(document: Mapping[str, Any]) -> Budget:
+    parts = document.get("budget", ())
+    dof = document["dof"]
     if all("dof" in p for p in parts):
         return tuple(
             Contribution(p["source"], p["u"], p["kind"], math.inf if p["dof"] is None else p["dof"])

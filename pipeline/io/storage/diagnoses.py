@@ -43,9 +43,9 @@ def _summary(document: Mapping[str, Any]) -> DiagnosisSummary:
     sizes = {ranked["effect"]: ranked.get("parameters", {}) for ranked in document["ranking"]}
     # of an effect whose numbers are not all determined, none is its size
     parameters = {
-        effect: {name: (float(one["value"]), str(one["unit"])) for name, one in said.items()}
-        for effect, said in sizes.items()
-        if all(one["value"] is not None for one in said.values())
+        effect: {name: (float(one["value"]), str(one["unit"])) for name, one in sizes_of.items()}
+        for effect, sizes_of in sizes.items()
+        if all(one["value"] is not None for one in sizes_of.values())
     }
     return DiagnosisSummary(
         str(document["motor_id"]),

@@ -54,7 +54,7 @@ class Identities:
             self._path = notes / f"{name}.json"
             found = read_sealed(self._path)
             files = found.get("files", {}) if isinstance(found, dict) else {}
-            self._known = {file: (_identity(said[0]), said[1]) for file, said in files.items()}
+            self._known = {file: (_identity(noted[0]), noted[1]) for file, noted in files.items()}
         self._changed = False
 
     def sha256(self, file: str) -> str | None:
@@ -99,8 +99,8 @@ class Identities:
         _prune(self._path.parent)
 
 
-def _identity(said: list[int]) -> Identity:
-    return said[0], said[1], said[2], said[3], said[4]
+def _identity(noted: list[int]) -> Identity:
+    return noted[0], noted[1], noted[2], noted[3], noted[4]
 
 
 def _instant_ns(seen: Identity) -> int:

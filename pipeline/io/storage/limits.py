@@ -54,10 +54,10 @@ def release_conditions(path: Path) -> tuple[tuple[str, ...], bool]:
     Raises UsageError for a bad file.
     """
     document = _document(path)
-    said = str(document.get("model_gates", "yes")).lower()
-    if said not in WORDS:
-        raise UsageError(f"{path.name}: model_gates is {said!r}", "write yes or no")
-    return _required(document, path), WORDS[said]
+    given = str(document.get("model_gates", "yes")).lower()
+    if given not in WORDS:
+        raise UsageError(f"{path.name}: model_gates is {given!r}", "write yes or no")
+    return _required(document, path), WORDS[given]
 
 
 def _required(document: Mapping[str, Any], path: Path) -> tuple[str, ...]:
@@ -90,7 +90,7 @@ def read_limits(path: Path) -> Limits:
         name=path.stem,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         required=required_constants(path),
-        constants=tuple(_constant(path.name, name, said) for name, said in constants.items()),
+        constants=tuple(_constant(path.name, name, given) for name, given in constants.items()),
         golden=tuple(golden),
         **values,
     )
@@ -135,38 +135,38 @@ def _amount(text: Any, where: str) -> Amount:
         raise UsageError(f"{where}: {error.message}", error.remedy) from error
 
 
-def _constant(file: str, name: str, said: Any) -> ConstantLimits:
+def _constant(file: str, name: str, given: Any) -> ConstantLimits:
     where = f"{file}: {name}"
-    said = said or {}
-    if not isinstance(said, dict):
+    given = given or {}
+    if not isinstance(given, dict):
         raise UsageError(f"{where} holds no keys", "write {tolerance: 3 %} or lines below it")
-    _only(said, CONSTANT_KEYS, where)
+    _only(given, CONSTANT_KEYS, where)
     values: dict[str, Any] = {}
     for key in ("nominal", "minimum", "maximum"):
-        if key in said and not (key == "nominal" and said[key] == "baseline"):
-            values[key] = _number(said, key, where)
+        if key in given and not (key == "nominal" and given[key] == "baseline"):
+            values[key] = _number(given, key, where)
     for key in ("tolerance", "guard_band"):
-        if key in said:
-            values[key] = _amount(said[key], f"{where}: {key}")
-    margins = said.get("equivalence_margin", [])
+        if key in given:
+            values[key] = _amount(given[key], f"{where}: {key}")
+    margins = given.get("equivalence_margin", [])
     margins = margins if isinstance(margins, list) else [margins]
     values["margins"] = tuple(_amount(one, f"{where}: equivalence_margin") for one in margins)
-    return ConstantLimits(name=name, **values, **_choices(said, where))
+    return ConstantLimits(name=name, **values, **_choices(given, where))
 
 
-def _choices(said: Mapping[str, Any], where: str) -> dict[str, Any]:
+def _choices(given: Mapping[str, Any], where: str) -> dict[str, Any]:
     """The decision rule and what is answered by yes or no."""
     chosen: dict[str, Any] = {}
-    if "decision_rule" in said:
-        if said["decision_rule"] not in RULES:
+    if "decision_rule" in given:
+        if given["decision_rule"] not in RULES:
             known = ", ".join(RULES)
             raise UsageError(
-                f"{where}: no decision rule {said['decision_rule']!r}", f"known are {known}"
+                f"{where}: no decision rule {given['decision_rule']!r}", f"known are {known}"
             )
-        chosen["rule"] = said["decision_rule"]
+        chosen["rule"] = given["decision_rule"]
     for key, field in (("decides", "decides"), ("tolerate_within_margin", "tolerate")):
-        if key in said:
-            if str(said[key]).lower() not in WORDS:
-                raise UsageError(f"{where}: {key} is {said[key]!r}", "write yes or no")
-            chosen[field] = WORDS[str(said[key]).lower()]
+        if key in given:
+            if str(given[key]).lower() not in WORDS:
+                raise UsageError(f"{where}: {key} is {given[key]!r}", "write yes or no")
+            chosen[field] = WORDS[str(given[key]).lower()]
     return chosen

@@ -59,7 +59,7 @@ def test_hidden_effects_do_not_spoil_the_electrical_constants(motor):
 
     wanted = ("resistance", "current_step", "open_circuit", "heat_run")
     folder = RIG / motor
-    entries = [e for e in survey(folder, {}).entries if e.said["test"] in wanted]
+    entries = [e for e in survey(folder, {}).entries if e.stated["test"] in wanted]
     campaign = Campaign(motor, tuple(read_capture(folder, entry) for entry in entries))
     true = json.loads((folder / "truth.json").read_bytes())["constants"]
     known = Constants()

@@ -300,7 +300,7 @@ def test_ld_and_lq_of_the_shared_bench(motor: str) -> None:
     from pipeline.io.ingest.capture_reader import read_capture, survey
 
     folder = BENCH_B / motor
-    entries = [e for e in survey(folder, {}).entries if e.said["test"] == "current_step"]
+    entries = [e for e in survey(folder, {}).entries if e.stated["test"] == "current_step"]
     truth = json.loads((folder / "truth.json").read_bytes())
     gains = truth["gains_of_the_day"]
     campaign = Campaign(motor, tuple(read_capture(folder, entry) for entry in entries))

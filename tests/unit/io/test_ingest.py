@@ -242,7 +242,7 @@ def test_a_capture_without_a_motor_is_refused_before_motors_are_told_apart(tmp_p
     """Every entry of a survey names its motor, so nothing after it has to ask."""
     bare = CSV.replace("# motor_id: 000123\n", "")
     found = fill(tmp_path, a__csv=CSV, b__csv=bare, c__csv=bare.replace("# test: spin_down\n", ""))
-    assert [entry.said["motor_id"] for entry in found.entries] == ["000123"]
+    assert [entry.stated["motor_id"] for entry in found.entries] == ["000123"]
     assert [(f.file, f.code) for f in found.findings] == [
         ("b.csv", "missing_metadata"),
         ("c.csv", "missing_metadata"),

@@ -246,7 +246,7 @@ def test_a_file_without_header_parted_by_blanks_gets_a_map_that_reads_it(tmp_pat
     report = describe(path, {}, answers)
     found = survey(tmp_path, parse_source_file(report.starter.encode(), "b"))
     (table,) = read_capture(tmp_path, found.entries[0]).tables
-    assert found.entries[0].said["motor_id"] == "0012"
+    assert found.entries[0].stated["motor_id"] == "0012"
     np.testing.assert_allclose(table["t_s"], np.arange(60) * 1e-3)
     np.testing.assert_allclose(table["omega_mech_rad_s"], np.arange(60) * 0.5 * np.pi / 30)
 
