@@ -22,7 +22,7 @@ from pipeline.criticism.effect import Array, Effect
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.regression.noise_floors import Floor, noise_floor
 from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.records.diagnosis import Separation
 
@@ -182,6 +182,6 @@ def _planned_rows(test: str, wide: LinearSystem) -> Array | None:
     model, values = wide.fit.model, wide.fit.values
     for number, segment in enumerate(planned(test, wide.fit)):
         sigma = noise_floor(segment, model, values, _SEED + number)
-        rows = linearise(segment, model, values, wide.columns, sigma, np.zeros(sigma.size), values)
+        rows = linearise(segment, model, values, wide.columns, Floor(sigma, values))
         made.append(rows.columns)
     return np.concatenate(made) if made else None

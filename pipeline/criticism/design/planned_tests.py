@@ -114,11 +114,11 @@ def _shaft(
     period: float,
     recorded: Mapping[str, Array],
     noise: Mapping[str, float],
-    channel: str,
-    orders: tuple[float, ...],
+    orders: tuple[float, ...] = (),
 ) -> Segment:
     theta = recorded["theta_mech_rad"]
     slow = test == "cogging"
+    channel = "torque_shaft_nm" if slow else "omega_mech_rad_s"
     window = theta.size - 2 if slow else 40
     keep = np.ones(theta.size - 2, dtype=bool)
     starts = 1 + window_starts(keep, window)
@@ -148,8 +148,6 @@ def _spin_down(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
             period,
             {"theta_mech_rad": sign * theta},
             noise,
-            "omega_mech_rad_s",
-            (),
         )
         for sign in (1, -1)
     ]
@@ -167,7 +165,6 @@ def _cogging(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
             period,
             {"theta_mech_rad": sign * theta, "torque_shaft_nm": np.zeros(theta.size)},
             noise,
-            "torque_shaft_nm",
             orders,
         )
         for sign in (1, -1)

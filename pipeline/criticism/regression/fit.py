@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import Policy
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.linearise import Column
-from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
+from pipeline.criticism.regression.noise_floors import Floor, form_tolerance, noise_floor
 from pipeline.criticism.regression.parallel import on_each
 
 _SEED = 20260302
@@ -74,10 +74,10 @@ class Fit:
         return self.at({c.name: self.values[c.name] + change for c, change in moves})
 
     @property
-    def floors(self) -> Iterator[tuple[Array, Array]]:
-        """Noise floor and tolerance of form [groups] of every segment."""
-        none = (np.zeros(sigma.size) for sigma in self.sigma)
-        return zip(self.sigma, self.tolerance or none, strict=True)
+    def floors(self) -> tuple[Floor, ...]:
+        """What the rows of every segment are held against."""
+        both = zip(self.sigma, self.tolerance or [None] * len(self.sigma), strict=True)
+        return tuple(Floor(sigma, self.near, tolerance) for sigma, tolerance in both)
 
 
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:

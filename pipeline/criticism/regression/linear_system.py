@@ -25,7 +25,9 @@ from pipeline.criticism.regression.linearise import (
 )
 from pipeline.criticism.regression.normal_equations import (
     NormalEquations,
+    Prior,
     deviance_of,
+    prior_costs,
     pseudo_inverse,
 )
 from pipeline.criticism.regression.parallel import on_each
@@ -119,13 +121,10 @@ class LinearSystem:
         """Squared distance [P] of every parameter from its prior's centre, in its standard
         uncertainties, after a step along `places`; 0 where there is no prior.
         """
-        prior_gradient = self.prior_gradient.copy()
+        gradient = self.prior_gradient.copy()
         if places is not None and step is not None:
-            prior_gradient[places] += self.prior_precision[places] * step
-        costs: Array = prior_gradient**2 / np.where(
-            self.prior_precision > 0, self.prior_precision, np.inf
-        )
-        return costs
+            gradient[places] += self.prior_precision[places] * step
+        return prior_costs(gradient, self.prior_precision)
 
     def weights(self, reduced_chi2: Array) -> Array:
         """How much each weak sample [R] counts where groups have these χ²/n."""
@@ -158,16 +157,11 @@ class LinearSystem:
         along = np.arange(len(self.columns)) if places is None else places
         elsewhere = self.prior_costs()
         elsewhere[along] = 0.0
-        return NormalEquations.of(
-            self.matrix[:, along],
-            self.residual,
-            self.group,
-            len(self.labels),
-            self.prior_precision[along],
-            self.prior_gradient[along],
-            float(elsewhere.sum()),
-            self.policy.fit,
+        prior = Prior(
+            self.prior_precision[along], self.prior_gradient[along], float(elsewhere.sum())
         )
+        rows = np.column_stack([self.residual, self.matrix[:, along]])
+        return NormalEquations.of(rows, self.group, len(self.labels), prior, self.policy.fit)
 
     def along(self, places: NDArray[np.int64]) -> LinearSystem:
         """The same system with some of its columns."""
@@ -250,7 +244,7 @@ def linear_system(
     columns = [*own, *candidates]
     known = _kept(before, fit, columns, chord)
     new = [column for column in columns if column.key not in known]
-    each = [(model, values, new, *both, fit.near) for both in fit.floors]
+    each = [(model, values, new, floor) for floor in fit.floors]
     rows = on_each(linearise, fit.segments, each)
     group, labels = _numbered(rows)
     prior_precision, prior_gradient = _priors(model, columns, values)

@@ -31,8 +31,8 @@ from pipeline.criticism.machine.model import (
 )
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.regression.noise_floors import (
+    Floor,
     offsets,
-    reading_error,
     window_gain,
 )
 from pipeline.criticism.residuals.channels import of_acceleration, reported_unit
@@ -91,20 +91,18 @@ def linearise(
     model: Model,
     values: Values,
     columns: Sequence[Column],
-    sigma: Array,
-    tolerance: Array,
-    near: Values,
+    floor: Floor,
 ) -> Rows:
-    """Whitened residual and columns of one segment at `values`, reading errors as at `near`."""
+    """Whitened residual and columns of one segment at `values`."""
     group, window, valid, groups = row_index(segment)
     sampler = _Sampler(segment, model, dict(values))
-    floor = np.hypot(sigma[group[valid]], reading_error(segment, model, near, sampler.x)[valid])
-    row_weight = 1.0 / np.hypot(floor, tolerance[group[valid]])
+    noise, scale = floor.noise_and_scale(segment, model, sampler.x)
+    row_weight = 1.0 / scale
     kept = _weak_columns(segment, sampler, columns, valid)
     both = np.column_stack([projected(segment, sampler.here)[valid], kept]) * row_weight[:, None]
     absorb(both, offsets(segment, valid, row_weight, model.policy.noise_floors))
     unit = reported_unit(segment, values) / (row_weight * window_gain(segment))
-    noise_ratio = floor * row_weight
+    noise_ratio = noise * row_weight
     return Rows(
         both[:, 0], both[:, 1:], group[valid], window[valid], unit, noise_ratio, row_weight, groups
     )

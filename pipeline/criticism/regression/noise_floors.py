@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,28 @@ from pipeline.criticism.residuals.channels import (
     reported_unit,
 )
 from pipeline.criticism.residuals.residual import operate, residual
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """What the rows of a segment are divided by: noise `sigma` [groups], the reading error at the
+    values `near`, and what the forms of effects may be wrong by, `tolerance` [groups].
+    """
+
+    sigma: Array
+    near: Values
+    tolerance: Array | None = None
+
+    def noise_and_scale(
+        self, segment: Segment, model: Model, state: Operating
+    ) -> tuple[Array, Array]:
+        """Noise floor [R] of the weak samples, and the same with the tolerance of form."""
+        group, _, valid, _ = row_index(segment)
+        reading = reading_error(segment, model, self.near, state)[valid]
+        noise: Array = np.hypot(self.sigma[group[valid]], reading)
+        if self.tolerance is None:
+            return noise, noise
+        return noise, np.hypot(noise, self.tolerance[group[valid]])
 
 
 def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Array:

@@ -32,39 +32,48 @@ class Descent:
 
 
 @dataclass(frozen=True, slots=True)
+class Prior:
+    """What is known of k parameters beforehand: inverse prior variance `precision` [k], half the
+    `gradient` [k] of its cost, and what the priors of other parameters cost, `elsewhere`.
+    """
+
+    precision: Array
+    gradient: Array
+    elsewhere: float = 0.0
+
+    def cost(self, step: Array | float = 0.0) -> float:
+        """Squared distance from the centres after a step [k], in standard uncertainties."""
+        gradient = self.gradient + self.precision * step
+        return float(prior_costs(gradient, self.precision).sum())
+
+    def along(self, places: NDArray[np.int64]) -> Prior:
+        """The same for some of the parameters."""
+        out = np.setdiff1d(np.arange(self.precision.size), places)
+        rest = float(prior_costs(self.gradient[out], self.precision[out]).sum())
+        return Prior(self.precision[places], self.gradient[places], self.elsewhere + rest)
+
+
+@dataclass(frozen=True, slots=True)
 class NormalEquations:
     """What a fit along k columns needs of the rows of G groups.
 
     `counts` [G] are their weak samples, `power` [G] the residuals' sums of squares, `slope` [G, k]
     the columns times the residual and `normal` [G, k, k] the columns times each other.
-    `prior_precision` [k] is the inverse prior variance, `prior_gradient` [k] its slope, `elsewhere`
-    what the priors of other columns cost.
     """
 
     counts: Array
     power: Array
     slope: Array
     normal: Array
-    prior_precision: Array
-    prior_gradient: Array
-    elsewhere: float
+    prior: Prior
     policy: GaussNewton
 
     @classmethod
     def of(
-        cls,
-        matrix: Array,
-        residual: Array,
-        group: NDArray[np.int64],
-        count: int,
-        prior_precision: Array,
-        prior_gradient: Array,
-        elsewhere: float,
-        policy: GaussNewton,
+        cls, rows: Array, group: NDArray[np.int64], count: int, prior: Prior, policy: GaussNewton
     ) -> NormalEquations:
-        """From columns [R, k] and residual [R] of rows whose groups are numbered below `count`."""
-        order = np.argsort(group, kind="stable")
-        both = np.column_stack([residual, matrix])[order]
+        """From residual and columns `rows` [R, 1 + k], their groups numbered below `count`."""
+        both = rows[np.argsort(group, kind="stable")]
         counts = np.bincount(group, minlength=count)
         edges = np.concatenate([[0], np.cumsum(counts)])
         normal = np.empty((count, both.shape[1], both.shape[1]))
@@ -76,24 +85,18 @@ class NormalEquations:
             normal[:, 0, 0].copy(),
             normal[:, 0, 1:].copy(),
             normal[:, 1:, 1:],
-            prior_precision,
-            prior_gradient,
-            elsewhere,
+            prior,
             policy,
         )
 
     def along(self, places: NDArray[np.int64]) -> NormalEquations:
         """The same for some of the columns."""
-        out = np.setdiff1d(np.arange(self.prior_precision.size), places)
         return NormalEquations(
             self.counts,
             self.power,
             self.slope[:, places],
             self.normal[:, places[:, None], places],
-            self.prior_precision[places],
-            self.prior_gradient[places],
-            self.elsewhere
-            + float(_costs(self.prior_gradient[out], self.prior_precision[out]).sum()),
+            self.prior.along(places),
             self.policy,
         )
 
@@ -105,8 +108,8 @@ class NormalEquations:
 
     def deviance(self) -> float:
         """−2 log likelihood where the fit stands, and what the priors cost."""
-        cost = float(_costs(self.prior_gradient, self.prior_precision).sum()) + self.elsewhere
-        return deviance_of(self.counts, self._spreads(self.power)) + cost
+        cost = self.prior.cost() + self.prior.elsewhere
+        return deviance_of(self.counts, self._reduced_chi2(self.power)) + cost
 
     def best(self, starts: Sequence[float] = (1.0, 0.5, 0.0), rounds: int | None = None) -> Descent:
         """The step of least deviance.
@@ -129,29 +132,25 @@ class NormalEquations:
         be more than one end: one start gives up a group that another would have saved.
 
         """
-        now = np.maximum(self._spreads(self.power), 1.0)
+        now = np.maximum(self._reduced_chi2(self.power), 1.0)
         ends = [self._descended(now**power, rounds or self.policy.most_rounds) for power in starts]
         return min(ends, key=lambda end: end.deviance)
 
     def _descended(self, reduced_chi2: Array, rounds: int) -> Descent:
-        step, now, before = np.zeros(self.prior_precision.size), np.inf, np.inf
+        step, now, before = np.zeros(self.prior.precision.size), np.inf, np.inf
         for _ in range(rounds):
             weight = 1.0 / np.maximum(reduced_chi2, 1.0)
-            normal = np.einsum("g,gkl->kl", weight, self.normal) + np.diag(self.prior_precision)
-            step = -pseudo_inverse(normal) @ (weight @ self.slope + self.prior_gradient)
-            reduced_chi2 = self._spreads(_after(self.power, self.slope, self.normal, step))
-            cost = float(
-                _costs(
-                    self.prior_gradient + self.prior_precision * step, self.prior_precision
-                ).sum()
-            )
-            now = deviance_of(self.counts, reduced_chi2) + cost + self.elsewhere
+            normal = np.einsum("g,gkl->kl", weight, self.normal) + np.diag(self.prior.precision)
+            step = -pseudo_inverse(normal) @ (weight @ self.slope + self.prior.gradient)
+            reduced_chi2 = self._reduced_chi2(_after(self.power, self.slope, self.normal, step))
+            now = deviance_of(self.counts, reduced_chi2) + self.prior.cost(step)
+            now += self.prior.elsewhere
             if abs(before - now) < self.policy.settled:
                 break
             before = now
         return Descent(step, reduced_chi2, now)
 
-    def _spreads(self, power: Array) -> Array:
+    def _reduced_chi2(self, power: Array) -> Array:
         return np.where(self.counts > 0, power / np.maximum(self.counts, 1.0), 1.0)
 
 
@@ -221,7 +220,7 @@ def _after(power: Array, slope: Array, normal: Array, step: Array) -> Array:
     return after
 
 
-def _costs(prior_gradient: Array, prior_precision: Array) -> Array:
+def prior_costs(gradient: Array, precision: Array) -> Array:
     """Squared distances [k] from the priors' centres in standard uncertainties."""
-    costs: Array = prior_gradient**2 / np.where(prior_precision > 0, prior_precision, np.inf)
+    costs: Array = gradient**2 / np.where(precision > 0, precision, np.inf)
     return costs

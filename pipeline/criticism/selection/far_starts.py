@@ -19,6 +19,7 @@ from pipeline.criticism.effect import Array, Parameter, Values
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.linearise import linearise
+from pipeline.criticism.regression.noise_floors import Floor
 from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.observability import observes
@@ -107,9 +108,9 @@ def _moved(own: LinearSystem, candidate: Candidate, start: Values) -> LinearSyst
     fit, effect = own.fit, candidate.effect
     model = fit.model.with_effects(effect)
     values = {**fit.values, **candidate.values, **start}
-    segments, floors = fit.segments, tuple(fit.floors)
+    segments, floors = fit.segments, fit.floors
     observed = [number for number, segment in enumerate(segments) if observes(segment, effect)]
-    each = [(model, values, *floors[number], fit.near) for number in observed]
+    each = [(model, values, floors[number]) for number in observed]
     rows = on_each(_residual, [segments[number] for number in observed], each)
     residual = own.residual.copy()
     for number, row in zip(observed, rows, strict=True):
@@ -117,7 +118,5 @@ def _moved(own: LinearSystem, candidate: Candidate, start: Values) -> LinearSyst
     return replace(own, residual=residual)
 
 
-def _residual(
-    segment: Segment, model: Model, values: Values, sigma: Array, tolerance: Array, near: Values
-) -> Array:
-    return linearise(segment, model, values, (), sigma, tolerance, near).residual
+def _residual(segment: Segment, model: Model, values: Values, floor: Floor) -> Array:
+    return linearise(segment, model, values, (), floor).residual

@@ -225,8 +225,7 @@ class _Scoring:
         """Score of one candidate with parameters on the wrong side of a bound left at zero."""
         system, machine = self.system, self.system.fit.machine
         known = {
-            f"{candidate.effect.name}.{p.name}": (p, machine.scale(p))
-            for p in candidate.effect.parameters_of(machine)
+            f"{candidate.effect.name}.{p.name}": p for p in candidate.effect.parameters_of(machine)
         }
         live = places
         while live.size:
@@ -236,7 +235,7 @@ class _Scoring:
             wrong = [
                 n
                 for n in live
-                if _outside(mine[system.columns[n].name], known[system.columns[n].name][0])
+                if _outside(mine[system.columns[n].name], known[system.columns[n].name])
             ]
             if not wrong:
                 break
@@ -244,9 +243,9 @@ class _Scoring:
         if live.size == 0:
             return None
         sizes = [
-            abs(value) / (known[name][0].negligible * known[name][1])
+            abs(value) / (known[name].negligible * machine.scale(known[name]))
             for name, value in mine.items()
-            if known[name][0].negligible > 0
+            if known[name].negligible > 0
         ]
         after = Standing.of(system, np.concatenate([self.own, live]), end)
         names = (system.columns[n].name for n in self.own)

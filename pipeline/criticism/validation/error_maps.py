@@ -160,20 +160,20 @@ def _window_map(
     errors: Errors, inside: NDArray[np.bool_], cell: NDArray[np.int64], x: Bins, y: Bins | None
 ) -> ErrorMap:
     visit = visits_of(cell, errors.segment[inside])
-    return _map(errors.signal, errors.error[inside], errors.sigma[inside], cell, visit, x, y)
+    error, sigma = errors.error[inside], errors.sigma[inside]
+    return _map(errors.signal, (error, sigma), cell, visit, x, y)
 
 
 def _map(
     signal: str,
-    error: Array,
-    sigma: Array,
+    errors: tuple[Array, Array],
     cell: NDArray[np.int64],
     visit: NDArray[np.int64],
     x: Bins,
     y: Bins | None,
 ) -> ErrorMap:
     shape = (x.count,) if y is None else (y.count, x.count)
-    found = cell_means(error, sigma, cell, visit, math.prod(shape))
+    found = cell_means(*errors, cell, visit, math.prod(shape))
     return ErrorMap(
         signal,
         unit_of(signal),
@@ -223,7 +223,7 @@ def angle_maps(fit: Fit) -> tuple[ErrorMap, ...]:
         x = Bins(variable, tuple(np.linspace(0.0, 2 * math.pi, cells[variable] + 1).tolist()))
         cell = cell.astype(np.int64)
         visit = window.astype(np.int64) * x.count + cell
-        made.append(_map(signal, error, sigma, cell, visit, x, None))
+        made.append(_map(signal, (error, sigma), cell, visit, x, None))
     return tuple(made)
 
 

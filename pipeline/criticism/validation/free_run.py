@@ -87,16 +87,15 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     if batch is None:
         return None
     recorded = batch.segment.recorded
-    jacobian = jacobian_of(batch, model, values)
-    found, settled = settle(
-        batch, recorded, recorded, model, values, jacobian, model.policy.validation.most_rounds
-    )
+    jacobian = jacobian_of(batch)
+    most = model.policy.validation.most_rounds
+    found, settled = settle(batch, jacobian, recorded, recorded, most)
     if 2 * settled.sum() < batch.windows:
         return None
     names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
     told = {name: _signal(batch, recorded, name)[settled] for name in names}
     made = {name: _signal(batch, found, name)[settled] for name in names}
-    moved = _Response(batch, found, model, values, jacobian, settled, names)
+    moved = _Response(batch, found, jacobian, settled, names)
     time = recorded.get("t_s", segment.ts_s * np.arange(batch.segment.size, dtype=np.float64))
     floor, drift = _floor(moved), _drift(moved)
     return Run(segment.capture, batch.inside(time)[settled], told, made, floor, drift)
@@ -123,8 +122,6 @@ class _Response:
 
     batch: Batch
     found: Mapping[str, Array]
-    model: Model
-    values: Values
     jacobian: Jacobian
     settled: NDArray[np.bool_]
     names: tuple[str, ...]
@@ -135,9 +132,7 @@ class _Response:
         """Changes [W] by what is added to recorded signals, and to each window's equations."""
         batch, recorded = self.batch, self.batch.segment.recorded
         other = {name: column + added.get(name, 0.0) for name, column in recorded.items()}
-        moved, _ = settle(
-            batch, self.found, other, self.model, self.values, self.jacobian, 1, extra
-        )
+        moved, _ = settle(batch, self.jacobian, self.found, other, 1, extra)
         changes = {}
         for name in self.names:
             after = _signal(batch, other, name) - _signal(batch, moved, name)
@@ -154,7 +149,7 @@ def _floor(response: _Response) -> dict[str, float]:
     """
     batch = response.batch
     noise = batch.segment.noise
-    policy = response.model.policy.validation
+    policy = response.batch.model.policy.validation
     total: dict[str, list[Array]] = {name: [] for name in response.names}
     for replicate in range(
         max(policy.run_replicates, -(-policy.run_pooled // int(response.settled.sum())))
@@ -165,7 +160,7 @@ def _floor(response: _Response) -> dict[str, float]:
             for name, sigma in sorted(noise.items())
             if sigma > 0.0 and name in batch.segment.recorded
         }
-        for name, change in response.to(added, _missed(batch, rng, response.values)).items():
+        for name, change in response.to(added, _missed(batch, rng)).items():
             total[name].append(change**2)
     return {name: math.sqrt(float(np.mean(squares))) for name, squares in total.items()}
 
@@ -173,16 +168,16 @@ def _floor(response: _Response) -> dict[str, float]:
 def _drift(response: _Response) -> dict[str, Array]:
     """Moves [K, W] of the window means with an offset of each sensor, of its prior size."""
     noise = response.batch.segment.noise
-    prior = response.model.policy.noise_floors.offset
+    prior = response.batch.model.policy.noise_floors.offset
     offsets = [name for name in _OFFSETS if noise.get(name, 0.0) > 0.0]
     moves = [response.to({name: prior * noise[name]}) for name in offsets]
     return {name: np.array([move[name] for move in moves]) for name in response.names}
 
 
-def _missed(batch: Batch, rng: np.random.Generator, values: Values) -> tuple[Complex, Array]:
+def _missed(batch: Batch, rng: np.random.Generator) -> tuple[Complex, Array]:
     """A draw of what the equations may miss by in each window [W]: voltage [V], torque [N·m]."""
     drawn = batch.allowed * rng.normal(size=batch.allowed.shape)
     if not batch.currents:
-        return np.zeros(batch.windows, dtype=complex), values["j_kgm2"] * drawn[0]
+        return np.zeros(batch.windows, dtype=complex), batch.values["j_kgm2"] * drawn[0]
     torque = drawn[2] if batch.shaft else np.zeros(batch.windows)
     return drawn[0] + 1j * drawn[1], torque

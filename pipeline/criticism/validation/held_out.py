@@ -92,7 +92,7 @@ def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
             yield from _equations(segment, fit, one)
         for signal in run.signals:
             told, made = run.recorded[signal], run.simulated[signal]
-            yield _trace(segment, signal, "free_run", one.split, run.t_s, told, made)
+            yield _trace(segment, signal, "free_run", one.split, (run.t_s, told, made))
 
 
 def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
@@ -111,7 +111,7 @@ def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
         told = smoothed(segment.recorded[channel], width)[rows]
         model = told - smoothed(left[place], width)[rows]
         time = segment.recorded["t_s"][rows]
-        yield _trace(segment, channel, "equation", one.split, time, told, model)
+        yield _trace(segment, channel, "equation", one.split, (time, told, model))
 
 
 def _trace(
@@ -119,11 +119,12 @@ def _trace(
     signal: str,
     kind: Literal["equation", "free_run"],
     split: Split,
-    time: Array,
-    told: Array,
-    model: Array,
+    columns: tuple[Array, Array, Array],
 ) -> Trace:
-    """Windows [W, N] one after the other with a gap behind each [W (N + 1)]."""
+    """Time, recorded and predicted signal, windows [W, N] one after the other with a gap behind
+    each [W (N + 1)].
+    """
+    time, recorded, predicted = columns
     gap = np.full((time.shape[0], 1), np.nan)
     after = np.hstack([time, time[:, -1:] + segment.ts_s])
     return Trace(
@@ -132,6 +133,6 @@ def _trace(
         kind,
         split,
         after.ravel(),
-        np.hstack([told, gap]).ravel(),
-        np.hstack([model, gap]).ravel(),
+        np.hstack([recorded, gap]).ravel(),
+        np.hstack([predicted, gap]).ravel(),
     )

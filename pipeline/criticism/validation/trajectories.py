@@ -37,13 +37,16 @@ radians: small against what bends the equations, large against rounding."""
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Windows cut out of a segment, with their surroundings: [W] stretches of `pad + N + pad`.
+    """Windows cut out of a segment, with their surroundings: [W] stretches of `pad + N + pad`, and
+    the model at the values whose trajectories are sought.
 
     Where stretches meet the angle jumps; `pad` is wider than what smooths the speed. `allowed`
     [C, W] is what each channel's equation may miss by in a window, in its unit.
     """
 
     segment: Segment
+    model: Model
+    values: Values
     windows: int
     length: int
     pad: int
@@ -84,7 +87,7 @@ def batch_of(segment: Segment, model: Model, values: Values) -> Batch | None:
     currents = equation_of(segment).use.currents
     shaft = not currents or "torque_shaft_nm" in segment.channels
     short = replace(segment, recorded=cut, weak=None)
-    return Batch(short, starts.size, length, pad, shaft, allowed)
+    return Batch(short, model, values, starts.size, length, pad, shaft, allowed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +106,9 @@ class Jacobian:
     spring: Array
 
 
-def jacobian_of(batch: Batch, model: Model, values: Values) -> Jacobian:
+def jacobian_of(batch: Batch) -> Jacobian:
     """Linearises the equations along the recorded trajectory, by differences."""
+    model, values = batch.model, batch.values
     x = operate(batch.segment, batch.segment.recorded, model, values)
     shape = (batch.segment.size // batch.windows, batch.windows)
     if not batch.currents:
@@ -167,15 +171,14 @@ def _steps(flux: Array, drop: Array, omega_e: Array, period: float) -> tuple[Arr
     return inverse, slope - half
 
 
-def _defects(
-    batch: Batch, signals: Mapping[str, Array], model: Model, values: Values
-) -> tuple[Complex, Array]:
+def _defects(batch: Batch, signals: Mapping[str, Array]) -> tuple[Complex, Array]:
     """What the equations miss by along a trajectory: voltage over the step from each sample [W, n]
     [V], and torque at each sample [W, n] [N·m].
 
     The residual has the central difference of the flux, under which samples of even and odd number
     would drift apart. It is exchanged for the difference over the step.
     """
+    model, values = batch.model, batch.values
     segment, period = batch.segment, batch.segment.ts_s
     x = operate(segment, signals, model, values)
     pieces = evaluate(model, x, values)
@@ -201,11 +204,9 @@ def _defects(
 
 def settle(
     batch: Batch,
+    jacobian: Jacobian,
     start: Mapping[str, Array],
     given: Mapping[str, Array],
-    model: Model,
-    values: Values,
-    jacobian: Jacobian,
     rounds: int,
     extra: tuple[Complex, Array] | None = None,
 ) -> tuple[dict[str, Array], NDArray[np.bool_]]:
@@ -214,7 +215,7 @@ def settle(
     `extra` adds to each window's voltage [W] and torque [W]. Also returns which windows [W]
     settled: those whose last correction was below what drives are modelled to.
     """
-    policy = model.policy
+    model, policy = batch.model, batch.model.policy
     names = [name for name in _STATE if name in given]
     now = dict(given)
     for name in names:
@@ -225,11 +226,11 @@ def settle(
     limits = (model.machine.scales["current_a"], 2 * math.pi / model.machine.pole_pairs)
     sound = np.ones(batch.windows, dtype=bool)
     for _ in range(rounds):
-        voltage, torque = _defects(batch, now, model, values)
+        voltage, torque = _defects(batch, now)
         if extra is not None:
             voltage, torque = voltage + extra[0][:, None], torque + extra[1][:, None]
         speed = begin - _central_speed(batch, now["theta_mech_rad"])
-        current, angle = _corrected(batch, jacobian, voltage, torque, values["j_kgm2"], speed)
+        current, angle = _corrected(batch, jacobian, voltage, torque, speed)
         size = np.maximum(np.abs(current) / limits[0], np.abs(angle) / limits[1]).max(axis=1)
         sound &= size < policy.validation.lost
         current[~sound], angle[~sound] = 0.0, 0.0
@@ -266,7 +267,6 @@ def _corrected(
     jacobian: Jacobian,
     voltage: Complex,
     torque: Array,
-    inertia: float,
     speed: Array,
 ) -> tuple[Complex, Array]:
     """Corrections of current [W, n] [A] and angle [W, n] [rad], zero up to the windows' start.
@@ -279,7 +279,7 @@ def _corrected(
         np.zeros((n_all, batch.windows), dtype=complex),
         np.zeros((n_all, batch.windows)),
     )
-    kick = period / inertia
+    kick = period / batch.values["j_kgm2"]
     calm = 1.0 / (1.0 + kick * jacobian.damping)
     d, q = np.zeros(batch.windows), np.zeros(batch.windows)
     turn = np.zeros(batch.windows)

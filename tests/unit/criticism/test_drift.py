@@ -14,6 +14,7 @@ from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import remainder
 from pipeline.criticism.regression.linearise import linearise
+from pipeline.criticism.regression.noise_floors import Floor
 from pipeline.criticism.selection.drift import drifting_segments, slowest, with_drift
 from tests.unit.criticism.machines import BASE, log, machine
 
@@ -55,7 +56,7 @@ def test_a_walk_of_its_size_is_all_but_noise_once_it_is_known():
         segment = walked(seed, "drive", 4.0)
         sigma = floors((segment,), model, BASE)[0]
         for one, found in ((segment, over), (with_drift(segment, model, BASE), known)):
-            rows = linearise(one, model, BASE, [], sigma, np.zeros(sigma.size), BASE)
+            rows = linearise(one, model, BASE, [], Floor(sigma, BASE))
             mine = [n for n, (channel, k) in enumerate(rows.groups) if channel[0] == "t" and k == 0]
             found.append(float((rows.residual[np.isin(rows.group, mine)] ** 2).mean()))
     assert np.median(over) > 100.0

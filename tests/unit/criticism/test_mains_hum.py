@@ -10,7 +10,7 @@ import pytest
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linearise import absorb, linearise
 from pipeline.criticism.regression.mains_hum import Hum, hum_notes, hum_of, with_hum
-from pipeline.criticism.regression.noise_floors import noise_floor
+from pipeline.criticism.regression.noise_floors import Floor, noise_floor
 from pipeline.numerics.projection import projection
 from tests.unit.criticism.machines import BASE, log, machine
 
@@ -130,7 +130,7 @@ def missed(segment, heard):
     """χ²/n of vq_v where the lines `heard` are known."""
     sigma = noise_floor(segment, PLAIN, BASE, 1)
     (known,) = with_hum([segment], heard, PLAIN, BASE)
-    rows = linearise(known, PLAIN, BASE, [], sigma, np.zeros(sigma.size), BASE)
+    rows = linearise(known, PLAIN, BASE, [], Floor(sigma, BASE))
     mine = [n for n, (channel, _) in enumerate(rows.groups) if channel == "vq_v"]
     return float((rows.residual[np.isin(rows.group, mine)] ** 2).mean())
 
@@ -204,7 +204,7 @@ def test_an_open_winding_s_hum_no_longer_misses_the_floor():
     sigma = noise_floor(one, PLAIN, TURNED, 1)
     spreads = []
     for (known,) in ((one,), with_hum([one], heard, PLAIN, TURNED)):
-        rows = linearise(known, PLAIN, TURNED, [], sigma, np.zeros(sigma.size), TURNED)
+        rows = linearise(known, PLAIN, TURNED, [], Floor(sigma, TURNED))
         spreads.append(float((rows.residual**2).mean()))
     assert spreads[0] > 5.0
     assert spreads[1] < 1.5

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.policy.policy import DEFAULT
-from pipeline.criticism.regression.normal_equations import NormalEquations
+from pipeline.criticism.regression.normal_equations import NormalEquations, Prior
 
 GROUP = np.repeat([0, 1, 2], [40, 60, 30])
 NOTHING = np.zeros(4)
@@ -18,10 +18,9 @@ def rows(bad=1.0):
     return matrix, residual + np.where(GROUP == 2, bad, 0.0)
 
 
-def normal_equations(matrix, residual, prior_precision=NOTHING, prior_gradient=NOTHING):
-    return NormalEquations.of(
-        matrix, residual, GROUP, 3, prior_precision, prior_gradient, 0.0, DEFAULT.fit
-    )
+def normal_equations(matrix, residual, precision=NOTHING, gradient=NOTHING):
+    rows = np.column_stack([residual, matrix])
+    return NormalEquations.of(rows, GROUP, 3, Prior(precision, gradient), DEFAULT.fit)
 
 
 def test_groups_at_their_floor_make_an_ordinary_least_squares_fit():
@@ -62,15 +61,7 @@ def test_moved_and_along_are_the_same_as_rows_moved_and_chosen():
     assert there.power == pytest.approx(direct.power)
     assert there.slope == pytest.approx(direct.slope)
     some = there.along(np.array([0, 2])).best()
-    again = NormalEquations.of(
-        matrix[:, [0, 2]],
-        residual + matrix[:, [1, 3]] @ [0.7, -0.2],
-        GROUP,
-        3,
-        np.zeros(2),
-        np.zeros(2),
-        0.0,
-        DEFAULT.fit,
-    ).best()
+    left, none = residual + matrix[:, [1, 3]] @ [0.7, -0.2], np.zeros(2)
+    again = normal_equations(matrix[:, [0, 2]], left, none, none).best()
     assert some.step == pytest.approx(again.step)
     assert some.deviance == pytest.approx(again.deviance)

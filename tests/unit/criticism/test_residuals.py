@@ -13,7 +13,7 @@ from pipeline.criticism.equations.free_shaft import _FINEST
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, mean_current, zero
 from pipeline.criticism.regression.linearise import effect_columns, linearise
-from pipeline.criticism.regression.noise_floors import noise_floor, reading_error
+from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.residuals.residual import residual
 from pipeline.criticism.signals.shaft import _averaged
 from pipeline.criticism.signals.true_state import finer_of
@@ -54,14 +54,13 @@ def test_a_column_is_the_change_of_the_whole_residual(name):
     """The hook's own column against a residual computed anew with the effect in the model."""
     effect, segment = LIBRARY[name], log()
     sigma = noise_floor(segment, PLAIN, BASE, 1)
-    strict = np.zeros(sigma.size)
     columns = effect_columns(effect, PLAIN)
     model = PLAIN.with_effects(effect)
     start = {**BASE, **zero(effect, model)}
-    before = linearise(segment, PLAIN, BASE, columns, sigma, strict, BASE)
+    before = linearise(segment, PLAIN, BASE, columns, Floor(sigma, BASE))
     for n, column in enumerate(columns):
         moved = {**start, column.name: start[column.name] + column.step}
-        after = linearise(segment, model, moved, [], sigma, strict, BASE)
+        after = linearise(segment, model, moved, [], Floor(sigma, BASE))
         expected = (after.residual - before.residual) / column.step
         size = np.abs(expected).max()
         assert before.columns[:, n] == pytest.approx(expected, abs=0.02 * size + 1e-12)
