@@ -25,10 +25,19 @@ STEPS_APART = 100.0
 
 
 def agree(campaign: Campaign) -> tuple[Finding, ...]:
-    """Warnings where one motor's captures contradict each other or leave an experiment out.
+    """Where one motor's captures contradict each other or leave an experiment out.
 
-    Neither of two captures that disagree is refused: which nameplate is wrong is not for one
-    of them to say. The finding stands at the file of the smaller group and names the other.
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+
+    Returns
+    -------
+    tuple of Finding
+        Warnings at the file of the smaller group, naming the other. Neither of two captures that
+        disagree is refused: which nameplate is wrong is not for one of them to say.
+
     """
     findings = [finding for key in NAMEPLATE for finding in _contradictions(campaign, key)]
     findings += _statements(campaign)

@@ -84,7 +84,23 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
 def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
     """All requirements of a test, those of its terminal pair and its clock included.
 
-    Raises KeyError for a test that the contract does not know.
+    Parameters
+    ----------
+    test
+        Its name.
+    pair
+        `ab`, `bc` or `ca`; any of them where not stated.
+
+    Returns
+    -------
+    tuple of Requirement
+        A capture has to meet each.
+
+    Raises
+    ------
+    KeyError
+        The contract does not know the test.
+
     """
     fixed = _FIXED[test]
     pairs = (pair,) if pair in PAIRS else PAIRS
@@ -100,7 +116,28 @@ def requirements(test: str, pair: str | None = None) -> tuple[Requirement, ...]:
 
 
 def columns_required(test: str, pair: str | None, columns: frozenset[str]) -> tuple[str, ...]:
-    """The columns that meet the requirements of a test, sorted: what its estimators rest on."""
+    """The columns that meet the requirements of a test: what its estimators rest on.
+
+    Parameters
+    ----------
+    test
+        Its name.
+    pair
+        `ab`, `bc` or `ca`; any of them where not stated.
+    columns
+        Those that the capture has.
+
+    Returns
+    -------
+    tuple of str
+        Sorted; of each requirement the first alternative that is there.
+
+    Examples
+    --------
+    >>> columns_required("spin_down", None, frozenset({"t_s", "omega_mech_rad_s", "vdc_v"}))
+    ('omega_mech_rad_s', 't_s')
+
+    """
     used: set[str] = set()
     for requirement in requirements(test, pair):
         for alternative in requirement.alternatives:

@@ -67,9 +67,23 @@ def _rules_of(column: str) -> tuple[str, ...]:
 
 @cache
 def table_schema(columns: tuple[str, ...]) -> pa.DataFrameSchema:
-    """The contract of a table with these glossary columns; other columns are let pass.
+    """The contract of a table with some glossary columns; other columns are let pass.
 
-    All rules are one check, evaluated together: one for each would take eight times as long.
+    Parameters
+    ----------
+    columns
+        Names of the glossary, each in its unit and range there.
+
+    Returns
+    -------
+    DataFrameSchema
+        All rules as one check, evaluated together: one for each would take eight times as long.
+
+    Notes
+    -----
+    NaN stands for missing and passes everywhere but in time, which is finite and rises strictly;
+    infinity passes nowhere; nothing is coerced.
+
     """
     import pandera.polars as pa
 
@@ -88,7 +102,21 @@ def table_schema(columns: tuple[str, ...]) -> pa.DataFrameSchema:
 
 
 def broken(table: pl.LazyFrame, columns: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Column and code of every rule that some row does not keep, in their order."""
+    """The rules that some row of a table does not keep.
+
+    Parameters
+    ----------
+    table
+        Any table.
+    columns
+        Columns of the glossary that it holds.
+
+    Returns
+    -------
+    list of (column, code)
+        In the order of the columns and of their rules.
+
+    """
     asked = [(column, code) for column in columns for code in _rules_of(column)]
     kept = table.select(
         RULES[code](column).all().alias(str(place)) for place, (column, code) in enumerate(asked)
@@ -98,9 +126,18 @@ def broken(table: pl.LazyFrame, columns: tuple[str, ...]) -> list[tuple[str, str
 
 
 def check_tables(capture: Capture) -> None:
-    """Holds every table of a capture against its contract, all failures at once.
+    """Holds every table of a capture against its contract.
 
-    Raises CaptureError with the first fault's code, the rows it spans and a few examples.
+    Parameters
+    ----------
+    capture
+        As recorded.
+
+    Raises
+    ------
+    CaptureError
+        With all faults; its code, rows and remedy are those of the first one.
+
     """
     faults: list[CaptureError] = []
     for table in capture.tables:
@@ -157,7 +194,17 @@ def _fault(table: pl.DataFrame, column: str, code: str) -> CaptureError:
 def check_columns(capture: Capture) -> None:
     """Whether a capture holds at least what its test asks for; an all-NaN column is not there.
 
-    Raises CaptureError `no_rows` or `missing_column`, naming what is needed and what there is.
+    Parameters
+    ----------
+    capture
+        As recorded.
+
+    Raises
+    ------
+    CaptureError
+        There is no row (`no_rows`), or a column is missing (`missing_column`): the message names
+        what is needed and what there is.
+
     """
     test, tables = capture.meta.test, capture.tables
     if not any(table.height for table in tables):
@@ -196,7 +243,19 @@ def _every_table_has_a_clock(capture: Capture) -> None:
 
 
 def check_metadata(meta: CaptureMeta) -> None:
-    """Holds the metadata against the glossary. Raises CaptureError for what cannot be true."""
+    """Holds metadata against the glossary.
+
+    Parameters
+    ----------
+    meta
+        Of one capture.
+
+    Raises
+    ------
+    CaptureError
+        A test, pair or winding is unknown, or a number out of the glossary's range.
+
+    """
     if meta.test not in TESTS:
         raise CaptureError(
             "unknown_test",

@@ -24,11 +24,33 @@ def validate(
 ) -> tuple[Capture, tuple[Finding, ...]]:
     """Holds a capture against its contract, then against every gate of its test.
 
-    `options` are the configuration's `gates`. Gates look at the capture as recorded, none at
-    another's masks, so that their order does not matter. Raises CaptureError that says every
-    reason for the refusal at once. A gate that breaks on what it was not made for refuses the
-    capture too, for it has not been judged; it goes unsaid where another gate knows the reason.
-    Slow streams that were written into a fast table have a table of their own in the end.
+    Parameters
+    ----------
+    capture
+        As recorded.
+    options
+        Of each gate by its name, over its defaults: the configuration's `gates`.
+
+    Returns
+    -------
+    capture
+        With the masks of the gates, without columns that hold no value; slow streams that were
+        written into a fast table have a table of their own.
+    findings
+        Warnings.
+
+    Raises
+    ------
+    CaptureError
+        It is of no use, with every reason at once. A gate that breaks on what it was not made for
+        refuses the capture too, for it has not been judged; it goes unsaid where another gate knows
+        the reason.
+
+    Notes
+    -----
+    Gates look at the capture as recorded, none at another's masks, so that their order does not
+    matter.
+
     """
     check_metadata(capture.meta)
     check_columns(capture)

@@ -46,7 +46,6 @@ class Expression:
     covariance: Array
     gain: float
     left: Array
-    own_step: Array
 
     def value(self, v: Array, carrier: int = 0) -> Array:
         """The expression [n] on one carrier."""
@@ -307,7 +306,7 @@ def _shapes(variable: Variable, carrier: int, policy: Discovery) -> Iterator[Gro
 
 def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expression:
     terms = tuple(t for group in chosen for t in group)
-    own, amplitudes, left, deviance = pursuit.fit(pursuit.curves(terms))
+    _, amplitudes, left, deviance = pursuit.fit(pursuit.curves(terms))
     directions = tuple((n, name) for n, t in enumerate(terms) for name in ("amplitude", *t.free))
     columns = [
         _hat_direction(pursuit, terms[n], float(amplitudes[n]), name) for n, name in directions
@@ -315,7 +314,7 @@ def _finished(pursuit: Pursuit, chosen: Sequence[Group], start: float) -> Expres
     width = pursuit.system.matrix.shape[1] - pursuit.own
     slopes = np.column_stack([np.empty((width, 0)), *columns])
     covariance = _inverse(slopes.T @ pursuit.gram @ slopes)
-    return Expression(terms, amplitudes, directions, covariance, start - deviance, left, own)
+    return Expression(terms, amplitudes, directions, covariance, start - deviance, left)
 
 
 def _hat_direction(pursuit: Pursuit, term: Term, amplitude: float, name: str) -> Array:

@@ -22,10 +22,8 @@ def words(variable: str, low: float, high: float, *terms: tuple[float, Term]) ->
         if p.variable.name == variable and not p.carriers[0].words
     )
     amplitudes = np.array([size for size, _ in terms])
-    nothing = np.zeros(0)
-    found = Expression(
-        tuple(term for _, term in terms), amplitudes, (), np.eye(0), 1.0, nothing, nothing
-    )
+    chosen = tuple(term for _, term in terms)
+    found = Expression(chosen, amplitudes, (), np.eye(0), 1.0, np.zeros(0))
     curve = tuple(CurvePoint(float(at), 0.0, 0.0, 0.0) for at in np.linspace(low, high, 17))
     return _run(port, curve, found, 0, DEFAULT.discovery)
 
