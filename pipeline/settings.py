@@ -336,7 +336,10 @@ def named_file(group: str, name: str, config_dir: str | None = None) -> Path:
 
 
 def configuration_folder() -> Path:
-    """The folder `conf/`: beside the package in a checkout, inside it in a wheel."""
+    """The folder `conf/`: beside the package in a checkout, inside it in a wheel.
+
+    Raises UsageError where it is missing.
+    """
     package = Path(pipeline.__file__).parent
     for folder in (package.parent / "conf", package / "conf"):
         if (folder / "command").is_dir():

@@ -40,7 +40,20 @@ def check_options(settings: RunSettings) -> None:
 
 
 def check_constants(stated: Mapping[str, Any]) -> None:
-    """Refuses a stated constant that there is not, and a value that is no number."""
+    """Refuses a stated constant that there is not, and a value that is no number.
+
+    Parameters
+    ----------
+    stated
+        Values [the constant's unit] by `NAME`, their standard uncertainties by `u_NAME`.
+
+    Raises
+    ------
+    UsageError
+        No such constant can be stated, a value is no finite number, or an uncertainty is below 0 or
+        of no stated constant.
+
+    """
     for key, value in stated.items():
         name = key.removeprefix("u_")
         if not may_be_stated(name):

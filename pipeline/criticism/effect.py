@@ -219,14 +219,14 @@ class Operating:
 
     @property
     def flux_wb(self) -> Complex:
-        """Complex rotor-frame flux linkage, once the flux hooks have run [Wb]."""
+        """Complex rotor-frame flux linkage [Wb]; ValueError before the flux hooks have run."""
         if self.psi_wb is None:
             raise ValueError("flux linkage is not there yet: flux hooks come first")
         return self.psi_wb
 
     @property
     def torque_nm(self) -> Array:
-        """Air-gap torque, once the flux hooks have run [N·m]."""
+        """Air-gap torque [N·m]; ValueError before the flux hooks have run."""
         if self.torque_em_nm is None:
             raise ValueError("torque is not there yet: flux hooks come first")
         return self.torque_em_nm

@@ -79,7 +79,7 @@ class Estimate:
 
     @property
     def number(self) -> float:
-        """The value, for callers that have checked `known`."""
+        """The value, for callers that have checked `known`; else a ValueError."""
         if self.value is None:
             raise ValueError(f"{self.name} is not identifiable: {self.note}")
         return float(self.value)

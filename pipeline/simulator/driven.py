@@ -21,7 +21,28 @@ TIMINGS = ("centred", "held", "instant")
 
 
 def usable_speed_rad_s(session: Session) -> float:
-    """Rated speed, or where rated q current takes 90 % of the voltage, whichever is lower."""
+    """Rated speed, or where rated q current takes 90 % of the voltage, whichever is lower.
+
+    Parameters
+    ----------
+    session
+        With the motor and its link.
+
+    Returns
+    -------
+    float
+        Shaft speed [rad/s].
+
+    Raises
+    ------
+    ValueError
+        The link cannot drive rated current at standstill.
+
+    Notes
+    -----
+    (R I + ω_e ψ)² + (ω_e L_q I)² = (0.9 V_dc/√3)², solved for ω_e.
+
+    """
     m = session.motor
     limit = 0.9 * m.vdc_v / math.sqrt(3.0)
     i, flux = m.current_rated_a, math.hypot(m.psi_pm_wb, m.lq_h * m.current_rated_a)

@@ -6,7 +6,7 @@ import ast
 import doctest
 import importlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -67,6 +67,21 @@ def quoted(source: str) -> Iterator[str]:
                     yield name.rpartition(".")[2]
 
 
+def raised(body: Iterable[ast.stmt]) -> Iterator[str]:
+    """Exceptions that statements raise by name, not in a `try` or a nested function."""
+    for node in body:
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            made = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+            if isinstance(made, ast.Name) and made.id[0].isupper():
+                yield made.id
+        elif isinstance(node, ast.Try):
+            for handler in node.handlers:
+                yield from raised(handler.body)
+        elif not isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            inner = [one for one in ast.iter_child_nodes(node) if isinstance(one, ast.stmt)]
+            yield from raised(inner)
+
+
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_examples_in_docstrings_run(name: str) -> None:
     result = doctest.testmod(importlib.import_module(name))
@@ -77,6 +92,21 @@ def test_the_examples_in_docstrings_run(name: str) -> None:
 def test_a_parameters_section_names_the_parameters_of_its_function() -> None:
     found = [f"{path}: {one}" for path in FILES for one in wrong(path.read_text())]
     assert found == []
+
+
+def test_a_docstring_names_what_its_function_raises() -> None:
+    """Not of commands, whose errors are the user's, nor of gates, which have them from `Gate`."""
+    silent = [
+        f"{path}: {node.name}: {error}"
+        for path in FILES
+        if "stages" not in path.parts
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
+        if not ("gates" in path.parts and node.name == "check")
+        for error in raised(node.body)
+        if error not in (ast.get_docstring(node) or "")
+    ]
+    assert silent == []
 
 
 def test_a_docstring_names_nothing_that_is_gone() -> None:

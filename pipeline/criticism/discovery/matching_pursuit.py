@@ -336,11 +336,37 @@ def _inverse(normal: Array) -> Array:
 def curve_about(
     pursuit: Pursuit, found: Expression, coarse: NDArray[np.float64], at: Array, carrier: int
 ) -> tuple[Array, Array]:
-    """The curve and its standard uncertainty [n] at `at` [n].
+    """The curve of a structure and its standard uncertainty: its expression and what that leaves.
 
-    It is the expression and a smooth curve of what that leaves, so that the data speak where the
-    expression is wrong. `coarse` [K, k] are smooth curves in hats. The model's own constants stay
-    where the expression put them, since else a curve and a constant of one shape cannot be parted.
+    Parameters
+    ----------
+    pursuit
+        With the hats of the port.
+    found
+        Expression.
+    coarse
+        Smooth curves in hats [K, k].
+    at
+        Where the curve is wanted [n].
+    carrier
+        Of the port.
+
+    Returns
+    -------
+    curve, u
+        [n each, unit of the port].
+
+    Raises
+    ------
+    ValueError
+        The port has no curve.
+
+    Notes
+    -----
+    A smooth curve of what the expression leaves is added, so that the data speak where the
+    expression is wrong. The model's own constants stay where the expression put them, since else a
+    curve and a constant of one shape cannot be separated.
+
     """
     hats = pursuit.system.matrix[:, pursuit.own :] @ coarse
     weight = pursuit.system.weights(pursuit.system.reduced_chi2(found.left))

@@ -61,6 +61,7 @@ class _Anew(SourceFileLoader):
     """Compiles a file as it is now: bytecode of the same second may be of another content."""
 
     def path_stats(self, path: Any) -> NoReturn:
+        """There is no bytecode: OSError."""
         raise OSError(f"no bytecode of {path} is wanted")
 
 
@@ -81,7 +82,21 @@ def _load(path: Path, digest: str) -> Effect:
 
 
 def known_effects(wanted: Sequence[str], effects_path: str | None = None) -> None:
-    """Refuses the name of an effect that there is not, also of one to take away, or is twice."""
+    """Refuses the name of an effect that there is not, also of one to take away, or is twice.
+
+    Parameters
+    ----------
+    wanted
+        Names; one to take away begins with `-`.
+    effects_path
+        Folder of a user's own effects.
+
+    Raises
+    ------
+    UsageError
+        A name is unknown or there twice.
+
+    """
     names = tuple(name.removeprefix("-") for name in wanted)
     chosen(names, effects_path)
     twice = [name for name in names if names.count(name) > 1]

@@ -1,8 +1,8 @@
 """What candidates would do for a fit, to first order.
 
 References: [1] Rao, Math. Proc. Camb. Phil. Soc. 44 (1948), score test; [2] Schwarz, Ann. Stat.
-6 (1978), the penalty of a parameter; [3] Benjamini & Foster, Biometrika 109 (2022), penalty of a
-search over candidates.
+6 (1978), the penalty of a parameter; [3] Chen & Chen, Biometrika 95 (2008),
+doi:10.1093/biomet/asn034, penalty of a search over candidates.
 """
 
 from __future__ import annotations
@@ -193,7 +193,24 @@ def paid_for(effect: Effect, machine: Machine, score: Score | None) -> int:
 
 
 def searched(offered: Sequence[Candidate]) -> float:
-    """What the search over candidates costs a score [3]."""
+    """What the search over candidates costs a score.
+
+    Parameters
+    ----------
+    offered
+        All candidates; one effect at several trial shapes counts once.
+
+    Returns
+    -------
+    float
+        2 log p [deviance] of p effects, at least two.
+
+    References
+    ----------
+    Chen and Chen, Biometrika 95(3), 2008, 759 (extended Bayesian information criterion: 2 log of
+    the number of models of a size, here of one further effect), doi:10.1093/biomet/asn034.
+
+    """
     return 2.0 * math.log(max(len({c.effect.name for c in offered}), 2))
 
 

@@ -76,7 +76,24 @@ def contract_fields(names: Sequence[str], joint_state: bool) -> list[FieldMap]:
 def mapped_fields(names: Sequence[str], source: SourceMap) -> list[FieldMap]:
     """The map's fields that are there, each under the name it has in the file.
 
-    A `*` in a map's field is any text, where no field has that very name.
+    Parameters
+    ----------
+    names
+        Fields of the file.
+    source
+        The map; a `*` in one of its fields is any text, where no field has that very name.
+
+    Returns
+    -------
+    list of FieldMap
+        In the map's order.
+
+    Raises
+    ------
+    CaptureError
+        A field of the map could be several of the file, or two become one column
+        (`duplicate_column`).
+
     """
     by_last: dict[str, list[str]] = {}
     for name in names:

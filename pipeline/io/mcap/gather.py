@@ -26,7 +26,21 @@ class Column:
         self._counts: list[NDArray[np.int64]] = []
 
     def add(self, leaf: Leaf, batches: int) -> None:
-        """Takes a batch's values; `batches` is how many of them may come in all."""
+        """Takes a batch's values.
+
+        Parameters
+        ----------
+        leaf
+            Of the batch.
+        batches
+            How many of them may come in all.
+
+        Raises
+        ------
+        CaptureError
+            The field is a number in one message and an array in another (`bad_message`).
+
+        """
         array = leaf.counts is not None
         if self.array not in (None, array):
             raise CaptureError(

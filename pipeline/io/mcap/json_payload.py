@@ -34,7 +34,30 @@ class JsonDecoder:
     """Decodes messages that are JSON objects of numbers or arrays of numbers."""
 
     def decode(self, batch: Batch, wanted: Wanted) -> dict[str, Leaf]:
-        """Numeric fields by dotted name; null and absent are NaN."""
+        """Numeric fields of JSON messages.
+
+        Parameters
+        ----------
+        batch
+            Messages of one channel.
+        wanted
+            Which fields, by dotted name.
+
+        Returns
+        -------
+        dict
+            Leaves by dotted name; null and absent are NaN.
+
+        Raises
+        ------
+        CaptureError
+            A message is no object (`bad_message`), or too large (`limit`).
+
+        References
+        ----------
+        RFC 8259 (JSON).
+
+        """
         if batch.start.size == 0:
             return {}
         if int(batch.length.max()) > MAX_JSON_BYTES:

@@ -70,7 +70,10 @@ def bar_picture(rows: int) -> Image:
 
 
 def map_labels(one: ErrorMap, reach: float, words: tuple[str, str]) -> Labels:
-    """Ticks of both axes and of the colour bar, and `words` for x and y, in picture pixels."""
+    """Ticks of both axes and of the colour bar, and `words` for x and y, in picture pixels.
+
+    Raises ValueError for a map of one variable.
+    """
     if one.y is None:
         raise ValueError("a picture needs a map of two variables")
     width, height = CELL * one.x.count, CELL * one.y.count
