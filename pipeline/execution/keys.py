@@ -31,7 +31,7 @@ reader, after which nothing is cached.
 """
 NOT_OF_A_BATCH = frozenset(
     {"input", "output", "workers", "executor", "scheduler", "tls_ca", "tls_cert", "tls_key"}
-    | {"cache", "timings", "json", "config_dir", "registry_options"}
+    | {"cache", "timings", "json", "config_dir", "registry_options", "watch", "settle_s"}
 )
 """Settings of folders and of how the work is done; they do not change the results."""
 
