@@ -139,6 +139,8 @@ class Operating:
     dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
     `alone`: nothing records the torque that the shaft passes on, so that its load is a drag.
     `pwm_s`, `vdc_v`: period of the inverter's switching and voltage of its link, 0 where not known.
+    `volts_v`: the voltage that the drive's log records, in the true rotor frame, where it has both
+    axes; a leg near zero current goes by the voltage that it is told.
     """
 
     machine: Machine
@@ -161,6 +163,7 @@ class Operating:
     alone: bool = False
     pwm_s: float = 0.0
     vdc_v: float = 0.0
+    volts_v: Complex | None = None
     finer: int = 1
     run: NDArray[np.int64] | None = None
     runs_rad: Array | None = None
@@ -207,7 +210,8 @@ class Operating:
         """Some of the samples, for hooks that ask for nothing before or after a sample."""
         arrays = {name: getattr(self, name)[rows] for name in SAMPLED}
         run = None if self.run is None else self.run[rows]
-        return replace(self, **arrays, psi_wb=None, torque_em_nm=None, run=run, kept={})
+        own = {"psi_wb": None, "torque_em_nm": None, "volts_v": None, "kept": {}}
+        return replace(self, **arrays, run=run, **own)
 
     @property
     def i_a(self) -> Complex:

@@ -5,39 +5,34 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.inverter import phase_ripple
+from pipeline.criticism.machine.inverter import AXES, lost_shares
 
 
 def _drop(x: Operating, q: Values) -> Complex:
     if not x.inverter:
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
     before = x.i_a - np.gradient(x.i_a) / x.ts_s * q["lag_s"]
-    turn = x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
-    stationary = before * np.exp(1j * (x.eps_rad - turn))
-    drop = np.zeros(x.omega_rad_s.shape, dtype=complex)
-    swing = q["ripple"] * phase_ripple(x, x.eps_rad - turn) if q["ripple"] else np.zeros(3)
-    for k in range(3):
-        axis = np.exp(2j * np.pi * k / 3)
-        current = (stationary * np.conj(axis)).real
-        # at its rising edge a phase has the least current of its period, at its falling the most
-        edges = np.tanh((current - swing[k]) / q["width_a"])
-        edges = edges + np.tanh((current + swing[k]) / q["width_a"])
-        drop += 0.5 * edges * axis
-    rotor: Complex = drop * (2.0 / 3.0 * q["loss_v"]) * np.exp(-1j * (x.eps_rad - turn))
+    eps = x.eps_rad - x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
+    phases = (before * np.exp(1j * eps) * np.conj(AXES)[:, None]).real
+    if q["ripple"]:
+        shares = lost_shares(x, eps, phases, q["loss_v"], q["width_a"])
+    else:
+        shares = np.tanh(phases / q["width_a"])
+    rotor: Complex = 2.0 / 3.0 * q["loss_v"] * (AXES @ shares) * np.exp(-1j * eps)
     return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a
 
 
 EFFECT = Effect(
     name="dead_time",
-    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, as "
-    "the mean of both edges, which a ripple (1: as pwm_hz, vdc_v and L make it) sets apart; and "
-    "on_v i/i_max in its switches",
+    words="each phase loses V tanh(i/width), in the limit V sign(i), i a lag before the sample, or "
+    "(ripple 1) what the edges of a switching period make of it; and on_v i/i_max in its switches",
     signature="voltage offset at small current, orders 6ε, the same at every speed",
     tests=("torque_map", "drive", "heat_run"),
     experiment="steps of current from a hundredth of rated current up, at low speed",
     headline="voltage lost in the inverter, {loss_v} a phase",
-    reference="Jeong & Park, IEEE Trans. Ind. Electron. 38 (1991), dead-time effect in PWM; Mohan, "
-    "Undeland & Robbins, Power Electronics, 3rd ed. (2003), ch. 2, drop of a switch that is on",
+    reference="Jeong & Park, IEEE Trans. Ind. Electron. 38 (1991), dead-time effect in PWM; Choi & "
+    "Sul, IEEE Trans. Ind. Appl. 32 (1996), zero current clamping; Mohan, Undeland & Robbins, "
+    "Power Electronics, 3rd ed. (2003), ch. 2, drop of a switch that is on",
     parameters=(
         Parameter("loss_v", "V", 0.01, 0.0005, "voltage_v", low=0.0, high=0.5),
         Parameter(
@@ -45,7 +40,15 @@ EFFECT = Effect(
         ),
         # of itself it would be any resistance: it makes no effect large enough to be named
         Parameter("on_v", "V", 0.005, 0.0, "voltage_v", low=0.0, high=0.1, optional=1),
-        Parameter("ripple", "1", 1.0, 0.0, low=0.0, high=2.0, scan=(0.0, 1.0), optional=2),
+        Parameter(
+            "ripple",
+            "1",
+            1.0,
+            0.0,
+            scan=(0.0, 1.0),
+            choice=True,
+            words="1: as pwm_hz, vdc_v and L switch it, 0: by the mean current alone",
+        ),
         Parameter("lag_s", "s", 0.25, 0.0, "period_s", low=-1.0, high=1.0, scan=(0.0,)),
     ),
     signals=("vd_v", "vq_v"),

@@ -1,4 +1,4 @@
-"""What an inverter's switching makes of the phase currents between two samples."""
+"""What dead time takes from the legs of a switching inverter."""
 
 from __future__ import annotations
 
@@ -6,41 +6,111 @@ import numpy as np
 
 from pipeline.criticism.effect import Array, Operating
 
+_OTHERS = ((1, 2), (2, 0), (0, 1))
+_ROUNDS = 3
+"""Times that the legs' edges are worked out from each other's: two legs that switch within one dead
+time hold each other up."""
+_SHARP = 1e-9
+"""Width [A] below which a current's sign is as good as a step."""
+AXES = np.exp(2j * np.pi * np.arange(3) / 3.0)
+"""Directions of the phases a, b, c in the stationary frame."""
 
-def phase_ripple(x: Operating, eps_rad: Array) -> Array:
-    """How far each phase current [3, n, A] is over its mean where its phase switches off, and under
-    it where it switches on; 0 where the switching is not known.
+
+def lost_shares(
+    x: Operating, eps_rad: Array, current_a: Array, loss_v: float, width_a: float
+) -> Array:
+    """What dead time takes from each leg [3, n], of the voltage that it takes from a large current.
 
     Parameters
     ----------
     x : Operating
-        Currents and flux linkage [n] in the rotor frame, `pwm_s` and `vdc_v` of the inverter.
+        Flux linkage and recorded voltage [n] in the rotor frame, `pwm_s` and `vdc_v` of the
+        inverter; without these two the share is tanh(i/width).
     eps_rad : Array
         Electrical angle [n, rad].
+    current_a : Array
+        Phase currents [3, n, A], means over a switching period.
+    loss_v : float
+        Voltage [V] that dead time takes from a large current: V_dc t_d/T.
+    width_a : float
+        Current [A] over which a leg's diodes change over.
 
     Notes
     -----
-    With centred pulses of widths d_k T and zero-sequence injection, d_k = ½ + (v_k − (max v +
-    min v)/2)/V_dc, a phase that is off before its pulse has the voltage −(V_dc/3) Σ s_j, so
+    Pulses are centred. Leg k loses λ of the dead time before its pulse, and keeps 1 − μ of it
+    after. While both of its switches are off, a diode holds it at a rail until its current is
+    zero; then it floats at the mean of the others. With c the part of the dead time in which these
+    are low, and i the current where the dead time begins,
 
-        Δ_k = T/(2 L) [V_dc/3 Σ_j max(d_j − d_k, 0) + v_k (1 − d_k)].
+        λ, μ = clip(c + i/W, 0, 1),  W = 2/3 V_loss T/L,
+        c = ½ Σ_j clip((v_k − v_j)/(2 V_loss) + λ_j or μ_j, 0, 1).
+
+    The share is λ + μ − 1. Up to its edge the current moves from its mean by
+    T/(2L) [V_dc/3 Σ_j max(d_j − d_k − 2 λ_j V_loss/V_dc, 0) + e_k (1 − d_k + V_loss/V_dc)], d the
+    widths of the pulses, e the voltage at the winding; alike at the other edge. So where the ripple
+    exceeds the current nothing is lost, and at little voltage a current rests at zero while its
+    leg's voltage passes through the dead time.
 
     References
     ----------
     Holmes & Lipo, Pulse Width Modulation for Power Converters (2003), ch. 6.
     doi:10.1109/9780470546284
+    Choi & Sul, IEEE Trans. Ind. Appl. 32 (1996), zero current clamping. doi:10.1109/28.502170
 
     """
     inductance = 0.5 * (x.base["ld_h"] + x.base["lq_h"])
-    size = np.shape(x.omega_rad_s)
-    if not (x.pwm_s and x.vdc_v and inductance > 0.0) or x.psi_wb is None:
-        return np.zeros((3, *size))
+    width = max(width_a, _SHARP)
+    known = x.pwm_s and x.vdc_v and inductance > 0.0 and x.psi_wb is not None and loss_v > 0.0
+    if not known:
+        share: Array = np.tanh(current_a / width)
+        return share
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
-    stationary = (x.base["r_ohm"] * x.i_a + induced) * np.exp(1j * eps_rad)
-    axes = np.exp(-2j * np.pi * np.arange(3) / 3.0)
-    volts = (axes[:, None] * stationary).real
-    middle = 0.5 * (volts.max(axis=0) + volts.min(axis=0))
-    width = np.clip(0.5 + (volts - middle) / x.vdc_v, 0.0, 1.0)
-    longer = np.maximum(width[None] - width[:, None], 0.0).sum(axis=1)
-    swing: Array = x.vdc_v / 3.0 * longer + volts * (1.0 - width)
-    return x.pwm_s / (2.0 * inductance) * swing
+    winding = _phases(x.base["r_ohm"] * x.i_a + induced, eps_rad)
+    told = None if x.volts_v is None else _phases(x.volts_v, eps_rad)
+    late = keeps = (current_a > 0.0).astype(float)
+    per_volt = x.pwm_s / (2.0 * inductance)
+    ramp = 4.0 / 3.0 * loss_v * per_volt
+    dead = loss_v / x.vdc_v
+    for _ in range(_ROUNDS):
+        volts = winding + loss_v * (late + keeps - 1.0) if told is None else told
+        middle = 0.5 * (volts.max(axis=0) + volts.min(axis=0))
+        duty = np.clip(0.5 + (volts - middle) / x.vdc_v, 0.0, 1.0)
+        low, before = _beside(volts, loss_v, late, -1.0)
+        rise = current_a - per_volt * (before + winding * (1.0 - duty + dead))
+        low_after, after = _beside(volts, loss_v, 1.0 - keeps, 1.0)
+        fall = current_a + per_volt * (after - winding * (duty + dead))
+        late = _passed(rise + (low - 0.5) * ramp, ramp, width)
+        keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
+    lost: Array = late + keeps - 1.0
+    return lost
+
+
+def _phases(vector: Array, eps_rad: Array) -> Array:
+    """Components [3, n] along the phases of a vector [n] of the rotor frame."""
+    phases: Array = (vector * np.exp(1j * eps_rad) * np.conj(AXES)[:, None]).real
+    return phases
+
+
+def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Array, Array]:
+    """At each leg's edge [3, n]: the part of its dead time in which the others are low, and what
+    these did to its current since the middle of its zero vector [V].
+
+    `late` [3, n] is the part of the dead time by which an edge comes late; `side` −1 at the edges
+    before the pulses, 1 at those after.
+    """
+    low, moved = np.zeros_like(volts), np.zeros_like(volts)
+    for k, others in enumerate(_OTHERS):
+        for j in others:
+            apart = volts[k] - volts[j]
+            behind = late[j] if side < 0.0 else 1.0 - late[j]
+            low[k] += 0.5 * np.clip(apart / (2.0 * loss_v) + behind, 0.0, 1.0)
+            moved[k] += np.maximum(side * apart - 2.0 * loss_v * late[j], 0.0) / 3.0
+    return low, moved
+
+
+def _passed(current_a: Array, ramp_a: float, width_a: float) -> Array:
+    """A ramp from 0 to 1 of a length [A] about zero, smoothed by sech² of a width [A]."""
+    up, down = (np.abs(current_a + part * ramp_a) / width_a for part in (0.5, -0.5))
+    bent = up - down + np.log1p(np.exp(-2.0 * up)) - np.log1p(np.exp(-2.0 * down))
+    passed: Array = 0.5 + 0.5 * width_a / ramp_a * bent
+    return passed

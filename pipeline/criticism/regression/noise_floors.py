@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
-from pipeline.criticism.effect import Array, Effect, Operating, Values
+from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
 from pipeline.criticism.library.equations import equation_of
-from pipeline.criticism.machine.model import Model, evaluate, zero
+from pipeline.criticism.machine.model import Model, evaluate, values_of, zero
 from pipeline.criticism.policy.regression import NoiseFloors
 from pipeline.criticism.residuals.channels import (
     channel_of,
@@ -231,7 +231,37 @@ def reading_error(
         for place, channel in enumerate(segment.channels):
             if channel in ("vd_v", "vq_v"):
                 both[place] = np.hypot(both[place], jumps)
+        if any(effect.drop is not None for effect in model.effects):
+            x = operate(segment, segment.recorded, model, values) if state is None else state
+            steep = steep_drops(model, values, x)
+            for channel, part in (("vd_v", steep.real), ("vq_v", steep.imag)):
+                place = segment.channels.index(channel)
+                both[place] = np.hypot(both[place], np.abs(weak.project(part[None])[0]))
     return both
+
+
+def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
+    """How far the drops of effects are off [n, V], d + jq, where their currents are by a twentieth.
+
+    A drop that jumps with the current, as that of an inverter whose ripple just exceeds it, is
+    off by all of that jump where the current at which it does is off by little. What follows the
+    current itself is a resistance, which a fit knows.
+    """
+    known = dict(values)
+    for effect in model.effects:
+        known = {**zero(effect, model), **known}
+    evaluate(model, x, known)
+    more = 1.0 + model.policy.selection.form_error
+    moved = replace(x, id_a=x.id_a * more, iq_a=x.iq_a * more, kept={})
+    change = np.zeros(x.omega_rad_s.shape, dtype=complex)
+    for effect in model.effects:
+        if effect.drop is not None:
+            q = values_of(effect, model.machine, known)
+            here = effect.drop(x, q)
+            step = effect.drop(moved, q) - here
+            steeper = np.abs(step) - (more - 1.0) * np.abs(here)
+            change = change + np.maximum(steeper, 0.0) * np.exp(1j * np.angle(step))
+    return change
 
 
 def _jumps(segment: Segment, policy: NoiseFloors) -> Array:

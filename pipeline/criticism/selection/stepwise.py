@@ -77,7 +77,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         fit = reconsidered(_backward(chosen, base)).fit
         found = fit.model.effects[base:]
         fit = replace(fit, tolerance=tolerances(fit, found))
-        if found and (found[-1].hook == "sensor" or found[-1].discriminator is not None):
+        if found and (found[-1].hook in ("sensor", "drop") or found[-1].discriminator is not None):
             fit = _floored_anew(fit)
         if tuple(e.name for e in found) in {r.added for r in steps}:
             break
@@ -85,12 +85,12 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
 
 
 def _floored_anew(fit: Fit) -> Fit:
-    """The fit by noise floors made anew, now that an effect of a sensor or a coupling is found.
+    """The fit by noise floors made anew, now that a sensor's effect, a drop or a coupling is in.
 
     If no floor changes by half and nothing is left over them, the fit stays as it is. If a rough
     fit finds another inertia, a fit is begun there as well and the better one stays. Undoing a
-    sensor's lag adds noise, and so does a twist told by an angle. An encoder off its centre drives
-    J to next to nothing, and the floors were computed with that J.
+    sensor's lag adds noise, so does a twist told by an angle, and so do the edges of a dead time.
+    An encoder off its centre drives J to next to nothing, and the floors were made with that J.
     """
     policy = fit.policy.selection
     floor = floors(fit.segments, fit.model, fit.values)
@@ -141,7 +141,8 @@ def _refit_best(
     3. predicted from all other captures, it falls by `held_out_penalties`, even if the forms of
        effects `found` with the same hook are a little wrong (`form_error`);
     4. evidence below the floor does so even if any form found is wrong, and beside an effect of the
-       same hook by `same_hook_penalties`, since what a form leaves there is of that size.
+       same hook by `same_hook_penalties`, since what a form leaves there is of that size;
+    5. so predicted, what it mends is more than what it spoils where it acts.
     """
     policy = wide.policy.selection
     before, shrunk = leave_out(wide), _shrunk(wide)
@@ -165,7 +166,8 @@ def _refit_best(
         one, other = in_common((wide, tried), (before, leave_out(tried)))
         without = predicted_chi2(wide, one) * shrunk
         after = predicted_chi2(tried, other) * _shrunk(tried)
-        if _holds(wide, without, tried, after, promised, doubts):
+        holds = _holds(wide, without, tried, after, promised, doubts)
+        if holds and not _spoils(tried, without, after):
             best, least = tried, cost
     return best
 
@@ -212,8 +214,10 @@ def _sure(system: LinearSystem) -> bool:
 
 
 def _same_hook(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
-    """The found effects of an effect's own kind: flux, drop or drag."""
-    return [one for one in found if one.hook == effect.hook != "sensor"]
+    """The found effects that act where an effect does: fluxes and drops in voltages, or drags."""
+    voltage = ("flux", "drop")
+    acts = voltage if effect.hook in voltage else (effect.hook,)
+    return [one for one in found if one.hook in acts and effect.hook != "sensor"]
 
 
 def _doubt(wide: LinearSystem, found: Sequence[Effect]) -> Array:
@@ -256,6 +260,21 @@ def _holds(
     helps = priors or power_share(wide, same_hook * before, same_hook * after) >= policy.least_share
     quiet = min(quiet_fall(wide, some * before, some * after) for some in (1.0, below))
     return fall > least[0] and (helps or quiet > least[1])
+
+
+def _spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
+    """Whether the newest effect adds more power than it takes, of what other captures predict.
+
+    A deviance is logarithmic: it falls where a small error is halved and a large one doubled. Only
+    groups [G] in which the effect acts count, and of these what changes by more than `least_share`:
+    an error that something else makes moves a little with any refit.
+    """
+    name = f"{tried.fit.model.effects[-1].name}."
+    own = [n for n, column in enumerate(tried.columns) if column.name.startswith(name)]
+    acts = np.bincount(tried.group, np.any(tried.matrix[:, own], axis=1), len(tried.labels)) > 0
+    change = np.maximum(after, 1.0) - np.maximum(before, 1.0)
+    counts = acts & (np.abs(change) > tried.policy.selection.least_share * np.maximum(before, 1.0))
+    return float((tried.counts * change)[counts].sum()) > 0.0
 
 
 def _shrunk(tried: LinearSystem) -> Array:

@@ -123,11 +123,13 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
         nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
         error = zero + angle_error(nearer, model, values)
     turned = error / model.machine.pole_pairs
-    current = current * np.exp(1j * error)
+    ahead = np.exp(1j * error)
+    current = current * ahead
     return replace(
         x,
         id_a=current.real,
         iq_a=current.imag,
+        volts_v=None if x.volts_v is None else x.volts_v * ahead,
         eps_rad=x.eps_rad - error,
         theta_rad=theta - turned,
         omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, theta.size // segment.size),

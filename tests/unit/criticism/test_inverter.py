@@ -1,4 +1,4 @@
-"""Ripple of a switching inverter, against a period that is switched through step by step."""
+"""Dead time of a switching inverter, against periods that are switched through step by step."""
 
 from __future__ import annotations
 
@@ -8,66 +8,126 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.inverter import phase_ripple
+from pipeline.criticism.machine.inverter import AXES, lost_shares
 from pipeline.criticism.machine.model import Model, evaluate
+from pipeline.criticism.regression.noise_floors import steep_drops
 from tests.unit.criticism.machines import BASE, machine, operating
 
-PWM_S, VDC_V, STEPS = 6e-5, 40.0, 200_000
-L_H = 2.5e-4
+PWM_S, VDC_V, LOSS_V, L_H = 6e-5, 40.0, 0.5, 2.5e-4
+TEXTBOOK_V = 4.0 / np.pi * LOSS_V
+STEPS, ROUNDS = 1600, 40
 
 
-def switched(n=12):
-    """Operating points below the voltage limit, of a machine without saliency."""
-    x = operating(n)
-    x.omega_rad_s = x.omega_rad_s * 0.7
+def point(i_d, i_q, speed, angles=12):
+    """A machine without saliency at one current and speed, at angles over a turn."""
+    x = operating(angles)
+    x.omega_rad_s = np.full(angles, float(speed))
+    x.eps_rad = np.linspace(0.0, 2.0 * np.pi, angles, endpoint=False)
+    x.id_a, x.iq_a = np.full(angles, float(i_d)), np.full(angles, float(i_q))
     x = replace(x, base={**BASE, "ld_h": L_H, "lq_h": L_H}, pwm_s=PWM_S, vdc_v=VDC_V)
     evaluate(Model(machine(), ()), x, x.base)
     return x
 
 
-def phase_volts(x):
-    stationary = (BASE["r_ohm"] * x.i_a + 7j * x.omega_rad_s * x.flux_wb) * np.exp(1j * x.eps_rad)
-    return np.array([(stationary * np.exp(-2j * np.pi * k / 3)).real for k in range(3)])
+def phases(x, vector):
+    return (vector * np.exp(1j * x.eps_rad) * np.conj(AXES)[:, None]).real
 
 
-def test_the_ripple_at_the_edges_is_that_of_a_period_switched_through():
-    x = switched()
-    volts, ripple = phase_volts(x), phase_ripple(x, x.eps_rad)
-    at = (np.arange(STEPS) + 0.5) / STEPS - 0.5
-    for n in range(x.eps_rad.size):
-        mine = volts[:, n]
-        duty = 0.5 + (mine - 0.5 * (mine.max() + mine.min())) / VDC_V
-        assert 0.0 < duty.min() < duty.max() < 1.0
-        on = np.abs(at)[None] < 0.5 * duty[:, None]
-        line = VDC_V * (on - on.mean(axis=0))
-        assert line.mean(axis=1) == pytest.approx(mine, abs=2e-3)
-        over = np.cumsum(line - mine[:, None], axis=1) * PWM_S / STEPS / L_H
+def rotor(x, legs):
+    return 2.0 / 3.0 * (AXES @ legs) * np.exp(-1j * x.eps_rad)
+
+
+def switched(told, winding, begin):
+    """One period: lost volts of each leg, means of the currents and their ends [3, n].
+
+    Two switches a leg, each on a dead time late; diodes conduct while both are off and there is
+    current, else the leg floats.
+    """
+    dead = LOSS_V / VDC_V
+    middle = 0.5 * (told.max(axis=0) + told.min(axis=0))
+    duty = 0.5 + (told - middle) / VDC_V
+    current, lost, mean = begin.copy(), np.zeros_like(begin), np.zeros_like(begin)
+    for at in (np.arange(STEPS) + 0.5) / STEPS - 0.5:
+        upper = (at >= -0.5 * duty + dead) & (at < 0.5 * duty)
+        off = ~upper & ~((at < -0.5 * duty) | (at >= 0.5 * duty + dead))
+        leg = np.where(upper, 1.0, np.where(off & (current < 0.0), 1.0, 0.0))
+        floats = off & (current == 0.0)
         for k in range(3):
-            rise, fall = np.flatnonzero(np.diff(on[k].astype(int)))
-            assert over[k, fall] == pytest.approx(ripple[k, n], abs=2e-3 * PWM_S * VDC_V / L_H)
-            assert over[k, rise] == pytest.approx(-ripple[k, n], abs=2e-3 * PWM_S * VDC_V / L_H)
+            others = leg.sum(axis=0) - leg[k]
+            level = np.clip(0.5 * others + 1.5 * winding[k] / VDC_V, 0.0, 1.0)
+            leg[k] = np.where(floats[k], level, leg[k])
+        lost += VDC_V / STEPS * ((abs(at) < 0.5 * duty) - leg)
+        step = (VDC_V * (leg - leg.mean(axis=0)) - winding) * PWM_S / STEPS / L_H
+        after = np.where(off & (current * (current + step) < 0.0), 0.0, current + step)
+        mean += 0.5 * (current + after) / STEPS
+        current = after
+    return lost, mean, current
 
 
-def test_without_switching_there_is_no_ripple():
-    x = switched()
-    for unknown in (replace(x, pwm_s=0.0), replace(x, vdc_v=0.0)):
-        assert not phase_ripple(unknown, x.eps_rad).any()
+def settled(x):
+    """Voltage that is asked for [n], and what is lost of it [n], with the currents of `x`."""
+    winding = phases(x, BASE["r_ohm"] * x.i_a + 7j * x.omega_rad_s * x.flux_wb)
+    wanted = phases(x, x.i_a)
+    told, begin = winding + LOSS_V * np.sign(wanted), wanted.copy()
+    for _ in range(ROUNDS):
+        lost, mean, end = switched(told, winding, begin)
+        drift = end - begin
+        told = told - 0.3 * (drift - drift.mean(axis=0)) * L_H / PWM_S
+        begin = begin - 0.5 * (mean - wanted)
+    return rotor(x, told), rotor(x, lost)
+
+
+def lost_by(x, width=1e-4):
+    shares = lost_shares(x, x.eps_rad, phases(x, x.i_a), LOSS_V, width)
+    return rotor(x, LOSS_V * shares)
+
+
+@pytest.mark.parametrize(
+    ("i_d", "i_q", "speed"),
+    [(0.0, 0.4, 8.0), (0.0, 0.2, 80.0), (-3.0, 0.2, 80.0), (0.0, 3.0, 60.0)],
+)
+def test_what_is_lost_is_what_a_period_switched_through_loses(i_d, i_q, speed):
+    x = point(i_d, i_q, speed)
+    told, lost = settled(x)
+    found = lost_by(replace(x, volts_v=told))
+    assert np.abs(found.mean() - lost.mean()) < 0.1 * TEXTBOOK_V
+    assert np.sqrt((np.abs(found - lost) ** 2).mean()) < 0.15 * TEXTBOOK_V
 
 
 def test_dead_time_fades_where_the_ripple_exceeds_the_current():
     """Both edges of a period then meet another sign of the current."""
-    x = switched(40)
-    dead = effects()["dead_time"].drop
-    of = {"loss_v": 0.2, "width_a": 1e-6, "lag_s": 0.0, "on_v": 0.0, "ripple": 1.0}
-    swing = np.abs(phase_ripple(x, x.eps_rad)).min(axis=0)
-    assert swing.max() > 0.1
-    size = np.abs(x.i_a)
-    slow = replace(x, id_a=x.id_a * 0.1 * swing / size, iq_a=x.iq_a * 0.1 * swing / size)
-    slow.psi_wb = x.psi_wb
-    assert np.abs(dead(slow, {**of, "ripple": 0.0})).min() > 0.2
-    faded = np.abs(dead(slow, of))
-    assert np.median(faded) < 1e-9
-    large = replace(x, id_a=1e3 * x.id_a, iq_a=1e3 * x.iq_a)
-    large.psi_wb = x.psi_wb
-    still = replace(large, pwm_s=0.0)
-    assert dead(large, of)[size > 4.0] == pytest.approx(dead(still, of)[size > 4.0], abs=0.1)
+    slow, fast, large = point(0.0, 0.2, 4.0), point(0.0, 0.2, 200.0), point(0.0, 40.0, 200.0)
+    assert lost_by(slow).imag.mean() > 0.85 * TEXTBOOK_V
+    assert abs(lost_by(fast).mean()) < 0.05 * TEXTBOOK_V
+    assert lost_by(large).imag.mean() == pytest.approx(TEXTBOOK_V, rel=0.03)
+
+
+def test_at_little_voltage_a_resting_current_loses_what_is_told():
+    """A leg without current passes through the dead time: its voltage moves, nothing else."""
+    x = point(0.0, 0.0, 0.0)
+    shift = 0.3 * LOSS_V * np.exp(1j * (np.pi / 6.0 - x.eps_rad))
+    lost = lost_by(replace(x, volts_v=shift), width=1e-6)
+    assert lost == pytest.approx(shift, abs=0.05 * LOSS_V)
+
+
+def test_without_switching_the_current_alone_decides():
+    x = point(1.0, 2.0, 50.0)
+    plain = np.tanh(phases(x, x.i_a) / 0.3)
+    for unknown in (replace(x, pwm_s=0.0), replace(x, vdc_v=0.0)):
+        assert lost_shares(unknown, x.eps_rad, phases(x, x.i_a), 0.2, 0.3) == pytest.approx(plain)
+
+
+def test_where_a_drop_jumps_with_the_current_its_floor_is_that_jump():
+    """A twentieth of the current decides of much of the loss there, and of nothing elsewhere."""
+    model = Model(machine(), (effects()["dead_time"],))
+    of = {"loss_v": LOSS_V, "width_a": 1e-3, "on_v": 0.0, "ripple": 1.0, "lag_s": 0.0}
+    values = {**BASE, "ld_h": L_H, "lq_h": L_H}
+    values |= {f"dead_time.{name}": value for name, value in of.items()}
+
+    def jump(i_q, speed):
+        return np.abs(steep_drops(model, values, point(0.0, i_q, speed))).mean()
+
+    speeds = np.linspace(10.0, 150.0, 15)
+    at_half = min(speeds, key=lambda w: abs(lost_by(point(0.0, 0.2, w)).imag.mean() - 0.6 * LOSS_V))
+    assert jump(0.2, at_half) > 0.05 * LOSS_V
+    assert jump(4.0, 10.0) < 0.01 * LOSS_V
