@@ -210,8 +210,8 @@ class Operating:
         """Some of the samples, for hooks that ask for nothing before or after a sample."""
         arrays = {name: getattr(self, name)[rows] for name in SAMPLED}
         run = None if self.run is None else self.run[rows]
-        own = {"psi_wb": None, "torque_em_nm": None, "volts_v": None, "kept": {}}
-        return replace(self, **arrays, run=run, **own)
+        moved = replace(self, **arrays, run=run, kept={})
+        return replace(moved, psi_wb=None, torque_em_nm=None, volts_v=None)
 
     @property
     def i_a(self) -> Complex:

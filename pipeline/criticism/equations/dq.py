@@ -94,7 +94,8 @@ def state(
     motion = motion_of(segment, signals, model.machine)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
-    volts = (signals["vd_v"] + 1j * signals["vq_v"]) / (1.0 + values[segment.meter])
+    volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
+    volts = volts / (1.0 + values[segment.meter])
     return at_true_angle(segment, replace(x, inverter=True, volts_v=volts), model, values)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Operating
+from pipeline.criticism.effect import Array, Complex, Operating
 
 _OTHERS = ((1, 2), (2, 0), (0, 1))
 _ROUNDS = 3
@@ -85,7 +85,7 @@ def lost_shares(
     return lost
 
 
-def _phases(vector: Array, eps_rad: Array) -> Array:
+def _phases(vector: Complex, eps_rad: Array) -> Array:
     """Components [3, n] along the phases of a vector [n] of the rotor frame."""
     phases: Array = (vector * np.exp(1j * eps_rad) * np.conj(AXES)[:, None]).real
     return phases

@@ -234,9 +234,9 @@ def reading_error(
         if any(effect.drop is not None for effect in model.effects):
             x = operate(segment, segment.recorded, model, values) if state is None else state
             steep = steep_drops(model, values, x)
-            for channel, part in (("vd_v", steep.real), ("vq_v", steep.imag)):
+            for channel, axis in (("vd_v", steep.real), ("vq_v", steep.imag)):
                 place = segment.channels.index(channel)
-                both[place] = np.hypot(both[place], np.abs(weak.project(part[None])[0]))
+                both[place] = np.hypot(both[place], np.abs(weak.project(axis[None])[0]))
     return both
 
 
