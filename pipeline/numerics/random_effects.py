@@ -24,11 +24,6 @@ class Between(NamedTuple):
     p_value: float
     sd: float
 
-    @property
-    def birge(self) -> float:
-        """Birge ratio sqrt(chi2 / dof), 1 where the stated uncertainties are right."""
-        return float(np.sqrt(self.chi2 / self.dof)) if self.dof else 1.0
-
 
 def between(values: Array, covariance: Array, covariance_dof: float = np.inf) -> Between:
     """Whether values of one quantity agree, and what they scatter beyond their covariance.

@@ -38,7 +38,6 @@ from pipeline.io.recordings.datasheet_page import sheet_markdown
 from pipeline.io.recordings.error_map import send_frame, send_map
 from pipeline.io.recordings.seal import write_sealed
 from pipeline.io.recordings.stream import (
-    digest,
     recording,
     send_axis_ends,
     send_bars,
@@ -108,11 +107,6 @@ def recording_bytes(
 def identity(capture: Capture, datasheet: Datasheet | None) -> tuple[str, str, str]:
     """What makes the id of a recording: the same work, the same id."""
     return capture.path, capture.sha256, "" if datasheet is None else datasheet.version
-
-
-def recording_id(capture: Capture, datasheet: Datasheet | None) -> str:
-    """The id of a capture's recording."""
-    return digest(identity(capture, datasheet))
 
 
 def has_lanes(capture: Capture) -> tuple[str, ...]:

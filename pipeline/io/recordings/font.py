@@ -35,9 +35,3 @@ _OTHER = re.compile("[^\n\t" + "".join(f"{chr(a)}-{chr(b)}" for a, b in RANGES) 
 def drawable(text: str) -> str:
     """The text with every character that the viewer cannot draw as its code point, ‹1F600›."""
     return _OTHER.sub(lambda found: f"‹{ord(found.group()):X}›", text)
-
-
-def can_draw(char: str) -> bool:
-    """Whether the viewer's font has a character; line breaks and tabs are layout."""
-    code = ord(char)
-    return char in "\n\t" or char in SINGLE or any(a <= code <= b for a, b in RANGES)

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.io.recordings.capture import recording_id, write_recording
+from pipeline.io.recordings.capture import identity, write_recording
 from pipeline.io.recordings.capture_traces import (
     LONG_ROWS,
     TABLE_ROWS,
@@ -20,6 +20,7 @@ from pipeline.io.recordings.capture_views import further_views, loupe_views, mai
 from pipeline.io.recordings.datasheet_page import sheet_markdown
 from pipeline.io.recordings.readback import entities
 from pipeline.io.recordings.seal import seal_of, verify
+from pipeline.io.recordings.stream import digest
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.datasheet import Check, Datasheet
 from pipeline.records.errors import MachineError
@@ -203,7 +204,7 @@ def test_equal_work_has_an_equal_id_and_equal_content(recording: Path, tmp_path:
     again = tmp_path / "again.rrd"
     write_recording(capture, make_evidence(capture), again, make_sheet(), FINDINGS)
     ids = [RrdReader(str(p)).recordings()[0].recording_id for p in (recording, again)]
-    assert ids == [recording_id(capture, make_sheet())] * 2
+    assert ids == [digest(identity(capture, make_sheet()))] * 2
     for entity in ("/measured", "/model/step/0_0", "/findings"):
         assert read_back(recording, entity).equals(read_back(again, entity), null_equal=True)
 

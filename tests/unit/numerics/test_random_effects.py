@@ -44,7 +44,6 @@ def test_what_two_values_share_cancels_in_their_difference() -> None:
     assert apart[0].chi2 == pytest.approx(50.0)
     assert apart[1].chi2 == pytest.approx(50.0, rel=1e-6)
     assert apart[1].sd == pytest.approx(np.sqrt(0.5 - 0.01), rel=1e-6)
-    assert apart[1].birge == pytest.approx(np.sqrt(50.0), rel=1e-6)
 
 
 def test_a_covariance_known_from_little_data_judges_mildly() -> None:
