@@ -17,7 +17,7 @@ from pipeline.criticism.regression.goodness import leave_out, remainder
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.selection.drift import drifting_segments
-from pipeline.criticism.selection.requested_model import Begun
+from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.criticism.validation.error_maps import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -64,14 +64,14 @@ def model_verdict(
     twice the floor's, and the size is one that somebody would act on.
 
     """
-    begun = base_fit(campaign, model, start)
-    if isinstance(begun, str):
-        return _stated(model, ModelVerdict("insufficient", note=begun)), None
-    if not search and _surely_missing(begun):
-        return _stated(model, replace(_residuals(begun), verdict="missing")), None
-    found, kept = searched(campaign, model, begun)
+    base = base_fit(campaign, model, start)
+    if isinstance(base, str):
+        return _stated(model, ModelVerdict("insufficient", note=base)), None
+    if not search and _surely_missing(base):
+        return _stated(model, replace(_residuals(base), verdict="missing")), None
+    found, kept = searched(campaign, model, base)
     # instruments that drift count as noise where the verdict says that nothing else is left
-    tested = _residuals(begun if found.verdict in ("missing", "unknown") else kept)
+    tested = _residuals(base if found.verdict in ("missing", "unknown") else kept)
     return _stated(model, _named(tested, found)), found
 
 
@@ -79,20 +79,20 @@ def _stated(model: ModelSpec, found: ModelVerdict) -> ModelVerdict:
     return replace(found, model=model.name, effects=model.effects)
 
 
-def _surely_missing(begun: Begun) -> bool:
-    large = remainder(begun.system, large=True)
-    return bool(large) and drifting_segments(begun.system.fit, large) is None
+def _surely_missing(base: BaseFit) -> bool:
+    large = remainder(base.system, large=True)
+    return bool(large) and drifting_segments(base.system.fit, large) is None
 
 
 def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
     """The residuals of a model with what a diagnosis of it says."""
-    told = {one.effect: one for one in found.ranking}
+    ranked = {one.effect: one for one in found.ranking}
     missing = {
         name: FoundEffect(
-            told[name].parameters,
-            told[name].headline,
-            told[name].confused_with,
-            told[name].experiment,
+            ranked[name].parameters,
+            ranked[name].headline,
+            ranked[name].confused_with,
+            ranked[name].experiment,
         )
         for name in found.missing
     }
@@ -109,9 +109,9 @@ def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
     )
 
 
-def _residuals(begun: Begun) -> ModelVerdict:
+def _residuals(base: BaseFit) -> ModelVerdict:
     """What a fit leaves; the verdict is the caller's."""
-    system = begun.system
+    system = base.system
     left = remainder(system)
     worst = None
     if left:

@@ -56,8 +56,8 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     names = tuple(effect.name for effect in asked.effects)
     if not found:
         return _nothing(campaign, model, names, _IDLE)
-    begun = fit_of(found, asked)
-    system = linear_system(trimmed(begun.system, names).fit)
+    base = fit_of(found, asked)
+    system = linear_system(trimmed(base.system, names).fit)
     held = leave_out(system)
     simulated = simulate(system, held)
     maps = all_maps(system, held.or_fit(system))
@@ -75,7 +75,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
             *unused(campaign, system.segments),
             *at_ambient(system.segments, system.fit.model),
             *against_stated(system, held),
-            *hum_notes(begun.hum),
+            *hum_notes(base.hum),
             *held.notes,
         ),
         maps,
@@ -116,8 +116,8 @@ def _bare(
     if names == {effect.name for effect in whole.fit.model.effects}:
         return None
     gone = [e.name for e in whole.fit.model.effects if e.name not in names]
-    begun = replace(whole.fit.without(*gone), model=without, tolerance=())
-    system = linear_system(gauss_newton(begun).fit)
+    base = replace(whole.fit.without(*gone), model=without, tolerance=())
+    system = linear_system(gauss_newton(base).fit)
     held = leave_out(system)
     moved = _moves(reported_parameters(system, held), after)
     less, full = in_common((system, whole), (held, whole_held))

@@ -28,10 +28,10 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.search import End, Ladder, ended
-from pipeline.criticism.selection.alternatives import experiment_for, remedies, rivals_of
+from pipeline.criticism.search import Ladder, SearchResult, search_ladder
+from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
-from pipeline.criticism.selection.requested_model import Begun, fit_of
+from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
 from pipeline.criticism.validation.signature import signature
@@ -68,13 +68,13 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 
     Reads recorded signals, tests and nameplate numbers; `start` gives pole pairs and sizes.
     """
-    begun = base_fit(campaign, model, start)
-    if isinstance(begun, str):
-        return _insufficient(campaign, model, effects(model.effects_path), begun)
-    return searched(campaign, model, begun)[0]
+    base = base_fit(campaign, model, start)
+    if isinstance(base, str):
+        return _insufficient(campaign, model, effects(model.effects_path), base)
+    return searched(campaign, model, base)[0]
 
 
-def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> Begun | str:
+def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit | str:
     """The model fitted to a motor's captures, or why it cannot be."""
     machine = machine_of(campaign, start)
     if machine is None:
@@ -83,11 +83,11 @@ def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> Begun | 
     return fit_of(found, model_of(model, machine)) if _enough(found) else TOO_LITTLE
 
 
-def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagnosis, Begun]:
+def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagnosis, BaseFit]:
     """The diagnosis from a model fitted, and the fit that its first step stands on."""
-    library, machine = effects(model.effects_path), begun.system.fit.machine
+    library, machine = effects(model.effects_path), base.system.fit.machine
     name = f"{file_stem(campaign.motor_id)}_unknown"
-    end = ended(campaign, model, machine, begun, library, name)
+    end = search_ladder(campaign, model, machine, base, library, name)
     ladder, last = end.ladder, end.ladder.steps[-1].system
     found = last.segments
     offered = candidates(library, last.fit.model)
@@ -96,7 +96,7 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
     verdict = _verdict_of(end, unseen)
     together = reported_combinations(last, ladder.held[-1])
     stateless = verdict == "unknown" and end.sketch is None
-    told = Diagnosis(
+    diagnosis = Diagnosis(
         campaign.motor_id,
         model.name,
         verdict,
@@ -104,12 +104,12 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
         ranking,
         _records(ladder.steps, ladder.held),
         end.sketch if verdict == "unknown" else None,
-        _as_told(last, end.left),
+        _as_reported(last, end.left),
         (
             *unused(campaign, found),
             *at_ambient(found, last.fit.model),
             *against_stated(last, ladder.held[-1]),
-            *hum_notes(ladder.begun.hum),
+            *hum_notes(ladder.base.hum),
             *end.notes,
             *_together(together, ladder.steps[-1].added),
             *(note for note in ladder.cut.values() if note),
@@ -121,17 +121,19 @@ def searched(campaign: Campaign, model: ModelSpec, begun: Begun) -> tuple[Diagno
         together,
         policy_digest(last.policy),
     )
-    return told, ladder.begun
+    return diagnosis, ladder.base
 
 
 def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[LadderRung, ...]:
     """The steps for people, each with the signature of what came with it."""
-    told = [step_record(step, one) for step, one in zip(steps, held, strict=True)]
+    records = [step_record(step, one) for step, one in zip(steps, held, strict=True)]
     signatures = [
-        signature((steps[n - 1], steps[n]), (told[n - 1], told[n])) for n in range(1, len(told))
+        signature((steps[n - 1], steps[n]), (records[n - 1], records[n]))
+        for n in range(1, len(records))
     ]
     return tuple(
-        replace(one, signature=shown) for one, shown in zip(told, [None, *signatures], strict=True)
+        replace(one, signature=shown)
+        for one, shown in zip(records, [None, *signatures], strict=True)
     )
 
 
@@ -145,7 +147,7 @@ def _together(known: Sequence[KnownCombination], added: Sequence[str]) -> tuple[
     )
 
 
-def _as_told(system: LinearSystem, left: Sequence[Remainder]) -> tuple[Remainder, ...]:
+def _as_reported(system: LinearSystem, left: Sequence[Remainder]) -> tuple[Remainder, ...]:
     """All that is over its floor, first what is `left`, then what is too small to matter, with
     signals as outputs name them.
     """
@@ -155,8 +157,8 @@ def _as_told(system: LinearSystem, left: Sequence[Remainder]) -> tuple[Remainder
         for channel in s.channels
     }
     small = [one for one in over_floor(system) if one not in left]
-    told = (*left, *(replace(one, matters=False) for one in small))
-    return tuple(replace(one, signal=names[one.capture, one.signal]) for one in told)
+    reported = (*left, *(replace(one, matters=False) for one in small))
+    return tuple(replace(one, signal=names[one.capture, one.signal]) for one in reported)
 
 
 def _enough(found: Sequence[Segment]) -> bool:
@@ -187,7 +189,7 @@ def _insufficient(
     )
 
 
-def _verdict_of(end: End, unseen: Sequence[Unexcited]) -> Verdict:
+def _verdict_of(end: SearchResult, unseen: Sequence[Unexcited]) -> Verdict:
     """What the end of the ladder says of the model; `unseen` are effects that nothing shows."""
     if end.left and not end.ladder.explains(end.left):
         return "unknown"
@@ -214,10 +216,10 @@ def _found(
     """An effect that the ladder found: its evidence, its alternatives and what would part them."""
     steps, wide = ladder.steps, ladder.steps[-1].system
     over = _passed_over(steps, effect.name, steps[-1].added)
-    confused = rivals_of(effect.name, wide, offered, over)
+    confused = alternatives_to(effect.name, wide, offered, over)
     dof = effect.dof(wide.fit.machine)
     loss = _loss(wide, effect, dof)
-    told = _parameters(steps[-1], effect, ladder.held[-1])
+    parameters = _parameters(steps[-1], effect, ladder.held[-1])
     return RankedEffect(
         effect.name,
         loss - dof * math.log(wide.size),
@@ -226,9 +228,9 @@ def _found(
         confused,
         f"{effect.words}; {effect.signature}",
         experiment_for(effect, confused, library),
-        told,
+        parameters,
         separations(effect, wide, offered, remedies(effect, confused, library)),
-        headline=headline(effect, told),
+        headline=headline(effect, parameters),
     )
 
 
@@ -291,5 +293,7 @@ def _p_value(fall: float, dof: int) -> float:
 
 
 def _parameters(step: LadderStep, effect: Effect, held: HeldOut) -> dict[str, ToldParameter]:
-    told, start = parameters_of(step, held), f"{effect.name}."
-    return {name.removeprefix(start): one for name, one in told.items() if name.startswith(start)}
+    reported, start = parameters_of(step, held), f"{effect.name}."
+    return {
+        name.removeprefix(start): one for name, one in reported.items() if name.startswith(start)
+    }

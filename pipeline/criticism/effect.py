@@ -185,10 +185,10 @@ class Operating:
     def shaft_waves(self, order: int) -> tuple[Array, Array]:
         """Cosine and sine of `order` times the shaft angle [n], as a sample's torque has them.
 
-        A free shaft's torque is told by the second difference of its angle, which is a mean under a
-        triangle of two samples: sinc² of the half turn of the wave in one. Of a coasting shaft that
-        mean is taken over `finer` points a sample, and each has the mean of its own part: a wave
-        that turns many times from point to point would beat with them.
+        A free shaft's torque is given by the second difference of its angle, which is a mean under
+        a triangle of two samples: sinc² of the half turn of the wave in one. Of a coasting shaft
+        that mean is taken over `finer` points a sample, and each has the mean of its own part: a
+        wave that turns many times from point to point would beat with them.
         """
         name = ("shaft", order, self.held)
         waves: tuple[Array, Array] = self.once(self.theta_rad, name, lambda: self._turned(order))

@@ -122,7 +122,7 @@ class Equation:
     state : callable (segment, signals, model, values) -> Operating
         True currents, angle and speed [n], the errors of the sensors taken out.
     measured : callable (segment, signals, model, values) -> array [C, n]
-        What the sensors recorded, as the prediction is told.
+        What the sensors recorded, in the units of the prediction.
     predicted : callable (segment, x, pieces, model, values) -> array [C, n]
         What they should have recorded, from flux, drop and drag at the true state.
     observes : Observes

@@ -41,9 +41,9 @@ def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
 
 def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ToldParameter]:
     """Value, standard uncertainty and unit of every effect's parameters on a step."""
-    told = reported_parameters(step.system, held)
+    reported = reported_parameters(step.system, held)
     own = step.fit.model.parameters()
-    return {name: (told[name].value, told[name].u, told[name].unit) for name in own}
+    return {name: (reported[name].value, reported[name].u, reported[name].unit) for name in own}
 
 
 def _rms(values: np.ndarray) -> float:

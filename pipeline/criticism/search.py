@@ -1,7 +1,7 @@
 """The ladder of one campaign: by what its equations look at, and by what its instruments do.
 
-An order that no equation looks at, or an instrument that wanders, is left over whatever is added;
-so the ladder is climbed once more where either is found, and the end that is told is the last.
+An order that no equation looks at, or an instrument that drifts, is left over whatever is added;
+so the ladder is searched once more where either is found, and the end that is reported is the last.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.order_scan import orders_left
-from pipeline.criticism.selection.requested_model import Begun, fit_of
+from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.stepwise import LadderStep, search
 from pipeline.criticism.selection.truncation import contradiction, explained, truncated
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
 
-_DRIFT = "instruments wander slowly, by some {:g} times their noise at most: taken as noise"
+_DRIFT = "instruments drift slowly, by some {:g} times their noise at most: taken as noise"
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
@@ -39,7 +39,7 @@ class Ladder:
     where captures speak against it, with none where it would be a guess.
     """
 
-    begun: Begun
+    base: BaseFit
     steps: tuple[LadderStep, ...]
     held: list[HeldOut]
     left: tuple[Remainder, ...]
@@ -53,7 +53,7 @@ class Ladder:
         """What is left and large for the machine as a whole.
 
         What matters only beside the little voltage that there is at standstill may be an
-        instrument's wander as well as the machine: it is told where some state of the machine
+        instrument's drift as well as the machine: it is reported where some state of the machine
         predicts it.
         """
         system = self.steps[-1].system
@@ -62,8 +62,8 @@ class Ladder:
 
 
 @dataclass(frozen=True, slots=True)
-class End:
-    """The last ladder, what it leaves that is told, the sketch of that, and notes on both."""
+class SearchResult:
+    """The last ladder, what it leaves that is reported, the sketch of that, and notes on both."""
 
     ladder: Ladder
     left: tuple[Remainder, ...]
@@ -71,22 +71,23 @@ class End:
     notes: tuple[str, ...]
 
 
-def ended(
+def search_ladder(
     campaign: Campaign,
     model: ModelSpec,
     machine: Machine,
-    begun: Begun,
+    base: BaseFit,
     library: Mapping[str, Effect],
     name: str,
-) -> End:
-    """Climbs, once more with instruments that wander where no state of the machine predicts what is
-    left, and sketches what nothing explains as an effect of some `name`; `begun` is the fit of the
-    model to the campaign's segments.
+) -> SearchResult:
+    """Searches the ladder, once more with instruments that drift where no state of the machine
+    predicts what is left, and sketches what nothing explains as an effect of some `name`.
+
+    `base` is the fit of the model to the campaign's segments.
     """
 
     def search_again(*orders: float) -> Ladder:
         if not orders:
-            return ladder_from(begun, library)
+            return ladder_from(base, library)
         wider = replace(machine, load_orders=orders)
         return ladder_from(fit_of(segments(campaign, wider), model_of(model, wider)), library)
 
@@ -102,7 +103,7 @@ def ended(
         sketch, _ = _sketched(ladder, left, name, in_parts=True)
         left = left if sketch else ladder.large()
         notes += [_WITHIN] if sketch else []
-    return End(ladder, left, sketch, tuple(notes))
+    return SearchResult(ladder, left, sketch, tuple(notes))
 
 
 def _by_orders(
@@ -129,18 +130,18 @@ def _by_orders(
 
 
 def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
-    """The ladder of instruments that wander; None where nothing large is left, or none does."""
+    """The ladder of instruments that drift; None where nothing large is left, or none does."""
     large = ladder.large()
     if ladder.explains(large):
         return None
     drifting = drifting_segments(ladder.steps[-1].fit, large)
     if drifting is None:
         return None
-    start = replace(ladder.begun.system.fit, segments=drifting)
-    return ladder_from(Begun(gauss_newton(start), ladder.begun.hum), library)
+    start = replace(ladder.base.system.fit, segments=drifting)
+    return ladder_from(BaseFit(gauss_newton(start), ladder.base.hum), library)
 
 
-def ladder_from(start: Begun, library: Mapping[str, Effect]) -> Ladder:
+def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     """The ladder from a model fitted, as far as it is trusted."""
     steps = search(start.system.fit, library)
     alone = [leave_out(step.system) for step in steps]

@@ -20,9 +20,9 @@ ARITHMETIC = {
     "discovery/matching_pursuit.py": {"_RIDGE"},  # against rounding
     "discovery/residual_inputs.py": {"_WIDE"},  # no bound
     "regression/bounds.py": {"_AT"},  # rounding
+    "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
     "regression/identifiability.py": {"_EDGE"},  # rounding
-    "regression/linear_system.py": {"_SEED"},
     "regression/linearise.py": {"_CHUNK", "_NOTHING", "_FINE"},  # the cache; rounding; differences
     "regression/mains_hum.py": {"LINES_HZ", "_BESIDE", "_LOBE", "_FINER"},  # mains; Hann's window
     "regression/normal_equations.py": {"_TIE"},  # rounding

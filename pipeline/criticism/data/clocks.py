@@ -83,8 +83,8 @@ def sampled_unevenly(time: Array, number: NDArray[np.int64], columns: Iterable[A
     from the cubic through the two before and the two after.
 
     """
-    told = [_roughness(c, number.astype(float)) / _roughness(c, time) for c in columns]
-    clearest = max(told, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)
+    ratios = [_roughness(c, number.astype(float)) / _roughness(c, time) for c in columns]
+    clearest = max(ratios, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)
     return clearest > _SURELY
 
 

@@ -19,7 +19,7 @@ rows each of a log of some thousand holds."""
 _SECTORS = 24
 """Parts of a turn that are held out one by one, and the fewest cells that a table may have."""
 _FEW = 4
-"""Rows that a cell must have for their scatter about a line to be told."""
+"""Rows that a cell must have for their scatter about a line to be reported."""
 _ENOUGH = 0.5
 """Share of the cells that must have them: the few where a pass turns round, and the rotor stays,
 scatter otherwise than the rest."""

@@ -46,9 +46,9 @@ def q_log(capture: Capture, machine: Machine) -> QLog | None:
     shaft_angle(found, period, machine)
     if speed is not None:
         found["omega_mech_rad_s"] = speed
-    told = prepared(found, period)
+    sensors = prepared(found, period)
     angle = any("theta" in name for name in moving)
-    return QLog(period, found, keep, told, speed is not None, angle)
+    return QLog(period, found, keep, sensors, speed is not None, angle)
 
 
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:

@@ -45,7 +45,7 @@ class Segment:
     there is no other capture to predict it from; `offsets` [K, n] are offsets of the channel, of
     their prior size, that the capture may have; `runs_rad` the angles turned between reversals, of
     which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak samples of the
-    mains lines, and of the wander of sensors, that there may be; `whole` are the columns of a drive
+    mains lines, and of the drift of sensors, that there may be; `whole` are the columns of a drive
     log before it was thinned, with `good`, the samples that were recorded well; `steps` the
     resolution of columns whose rounding error follows the signal; `log` what an instrument may be
     late with, at all samples, where the others were thinned.
@@ -141,12 +141,12 @@ def row_index(
     orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
     windows = segment.size if weak is None else weak.starts.size
     valid = np.ones((windows, 1), dtype=bool) if weak is None else weak.valid
-    told = [int(k) if k == int(k) else k for k in orders.tolist()]
-    distinct = sorted(set(told))
+    numbers = [int(k) if k == int(k) else k for k in orders.tolist()]
+    distinct = sorted(set(numbers))
     groups = tuple((c, k) for c in segment.channels for k in distinct)
     number = {group: n for n, group in enumerate(groups)}
     shape = (len(segment.channels), windows, orders.size)
-    table = np.array([[number[(c, k)] for k in told] for c in segment.channels])
+    table = np.array([[number[(c, k)] for k in numbers] for c in segment.channels])
     group = np.broadcast_to(table[:, None, :], shape)
     window = np.broadcast_to(np.arange(windows)[None, :, None], shape)
     return group, window, np.broadcast_to(valid[None], shape), groups

@@ -61,7 +61,7 @@ def separations(
     themselves declare, is reported without a power.
     """
     policy = wide.policy.design
-    told: list[Separation] = []
+    separations_found: list[Separation] = []
     for other, remedy in remedies.items():
         columns = _nearest(effect, other, wide, offered)
         if columns is None:
@@ -79,10 +79,10 @@ def separations(
         better = [(power, words) for power, words in ranked if power > base + policy.least_power][
             : policy.most_experiments
         ]
-        told += [Separation(other, words, power) for power, words in better]
+        separations_found += [Separation(other, words, power) for power, words in better]
         if not better:
-            told.append(Separation(other, remedy, None))
-    return tuple(told)
+            separations_found.append(Separation(other, remedy, None))
+    return tuple(separations_found)
 
 
 def _power(noncentrality: float, freedom: int, policy: Design) -> float:
@@ -115,12 +115,12 @@ def _amplitudes(effect: Effect, wide: LinearSystem) -> Array:
 
 
 def _now(
-    effect: Effect, rival: NDArray[np.int64], wide: LinearSystem
+    effect: Effect, alternative: NDArray[np.int64], wide: LinearSystem
 ) -> tuple[Array, NDArray[np.int64]]:
     """Normal matrix of [d, the model's other columns, the alternative's], and their places."""
     mine = f"{effect.name}."
     others = np.array([n for n in wide.own if not wide.columns[n].name.startswith(mine)])
-    places = np.concatenate([others, rival]).astype(np.int64)
+    places = np.concatenate([others, alternative]).astype(np.int64)
     weight = wide.weights(wide.reduced_chi2(wide.residual))
     matrix = _stacked(wide.matrix, _amplitudes(effect, wide), places)
     normal = (matrix * weight[:, None]).T @ matrix

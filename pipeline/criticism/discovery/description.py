@@ -20,7 +20,7 @@ _WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
 
 
-def told(
+def describe(
     pursuit: Pursuit,
     found: Expression,
     smooth: Port,

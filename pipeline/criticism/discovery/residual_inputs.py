@@ -242,7 +242,7 @@ def _port(
 
 
 def _effect(name: str, words: str, parameters: tuple[Parameter, ...], **hooks: Any) -> Effect:
-    """An effect that nobody is told of by its name."""
+    """An effect that is reported under no name."""
     return Effect(
         name=name,
         words=words,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.discovery.description import told
+from pipeline.criticism.discovery.description import describe
 from pipeline.criticism.discovery.matching_pursuit import Pursuit, expression
 from pipeline.criticism.discovery.residual_inputs import Port, ports, refined
 from pipeline.criticism.effect import Array
@@ -50,13 +50,12 @@ def unknown_structure(
     effect file.
 
     Ports are compared by the deviance they remove from whole captures that they were not fitted to.
-    Of those that do as well, the one of fewest variables is told, and the others are named beside
-    it. The result is None if the best takes less than a tenth of what is over the floor:
-    instruments that wander follow no state of the machine. Also returns the deviance (−2 log
-    likelihood) that the port removes.
-    `name`: of the effect.
-    `in_parts`: captures that miss the floor are held out a twelfth at a time, for a heat run that
-    has no second. A wander of an instrument would then pass for a state of the machine.
+    Of those that do as well, the one of fewest variables is reported, and the others are named
+    beside it. The result is None if the best takes less than a tenth of what is over the floor:
+    instruments that drift follow no state of the machine. Also returns the deviance (−2 log
+    likelihood) that the port removes. `name`: of the effect. `in_parts`: captures that miss the
+    floor are held out a twelfth at a time, for a heat run that has no second. A drift of an
+    instrument would then pass for a state of the machine.
     """
     fit = system.fit
     found, wide = _ranked(system, _hooks(signals), in_parts)
@@ -76,7 +75,7 @@ def unknown_structure(
     fine = linear_system(near, effect_columns(port.effect, near.model), wide)
     weight = fine.weights(fine.reduced_chi2(best.left))
     pursuit = Pursuit(fine, own, port, weight)
-    sketch = told(pursuit, expression(pursuit), best.port, others, signals, name)
+    sketch = describe(pursuit, expression(pursuit), best.port, others, signals, name)
     return sketch, best.gain
 
 
@@ -157,9 +156,9 @@ def _simplest(found: Sequence[Found], policy: Policy) -> Found:
 
 
 def _missed(system: LinearSystem) -> NDArray[np.int64]:
-    """Numbers of the segments in which a fit leaves something that is told."""
-    told = np.flatnonzero(significant_groups(system))
-    return np.unique([system.labels[place][0] for place in told])
+    """Numbers of the segments in which a fit leaves something that is reported."""
+    over = np.flatnonzero(significant_groups(system))
+    return np.unique([system.labels[place][0] for place in over])
 
 
 def _units(

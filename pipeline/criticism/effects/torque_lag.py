@@ -11,9 +11,10 @@ _STARTS = tuple(2.0**k for k in range(1, 8))
 
 
 def _load(r: Recorded, q: Values) -> Array:
-    """The true torque behind a lag τ stamped l late, or behind two lags τ and l: to second order
-    y + (τ + l) y' + τ l y''. What is told is the whole delay τ + l, which captures know well. Where
-    all of it is a late stamp the torque is read so much later in the log, however many samples.
+    """The true torque behind a lag τ stamped l late, or behind two lags τ and l: to second order y
+    + (τ + l) y' + τ l y''. What is reported is the whole delay τ + l, which captures know well.
+    Where all of it is a late stamp the torque is read so much later in the log, however many
+    samples.
     """
     stamped = q["stamped"] > 0.0
     torque = r.later(q["lag_s"])[1] if stamped else r.torque_nm

@@ -64,12 +64,19 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         return _slow_turn(capture, machine, period, found, keep, channel)
     window = window_of(period, keep.size)
     keep = keep & _coasts(found["theta_mech_rad"], window)
-    told = prepared(found, period)
+    sensors = prepared(found, period)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, ())
     return segment_of(
-        capture, "shaft", "bench", period, found=found, sensors=told, channels=(channel,), weak=weak
+        capture,
+        "shaft",
+        "bench",
+        period,
+        found=found,
+        sensors=sensors,
+        channels=(channel,),
+        weak=weak,
     )
 
 
@@ -111,7 +118,7 @@ def _slow_turn(
     steps = coarse_steps(found, noise)
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
     found = {name: decimated(column, factor) for name, column in found.items()}
-    told = Sensors(noise, steps, with_travel(found, noise))
+    sensors = Sensors(noise, steps, with_travel(found, noise))
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
@@ -126,7 +133,7 @@ def _slow_turn(
         "bench",
         period * factor,
         found=found,
-        sensors=told,
+        sensors=sensors,
         channels=(channel,),
         weak=weak,
     )

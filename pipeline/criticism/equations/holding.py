@@ -79,7 +79,7 @@ def predicted(
 def _current_slope(segment: Segment, model: Model, values: Values) -> float:
     """True q ampere a recorded one.
 
-    By it residuals of a current are told in the sensor's own units; else a gain could win by
+    By it residuals of a current are reported in the sensor's own units; else a gain could win by
     shrinking the residual that it is blamed for.
     """
     zero = np.zeros(4)

@@ -48,7 +48,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)
     window = window_of(period, keep.size)
-    told = prepared(found, period)
+    sensors = prepared(found, period)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, _WINDOWS)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
@@ -59,7 +59,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         "bench",
         period,
         found=found,
-        sensors=told,
+        sensors=sensors,
         channels=("vd_v", "vq_v"),
         weak=weak,
     )

@@ -37,13 +37,13 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra))
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    told = prepared(found, period)
+    sensors = prepared(found, period)
     fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:
             return None
         fixed["theta_elec_rad"] = math.radians(capture.meta.theta_elec_deg)
-        edges = np.abs(np.diff(volts)) > 8 * told.noise["v_pair_v"]
+        edges = np.abs(np.diff(volts)) > 8 * sensors.noise["v_pair_v"]
         keep[:-1] &= ~edges
         keep[1:] &= ~edges
         window = max(min(round(_STEP_WINDOW_S / period), keep.size // 4), _LEAST_WINDOW)
@@ -51,14 +51,14 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
         window = window_of(period, keep.size)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
     if capture.meta.test == "resistance":
-        weak = _settled(weak, amps, told.noise["i_pair_a"])
+        weak = _settled(weak, amps, sensors.noise["i_pair_a"])
     return segment_of(
         capture,
         "terminal",
         "bench",
         period,
         found=found,
-        sensors=told,
+        sensors=sensors,
         channels=("v_pair_v",),
         weak=weak,
         blocks=None,

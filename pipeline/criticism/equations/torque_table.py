@@ -30,7 +30,7 @@ _PARTS = 12
 """Parts that a sweep is held out in: by judgement. Fewer leave little to fit, more are like their
 neighbours."""
 _TERMS = 3
-"""Terms of the curve of torque over current that noise is told about: offset, slope, sag."""
+"""Terms of the curve of torque over current that noise is the scatter about: offset, slope, sag."""
 
 
 def cut(capture: Capture, _: Machine) -> Segment | None:

@@ -42,23 +42,23 @@ def _size(wanted: str, parameters: Mapping[str, ToldParameter]) -> str:
     if wanted == "largest":
         return _largest(parameters)
     names, percent = wanted.removesuffix("%"), wanted.endswith("%")
-    told = [parameters.get(name.strip(), (None, None, "1")) for name in names.split("&")]
-    value, u, unit = amplitude(told)
+    parts = [parameters.get(name.strip(), (None, None, "1")) for name in names.split("&")]
+    value, u, unit = amplitude(parts)
     if value is None or u is None:
         return UNKNOWN_SIZE
     return number_text(100.0 * value, 100.0 * u, "%") if percent else number_text(value, u, unit)
 
 
-def amplitude(told: Sequence[ToldParameter]) -> ToldParameter:
+def amplitude(parts: Sequence[ToldParameter]) -> ToldParameter:
     """Length of a vector of parameters, and its u to first order; one alone keeps its sign."""
-    values = [(value, u or 0.0) for value, u, _ in told if value is not None]
-    if len(values) < len(told):
-        return None, None, told[0][2]
-    if len(told) == 1:
-        return told[0]
+    values = [(value, u or 0.0) for value, u, _ in parts if value is not None]
+    if len(values) < len(parts):
+        return None, None, parts[0][2]
+    if len(parts) == 1:
+        return parts[0]
     length = math.hypot(*(value for value, _ in values))
     spread = math.hypot(*(value * u for value, u in values))
-    return length, spread / length if length > 0 else 0.0, told[0][2]
+    return length, spread / length if length > 0 else 0.0, parts[0][2]
 
 
 def _largest(parameters: Mapping[str, ToldParameter]) -> str:
@@ -67,7 +67,7 @@ def _largest(parameters: Mapping[str, ToldParameter]) -> str:
     for name, one in parameters.items():
         if found := _WAVE.fullmatch(name):
             waves.setdefault(found[1], []).append(one)
-    sizes = {order: amplitude(told) for order, told in waves.items()}
+    sizes = {order: amplitude(parts) for order, parts in waves.items()}
     known = {order: one for order, one in sizes.items() if one[0] is not None}
     if not known:
         return UNKNOWN_SIZE

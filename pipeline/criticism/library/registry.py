@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from pipeline.criticism.effect import Effect
-from pipeline.criticism.library.user_effects import guarded, told
+from pipeline.criticism.library.user_effects import errors_of, guarded
 from pipeline.plugins import discover
 from pipeline.records.errors import UsageError
 
@@ -73,7 +73,7 @@ def _load(path: Path, digest: str) -> Effect:
     module = importlib.util.module_from_spec(spec)
     # by its name it is known in another process too
     sys.modules[spec.name] = module
-    with told(path):
+    with errors_of(path):
         spec.loader.exec_module(module)
         effect = getattr(module, "EFFECT", None)
         if not isinstance(effect, Effect):

@@ -1,4 +1,4 @@
-"""Effects of a user's files: what is wrong with one is told with its file, line and remedy.
+"""Effects of a user's files: what is wrong with one is reported with its file, line and remedy.
 
 A hook of theirs is called through a `Hook`; hooks of the library are not, and cost nothing.
 """
@@ -62,7 +62,7 @@ class Hook:
     def __call__(self, *arguments: Any) -> Any:
         """The hook's value [n]."""
         q = next((a for a in arguments if isinstance(a, Mapping)), {})
-        with told(Path(self.file), self.what, q):
+        with errors_of(Path(self.file), self.what, q):
             value = self.call(*arguments)
         inputs = _inputs(arguments[0])
         if inputs:
@@ -135,7 +135,7 @@ class _Expand:
     file: str
 
     def __call__(self, machine: Machine) -> tuple[Parameter, ...]:
-        with told(Path(self.file), f"expand of {self.what}"):
+        with errors_of(Path(self.file), f"expand of {self.what}"):
             parameters = tuple(self.call(machine))
         for parameter in parameters:
             _known_scale(parameter, Path(self.file), self.what)
@@ -168,7 +168,7 @@ class _Named(dict[str, float]):
 def _try(effect: Effect, path: Path) -> None:
     """Calls every hook once; raises UsageError where it asks for a parameter that is not there.
 
-    Other errors do not count here, since this machine is no motor: they are told on captures.
+    Other errors do not count here, since this machine is no motor: they are reported on captures.
     """
     x, r = _operating(), _recorded()
     line: NDArray[Any] = np.ones(_TRIED)
@@ -207,7 +207,7 @@ def _ask(hook: Any, arguments: tuple[Any, ...], q: Mapping[str, float], path: Pa
 
 
 @contextmanager
-def told(path: Path, what: str = "", q: Mapping[str, float] | None = None) -> Iterator[None]:
+def errors_of(path: Path, what: str = "", q: Mapping[str, float] | None = None) -> Iterator[None]:
     """Whatever goes wrong in a user's file, as one line of file, line and remedy."""
     try:
         yield

@@ -101,9 +101,9 @@ def leave_out(system: LinearSystem) -> HeldOut:
         steps[number] = np.zeros(own)
         steps[number][places] = step
     predicted = np.isfinite(left)
-    told = np.where(predicted, left, system.residual) / system.noise_ratio
-    told = told[predicted] if predicted.any() else told
-    return HeldOut(left, math.sqrt(float((told**2).mean())), steps)
+    errors = np.where(predicted, left, system.residual) / system.noise_ratio
+    errors = errors[predicted] if predicted.any() else errors
+    return HeldOut(left, math.sqrt(float((errors**2).mean())), steps)
 
 
 def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
@@ -128,11 +128,11 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
 
     """
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
-    told = shared if shared.any() else np.ones(shared.size, dtype=bool)
+    counted = shared if shared.any() else np.ones(shared.size, dtype=bool)
     made = []
     for system, one in zip(fits, held, strict=True):
         residual = np.where(shared, one.residual, np.nan)
-        errors = (np.where(shared, one.residual, system.residual) / system.noise_ratio)[told]
+        errors = (np.where(shared, one.residual, system.residual) / system.noise_ratio)[counted]
         made.append(replace(one, residual=residual, total=math.sqrt(float((errors**2).mean()))))
     return tuple(made)
 
@@ -229,11 +229,11 @@ def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
     """Groups [G] that a fit leaves over their floor, judged as `remainder` does, but with the
     tolerance of form of the effects found in that floor.
     """
-    told = np.zeros(len(system.labels), dtype=bool)
+    significant = np.zeros(len(system.labels), dtype=bool)
     as_whitened = np.ones(system.size)
     over = _over(system, as_whitened)
-    told[[place for place, _, _, matters in over if matters]] = True
-    return told
+    significant[[place for place, _, _, matters in over if matters]] = True
+    return significant
 
 
 def _over(

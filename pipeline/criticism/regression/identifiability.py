@@ -146,9 +146,9 @@ def surely_there(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
     sure = set()
     for n, column in enumerate(system.columns):
         over = {j: fit.u_of(_over(values, n, j), bent=True) for j in below if j != n}
-        told = [(values[n] / values[j], u) for j, u in over.items()]
-        told.append((values[n], fit.u_of(np.eye(own)[n])))
-        if any(abs(size) > least * u for size, u in told):
+        sizes = [(values[n] / values[j], u) for j, u in over.items()]
+        sizes.append((values[n], fit.u_of(np.eye(own)[n])))
+        if any(abs(size) > least * u for size, u in sizes):
             sure.add(column.name)
     return sure
 
@@ -173,8 +173,8 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     sure_of = known(system, held)
     u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
     beyond = _beyond(sure_of.u, system.prior_precision[: len(own)], fit.policy.fit)
-    told = within(beyond, sure_of.found.sizes)
-    sized = dict(zip(u, told.tolist(), strict=True))
+    determined = within(beyond, sure_of.found.sizes)
+    sized = dict(zip(u, determined.tolist(), strict=True))
     limits, stated = limits_of(model), model.stated()
     made = {}
     for c in BASE:
@@ -182,14 +182,14 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
             value = fit.values[c.name]
             bound = _at(value, limits.get(c.name))
             sure = c.name not in POSITIVE or (REACH * u[c.name] < value and not bound)
-            made[c.name] = _told(value, u[c.name], c.unit, sized[c.name] and sure, bound)
+            made[c.name] = _parameter(value, u[c.name], c.unit, sized[c.name] and sure, bound)
             made[c.name] = _or_stated(made[c.name], stated.get(c.name))
     for name, (effect, p) in model.parameters().items():
         value = fit.values[name]
         beside = [f"{effect.name}.{q.name}" for q in effect.parameters_of(model.machine)]
         sure = sized[name] if name in u else any(sized.get(one, False) for one in beside)
         bound = not p.choice and _at(value, limits[name])
-        made[name] = _told(value, u.get(name, p.u), p.unit, sure, bound)
+        made[name] = _parameter(value, u.get(name, p.u), p.unit, sure, bound)
         made[name] = _or_stated(made[name], stated.get(name))
     return made
 
@@ -234,12 +234,12 @@ def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
     where nothing else tells: what handbooks say is not measured.
     """
     information = np.maximum(u, 1e-300) ** -2.0 - prior_precision
-    told = information > policy.least_information * prior_precision
-    alone: Array = np.where(told, np.maximum(information, 1e-300) ** -0.5, math.inf)
+    informed = information > policy.least_information * prior_precision
+    alone: Array = np.where(informed, np.maximum(information, 1e-300) ** -0.5, math.inf)
     return alone
 
 
-def _told(value: float, u: float, unit: str, known: bool, bound: bool) -> ModelParameter:
+def _parameter(value: float, u: float, unit: str, known: bool, bound: bool) -> ModelParameter:
     return ModelParameter(value if known else None, u if known else None, unit, bound and known)
 
 

@@ -219,7 +219,7 @@ class _Spectrum:
         whole = np.zeros(_FINER * self.bins)
         whole[self.place] = flat
         power = 2.0 * (np.abs(np.fft.rfft(whole)) / self.weight.sum()) ** 2
-        told = []
+        powers = []
         for freq in freqs_hz:
             middle = round(_FINER * freq * self.duration_s)
             beside = middle + _FINER * np.array(_BESIDE)
@@ -235,8 +235,8 @@ class _Spectrum:
                 or self._share(flat, top) < self.policy.steady_share * one_sine
             ):
                 line = level
-            told.append((line, level))
-        return told
+            powers.append((line, level))
+        return powers
 
     def _about_its_mean(self, signal: Array) -> Array:
         """A signal [n] less the mean of each run that holds two cycles of any line. With the gaps

@@ -343,7 +343,7 @@ def offsets(
     segment: Segment, valid: NDArray[np.bool_], row_weight: Array, policy: NoiseFloors
 ) -> list[Array]:
     """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
-    offset of each channel's sensor, mains lines and wander.
+    offset of each channel's sensor, mains lines and drift.
     """
     made = [] if segment.lines is None else [line[valid] * row_weight for line in segment.lines]
     if segment.offsets is not None:

@@ -203,9 +203,9 @@ def pseudo_inverse(normal: Array) -> Array:
     information.
 
     """
-    told = np.diag(normal)
+    information = np.diag(normal)
     # a parameter that no capture tells of stays where it is, exactly
-    size = np.sqrt(np.where(told > 0.0, told, 1.0))
+    size = np.sqrt(np.where(information > 0.0, information, 1.0))
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     good = power > _TIE * max(float(power[-1]), 1.0)
     inverse: Array = (axes[:, good] / power[good]) @ axes[:, good].T

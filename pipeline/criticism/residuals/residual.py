@@ -37,7 +37,7 @@ def operate(
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
-    """Recorded signals [C, n] of the channels, as the prediction is told."""
+    """Recorded signals [C, n] of the channels, in the units of the prediction."""
     equation = equation_of(segment)
     segment = on_true_clock(segment, equation.recorder, model, values)
     return equation.measured(segment, signals, model, values)

@@ -15,7 +15,7 @@ from pipeline.criticism.selection.score_test import Candidate, placed
 from pipeline.criticism.selection.stepwise import loss_without, shaped
 
 
-def rivals_of(
+def alternatives_to(
     name: str,
     wide: LinearSystem,
     offered: Sequence[Candidate],
@@ -68,8 +68,8 @@ def _refitted(name: str, candidate: Candidate, wide: LinearSystem) -> LinearSyst
 
 def experiment_for(effect: Effect, confused: Sequence[str], library: Mapping[str, Effect]) -> str:
     """The test or calibration that parts an effect from what it is confused with."""
-    told = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
-    return "; ".join(told) if told else effect.experiment
+    parted = [f"against {name}: {one}" for name, one in remedies(effect, confused, library).items()]
+    return "; ".join(parted) if parted else effect.experiment
 
 
 def remedies(

@@ -65,15 +65,15 @@ def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tupl
     )
 
 
-def settled(effect: Effect, told: Discrimination) -> Effect:
+def settled(effect: Effect, found: Discrimination) -> Effect:
     """The effect with the shapes that whole logs tell: they are known, and no fit moves them."""
-    return replace(effect, parameters=tuple(_known(p, told) for p in effect.parameters))
+    return replace(effect, parameters=tuple(_known(p, found) for p in effect.parameters))
 
 
-def _known(p: Parameter, told: Discrimination) -> Parameter:
-    if p.name not in told.values or p.amplitude:
+def _known(p: Parameter, found: Discrimination) -> Parameter:
+    if p.name not in found.values or p.amplitude:
         return p
-    return replace(p, choice=True, scan=(1.0,), u=told.values[p.name][1])
+    return replace(p, choice=True, scan=(1.0,), u=found.values[p.name][1])
 
 
 def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
@@ -82,10 +82,10 @@ def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> L
     """
     fit = system.fit
     effect = fit.effect(name)
-    told = discriminate(fit, effect)
-    if told is None or told.name not in (name, *sharing_discriminator(effect, library)):
+    found = discriminate(fit, effect)
+    if found is None or found.name not in (name, *sharing_discriminator(effect, library)):
         return system
-    truth = settled(library[told.name], told)
+    truth = settled(library[found.name], found)
     effects = tuple(truth if e.name == name else e for e in fit.model.effects)
     model = replace(fit.model, effects=effects)
     own = f"{name}."
@@ -93,6 +93,6 @@ def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> L
     for p in truth.parameters_of(model.machine):
         if own + p.name in fit.values:
             values[f"{truth.name}.{p.name}"] = fit.values[own + p.name]
-    values |= {f"{truth.name}.{key}": value for key, (value, _) in told.values.items()}
+    values |= {f"{truth.name}.{key}": value for key, (value, _) in found.values.items()}
     start = replace(fit, model=model, values=values).at({})
     return gauss_newton(start, before=system)

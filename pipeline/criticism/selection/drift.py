@@ -42,9 +42,9 @@ def drifting_segments(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...
     if len(tests) < fit.policy.selection.drift_tests:
         return None
     each = [(fit.model, fit.values)] * len(fit.segments)
-    told = on_each(with_drift, fit.segments, each)
-    system = gauss_newton(replace(fit, segments=told))
-    return None if remainder(system, large=True) else told
+    drifting = on_each(with_drift, fit.segments, each)
+    system = gauss_newton(replace(fit, segments=drifting))
+    return None if remainder(system, large=True) else drifting
 
 
 def with_drift(segment: Segment, model: Model, values: Values) -> Segment:

@@ -39,13 +39,14 @@ def with_starts(
     wide: LinearSystem,
     offered: Sequence[Candidate],
     scores: Sequence[Score],
-    told: NDArray[np.bool_],
+    significant: NDArray[np.bool_],
 ) -> tuple[Score, ...]:
     """The scores, those of effects with `starts` from the best of them if that beats the tangent.
 
-    Nothing is tried where nothing is `told` [G] as a remainder: a delay of many samples shows.
+    Nothing is tried where nothing is `significant` [G] as a remainder: a delay of many samples
+    shows.
     """
-    if not told.any():
+    if not significant.any():
         return tuple(scores)
     best = {score.candidate.effect.name: score for score in scores}
     thorough = wide.policy.selection.thorough
@@ -54,7 +55,7 @@ def with_starts(
     penalty = searched(offered)
     for candidate in offered:
         for parameter in candidate.effect.parameters_of(wide.fit.machine):
-            for score in _tried(own, candidate, parameter, before, told):
+            for score in _tried(own, candidate, parameter, before, significant):
                 known = best.get(candidate.effect.name)
                 if known is None or score.fall > known.fall:
                     best[candidate.effect.name] = replace(score, penalty=score.penalty + penalty)
@@ -66,7 +67,7 @@ def _tried(
     candidate: Candidate,
     parameter: Parameter,
     before: Standing,
-    told: NDArray[np.bool_],
+    significant: NDArray[np.bool_],
 ) -> tuple[Score, ...]:
     """The score of the best start of a parameter, none where it has no starts."""
     if not parameter.starts:
@@ -93,7 +94,7 @@ def _tried(
         share_of(own, candidate.effect, before, after),
         abs(start) / parameter.negligible,
         quiet_fall(own, before.reduced_chi2, after.reduced_chi2),
-        clears(own, told, before.reduced_chi2, after.reduced_chi2),
+        clears(own, significant, before.reduced_chi2, after.reduced_chi2),
         policy=policy,
     )
     dof = paid_for(candidate.effect, own.fit.machine, found)

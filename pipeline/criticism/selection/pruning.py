@@ -42,7 +42,7 @@ def trimmed(system: LinearSystem, names: Sequence[str]) -> LinearSystem:
     return system
 
 
-def whole(fit: Fit) -> Fit:
+def with_all_terms(fit: Fit) -> Fit:
     """Where a fit begins in which the machine's own effects have all their terms again.
 
     A term that did not pay while another effect was missing may pay now.

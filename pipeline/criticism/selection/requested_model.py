@@ -13,18 +13,18 @@ from pipeline.criticism.regression.mains_hum import Hum, hum_of, with_hum
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.score_test import candidates, score_all, widened
-from pipeline.criticism.selection.stepwise import begun
+from pipeline.criticism.selection.stepwise import begin_from
 
 
 @dataclass(frozen=True, slots=True)
-class Begun:
+class BaseFit:
     """The system around a model fitted to segments, which know the mains lines in them."""
 
     system: LinearSystem
     hum: tuple[Hum, ...]
 
 
-def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
+def fit_of(segments: Sequence[Segment], model: Model) -> BaseFit:
     """Fits a model from orders of magnitude.
 
     Effects that have a shape or a choice come in one by one, the most helpful first. Each begins at
@@ -41,7 +41,7 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     humming = with_hum(segments, hum, near.model, near.values)
     system = first_fit(replace(near, segments=humming))
     if not shaped:
-        return Begun(system, hum)
+        return BaseFit(system, hum)
     while shaped:
         offered = candidates(shaped, system.fit.model)
         wide = widened(system.fit, offered, system)
@@ -49,7 +49,7 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
         if not scores:
             break
         del shaped[scores[0].candidate.effect.name]
-        system = gauss_newton(begun(system.fit, scores[0]), before=wide)
+        system = gauss_newton(begin_from(system.fit, scores[0]), before=wide)
     for effect in system.fit.model.effects:
         system = renamed(system, effect.name, {effect.name: effect})
     fit = system.fit
@@ -57,4 +57,4 @@ def fit_of(segments: Sequence[Segment], model: Model) -> Begun:
     model = replace(model, effects=tuple(settled.get(e.name, e) for e in model.effects))
     unheard = {k: v for effect in shaped.values() for k, v in zero(effect, model).items()}
     whole = replace(fit, model=model, values={**fit.values, **unheard})
-    return Begun(reconsidered(gauss_newton(whole)), hum)
+    return BaseFit(reconsidered(gauss_newton(whole)), hum)

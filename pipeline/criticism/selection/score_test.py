@@ -41,9 +41,9 @@ class Score:
     own parameters, `moves` how the model's own move with it, `share` the part of the removable
     excess of the channel it helps most, `size` the largest of its amplitudes over its negligible
     size, `quiet` the part of the fall in signals that have nothing over their floor to take a share
-    of. `clears`: it takes most of what would be told as a remainder without it, and so matters at
-    any size; no coupling, which noise of an encoder in a speed loop looks like. `confounder` names
-    an effect that explains the same better, but is too small to matter.
+    of. `clears`: it takes most of what would be reported as a remainder without it, and so matters
+    at any size; no coupling, which noise of an encoder in a speed loop looks like. `confounder`
+    names an effect that explains the same better, but is too small to matter.
     """
 
     candidate: Candidate
@@ -69,8 +69,8 @@ class Score:
 
         Below the floor only what the machine itself does is named. A sensor's error is a common
         factor of which any form that is a little wrong elsewhere asks for some; and an effect of a
-        discriminator is not told from noise of the angle's sensor, which runs through a drive's
-        speed loop and so is in torque and angle alike.
+        discriminator is not discriminated from noise of the angle's sensor, which runs through a
+        drive's speed loop and so is in torque and angle alike.
         """
         effect = self.candidate.effect
         below = self._below_floor and effect.hook != "sensor" and effect.discriminator is None
@@ -136,7 +136,7 @@ def widened(
 
     The candidates' may stay as they were in `before`. Its own are made anew: what the station's
     priors alone hold apart, such as a gain and the effect of that name, columns that are made in
-    two places would seem to tell apart.
+    two places would seem to discriminate.
     """
     columns = [c for candidate in offered for c in candidate.columns]
     if before is not None:
@@ -150,13 +150,13 @@ def widened(
 def score_all(
     system: LinearSystem,
     offered: Sequence[Candidate],
-    told: NDArray[np.bool_] | None = None,
+    significant: NDArray[np.bool_] | None = None,
 ) -> tuple[Score, ...]:
     """Every candidate's score, the best fall first; of one effect the best shape only.
 
-    `told` [G] are groups that would be told as a remainder if nothing were added.
+    `significant` [G] are groups that would be reported as a remainder if nothing were added.
     """
-    by, policy = _Scoring.of(system, told), system.policy.selection
+    by, policy = _Scoring.of(system, significant), system.policy.selection
     penalty = math.log(float(system.size))
     search_penalty = searched(offered)
     best: dict[str, tuple[Score, NDArray[np.int64]]] = {}
@@ -224,13 +224,13 @@ class _Scoring:
     normal_equations: NormalEquations
     own: NDArray[np.int64]
     before: Standing
-    told: NDArray[np.bool_]
+    significant: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, system: LinearSystem, told: NDArray[np.bool_] | None) -> _Scoring:
+    def of(cls, system: LinearSystem, significant: NDArray[np.bool_] | None) -> _Scoring:
         own, normal_equations = system.own, system.normal_equations()
         before = Standing.of(system, own, normal_equations.along(own).best())
-        left = np.zeros(len(system.labels), dtype=bool) if told is None else told
+        left = np.zeros(len(system.labels), dtype=bool) if significant is None else significant
         return cls(system, normal_equations, own, before, left)
 
     def score(
@@ -276,7 +276,7 @@ class _Scoring:
             max(sizes, default=math.inf),
             quiet_fall(system, self.before.reduced_chi2, after.reduced_chi2),
             candidate.effect.discriminator is None
-            and clears(system, self.told, self.before.reduced_chi2, after.reduced_chi2),
+            and clears(system, self.significant, self.before.reduced_chi2, after.reduced_chi2),
             policy=system.policy.selection,
         )
 
@@ -286,7 +286,7 @@ class _Scoring:
         """The clearest effect that explains what a candidate does better, at a size too small to
         matter, and beside which the candidate is not worth its penalty.
 
-        A loss that is too small to be told must not be told under a wrong name.
+        A loss that is too small to be reported must not be reported under a wrong name.
         """
         if not score.passes:
             return None
@@ -309,13 +309,15 @@ class _Scoring:
         return None if worth else clearest.candidate.effect.name
 
 
-def clears(system: LinearSystem, told: NDArray[np.bool_], before: Array, after: Array) -> bool:
+def clears(
+    system: LinearSystem, significant: NDArray[np.bool_], before: Array, after: Array
+) -> bool:
     """Whether most of the power over the floor goes, between two sets of χ²/n [G], of the groups
-    that are `told` [G] as a remainder.
+    that are `significant` [G] as a remainder.
     """
     over, left = (system.counts * np.maximum(q - 1.0, 0.0) for q in (before, after))
-    most = system.policy.selection.clears_share * float(over[told].sum())
-    return bool(told.any()) and float(left[told].sum()) < most
+    most = system.policy.selection.clears_share * float(over[significant].sum())
+    return bool(significant.any()) and float(left[significant].sum()) < most
 
 
 def _outside(value: float, parameter: Parameter) -> bool:

@@ -25,7 +25,7 @@ from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.choices import reconsidered
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
-from pipeline.criticism.selection.pruning import trimmed, whole
+from pipeline.criticism.selection.pruning import trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import (
     Score,
     candidates,
@@ -61,9 +61,9 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
     for _ in range(policy.most_steps):
         offered = candidates(library, fit.model)
         wide = widened(fit, offered, steps[-1].system if steps else None)
-        told = significant_groups(wide)
-        scores = score_all(wide, offered, told)
-        scores = with_starts(wide, offered, scores, told)
+        significant = significant_groups(wide)
+        scores = score_all(wide, offered, significant)
+        scores = with_starts(wide, offered, scores, significant)
         added = tuple(e.name for e in fit.model.effects[base:])
         steps.append(LadderStep(added, wide, scores))
         if len(steps) == policy.most_steps:
@@ -122,7 +122,7 @@ def _chosen(
         batch = list(passing[first : first + policy.refits])
         while (best := _refit_best(wide, batch, found)) is not None:
             named = [effect.name for effect in best.fit.model.effects]
-            finished = trimmed(gauss_newton(whole(best.fit), before=best), named)
+            finished = trimmed(gauss_newton(with_all_terms(best.fit), before=best), named)
             if _sure(linear_system(finished.fit)):
                 return finished
             batch = [s for s in batch if s.candidate.effect.name != named[-1]]
@@ -146,7 +146,7 @@ def _refit_best(
     """
     policy = wide.policy.selection
     before, shrunk = leave_out(wide), _shrunk(wide)
-    any_wrong, told = _doubt(wide, found), significant_groups(wide)
+    any_wrong, significant = _doubt(wide, found), significant_groups(wide)
     tests = {segment.test for segment in wide.segments}
     close = [s for s in passing if s.fall >= policy.close_share * passing[0].fall]
     best: LinearSystem | None = None
@@ -157,7 +157,7 @@ def _refit_best(
         # of two that tie, the one that some capture here was made to show
         unsought = policy.tie if set(effect.tests).isdisjoint(tests) else 0.0
         cost = tried.deviance + score.penalty + unsought
-        if not _matters(tried, wide, told) or cost >= min(least, wide.deviance):
+        if not _matters(tried, wide, significant) or cost >= min(least, wide.deviance):
             continue
         same_hook = _same_hook(effect, found)
         doubts = _doubt(wide, same_hook), any_wrong
@@ -178,22 +178,22 @@ def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:
     If that fit is no better than the one without it, a second one begins with all other parameters
     where they are: along a bent valley the tangent goes astray.
     """
-    tried = gauss_newton(begun(wide.fit, score), before=wide)
+    tried = gauss_newton(begin_from(wide.fit, score), before=wide)
     if tried.deviance + score.penalty < wide.deviance:
         return tried
-    again = gauss_newton(begun(wide.fit, replace(score, moves={})), before=wide)
+    again = gauss_newton(begin_from(wide.fit, replace(score, moves={})), before=wide)
     return min(tried, again, key=lambda end: end.deviance)
 
 
-def _matters(system: LinearSystem, before: LinearSystem, told: NDArray[np.bool_]) -> bool:
+def _matters(system: LinearSystem, before: LinearSystem, significant: NDArray[np.bool_]) -> bool:
     """Whether the newest effect of a refit is as large as anybody would act on, or takes most of
-    what was `told` [G] as a remainder before.
+    what was `significant` [G] as a remainder before.
     """
     fit, effect = system.fit, system.fit.model.effects[-1]
     if material(fit, effect):
         return True
     was, now = before.reduced_chi2(before.residual), system.reduced_chi2(system.residual)
-    most = effect.discriminator is None and clears(system, told, was, now)
+    most = effect.discriminator is None and clears(system, significant, was, now)
     return most and shaped(fit, effect)
 
 
@@ -207,10 +207,10 @@ def _sure(system: LinearSystem) -> bool:
     effect = system.fit.model.effects[-1]
     sure = surely_there(system, leave_out(system), system.policy.selection.least_u)
     known = effect.parameters_of(system.fit.machine)
-    told = [p for p in known if f"{effect.name}.{p.name}" in sure]
+    there = [p for p in known if f"{effect.name}.{p.name}" in sure]
     twists = [p for p in known if p.negligible > 0 and not p.amplitude]
-    coupled = effect.discriminator is None or not twists or any(p in told for p in twists)
-    return coupled and any(p.amplitude for p in told)
+    coupled = effect.discriminator is None or not twists or any(p in there for p in twists)
+    return coupled and any(p.amplitude for p in there)
 
 
 def _same_hook(effect: Effect, found: Sequence[Effect]) -> list[Effect]:
@@ -291,7 +291,7 @@ def _shrunk(tried: LinearSystem) -> Array:
     return np.where(tried.counts > 0, factors, 1.0)
 
 
-def begun(fit: Fit, score: Score) -> Fit:
+def begin_from(fit: Fit, score: Score) -> Fit:
     """Where a refit with a candidate begins: what its score foresees."""
     model = fit.model.with_effects(score.candidate.effect)
     moved = {name: fit.values[name] + change for name, change in score.moves.items()}

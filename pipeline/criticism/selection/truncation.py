@@ -75,8 +75,10 @@ def _clears_orders(before: LinearSystem, after: LinearSystem) -> bool:
 
 def _waved(system: LinearSystem) -> set[str]:
     """Signals with waves of the angle that are reported."""
-    told = significant_groups(system)
-    return {c for (_, c, order), over in zip(system.labels, told, strict=True) if over and order}
+    significant = significant_groups(system)
+    return {
+        c for (_, c, order), over in zip(system.labels, significant, strict=True) if over and order
+    }
 
 
 def explained(

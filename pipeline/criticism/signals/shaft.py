@@ -44,11 +44,9 @@ def unexplained_acceleration(
     array [n], rad/s²
         By the recorded clock.
 
-    Notes
-    -----
-    (T/J − d²θ/dt²)/stretch². It is told in the angle sensor's units, since a torque's noise floor
-    would shrink with the inertia, and by the recorded clock, since a gain must not win by making
-    its residual small.
+    Notes ----- (T/J − d²θ/dt²)/stretch². It is reported in the angle sensor's units, since a
+    torque's noise floor would shrink with the inertia, and by the recorded clock, since a gain must
+    not win by making its residual small.
 
     """
     finer = x.theta_rad.size // segment.size

@@ -64,9 +64,9 @@ def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
         mine = system.group == place
         if order == 0 and found[number].weak is not None and mine.any():
             parts.setdefault(reported_signal(found[number], channel), []).append((number, mine))
-    told = [window_variables(segment) for segment in found]
+    variables = [window_variables(segment) for segment in found]
     return tuple(
-        _errors_of(signal, groups, told, system, whitened)
+        _errors_of(signal, groups, variables, system, whitened)
         for signal, groups in sorted(parts.items())
     )
 
@@ -74,7 +74,7 @@ def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
 def _errors_of(
     signal: str,
     groups: Sequence[tuple[int, NDArray[np.bool_]]],
-    told: Sequence[Mapping[str, Array]],
+    variables: Sequence[Mapping[str, Array]],
     system: LinearSystem,
     whitened: Array,
 ) -> Errors:
@@ -82,11 +82,11 @@ def _errors_of(
     noise_ratio = np.concatenate([system.noise_ratio[mine] for _, mine in groups])
 
     def variable(name: str, number: int, mine: NDArray[np.bool_]) -> Array:
-        values = told[number].get(name, np.full(system.segments[number].size, np.nan))
+        values = variables[number].get(name, np.full(system.segments[number].size, np.nan))
         chosen: Array = values[system.window[mine]]
         return chosen
 
-    names = sorted({name for number, _ in groups for name in told[number]})
+    names = sorted({name for number, _ in groups for name in variables[number]})
     return Errors(
         signal,
         np.concatenate([whitened[mine] for _, mine in groups]) * unit,

@@ -93,12 +93,12 @@ def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     if 2 * settled.sum() < batch.windows:
         return None
     names = ("id_a", "iq_a") * batch.currents + (SPEED,) * batch.shaft
-    told = {name: _signal(batch, recorded, name)[settled] for name in names}
+    seen = {name: _signal(batch, recorded, name)[settled] for name in names}
     made = {name: _signal(batch, found, name)[settled] for name in names}
     moved = _Response(batch, found, jacobian, settled, names)
     time = recorded.get("t_s", segment.ts_s * np.arange(batch.segment.size, dtype=np.float64))
     floor, drift = _floor(moved), _drift(moved)
-    return Run(segment.capture, batch.inside(time)[settled], told, made, floor, drift)
+    return Run(segment.capture, batch.inside(time)[settled], seen, made, floor, drift)
 
 
 def _signal(batch: Batch, signals: Mapping[str, Array], name: str) -> Array:

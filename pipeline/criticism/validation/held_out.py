@@ -91,8 +91,8 @@ def traces(fit: Fit, simulated: Sequence[Simulated]) -> Iterator[Trace]:
         if equation_of(segment).use.currents:
             yield from _equations(segment, fit, one)
         for signal in run.signals:
-            told, made = run.recorded[signal], run.simulated[signal]
-            yield _trace(segment, signal, "free_run", one.split, (run.t_s, told, made))
+            recorded, made = run.recorded[signal], run.simulated[signal]
+            yield _trace(segment, signal, "free_run", one.split, (run.t_s, recorded, made))
 
 
 def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
@@ -108,10 +108,10 @@ def _equations(segment: Segment, fit: Fit, one: Simulated) -> Iterator[Trace]:
     starts = disjoint(weak.starts, weak.length)
     rows = starts[:, None] + np.arange(width // 2, weak.length, max(width // 2, 1))[None, :]
     for place, channel in enumerate(segment.channels):
-        told = smoothed(segment.recorded[channel], width)[rows]
-        model = told - smoothed(left[place], width)[rows]
+        recorded = smoothed(segment.recorded[channel], width)[rows]
+        model = recorded - smoothed(left[place], width)[rows]
         time = segment.recorded["t_s"][rows]
-        yield _trace(segment, channel, "equation", one.split, (time, told, model))
+        yield _trace(segment, channel, "equation", one.split, (time, recorded, model))
 
 
 def _trace(

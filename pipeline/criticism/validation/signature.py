@@ -75,7 +75,7 @@ def signature(
     Returns
     -------
     Signature
-        An error of acceleration is told as torque, by the inertia that was fitted.
+        An error of acceleration is reported as torque, by the inertia that was fitted.
 
     """
     curves = [*_window_curves(steps), *_turn_curves(records)]
@@ -99,12 +99,12 @@ def signature(
 
 def _window_curves(steps: tuple[LadderStep, LadderStep]) -> Iterator[_Curve]:
     """Window errors of every signal of every capture over every variable that was recorded."""
-    told = [
+    by_step = [
         {one.signal: one for one in window_errors(step.system, step.system.residual)}
         for step in steps
     ]
-    for signal, before in told[0].items():
-        after = told[1].get(signal)
+    for signal, before in by_step[0].items():
+        after = by_step[1].get(signal)
         if after is None or after.error.size != before.error.size:
             continue
         for number in np.unique(before.segment).tolist():

@@ -119,7 +119,7 @@ def jacobian_of(batch: Batch) -> Jacobian:
 
     def probed(step: float, move: Callable[[float], Operating]) -> tuple[Complex, Complex, Array]:
         (up_psi, up_drop, up), (psi, drop, down) = (
-            _told(model, move(sign), values) for sign in (step, -step)
+            _flux_drop_torque(model, move(sign), values) for sign in (step, -step)
         )
         each = (up_psi - psi, up_drop - drop, up - down)
         flux, loss, torque = ((one / (2 * step)).reshape(shape[::-1]).T for one in each)
@@ -142,14 +142,14 @@ def jacobian_of(batch: Batch) -> Jacobian:
     return Jacobian(
         ahead,
         behind,
-        (1j * p * _told(model, x, values)[0]).reshape(shape[::-1]).T,
+        (1j * p * _flux_drop_torque(model, x, values)[0]).reshape(shape[::-1]).T,
         np.array([by_d[2], by_q[2]]),
         np.maximum(-by_speed[2], 0.0),
         -by_angle[2],
     )
 
 
-def _told(model: Model, x: Operating, values: Values) -> tuple[Complex, Complex, Array]:
+def _flux_drop_torque(model: Model, x: Operating, values: Values) -> tuple[Complex, Complex, Array]:
     """Flux, voltage drop and torque less drags [n]."""
     pieces = evaluate(model, x, values)
     torque: Array = air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
@@ -182,8 +182,8 @@ def _defects(batch: Batch, signals: Mapping[str, Array]) -> tuple[Complex, Array
     segment, period = batch.segment, batch.segment.ts_s
     x = operate(segment, signals, model, values)
     pieces = evaluate(model, x, values)
-    told = measured(segment, signals, model, values)
-    left = told - predicted(segment, x, pieces, model, values)
+    recorded = measured(segment, signals, model, values)
+    left = recorded - predicted(segment, x, pieces, model, values)
     if not batch.currents:
         torque = -values["j_kgm2"] * batch.folded(left[0])
         return np.zeros(torque.shape, dtype=complex), torque

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.criticism.effect import Discrimination
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.selection.alternatives import rivals_of
+from pipeline.criticism.selection.alternatives import alternatives_to
 from pipeline.criticism.selection.score_test import candidates, widened
 from pipeline.criticism.selection.stepwise import search
 from tests.unit.criticism.machines import LIBRARY, asking_for, curved, fitted, with_drag
@@ -27,8 +27,8 @@ def test_a_rival_is_told_where_the_captures_cannot_part_them():
     last = search(fitted(segments), library)[-1]
     assert last.added in {("windage",), ("brake",)}
     offered = candidates(library, last.fit.model)
-    rivals = rivals_of(last.added[0], last.system, offered)
-    assert set(rivals) == {"windage", "brake"} - set(last.added)
+    others = alternatives_to(last.added[0], last.system, offered)
+    assert set(others) == {"windage", "brake"} - set(last.added)
 
 
 def test_a_rival_is_told_whatever_size_it_comes_out_at():
@@ -39,7 +39,7 @@ def test_a_rival_is_told_whatever_size_it_comes_out_at():
     assert [effect.name for effect in fit.model.effects] == ["windage"]
     offered = candidates({**LIBRARY, "brake": twin}, fit.model)
     system = widened(fit, offered)
-    assert rivals_of("windage", system, offered) == ("brake",)
+    assert alternatives_to("windage", system, offered) == ("brake",)
 
 
 @pytest.mark.parametrize("told", ["brake", "windage", None])
@@ -61,9 +61,9 @@ def test_effects_that_share_a_closer_look_are_told_apart_by_it(told):
     assert len(last.added) == 1
     name = last.added[0]
     offered = candidates(library, last.fit.model)
-    rivals = rivals_of(name, last.system, offered)
+    others = alternatives_to(name, last.system, offered)
     if told is None:
-        assert set(rivals) == {"windage", "brake"} - {name}
+        assert set(others) == {"windage", "brake"} - {name}
         return
-    assert (name, rivals) == (told, ())
+    assert (name, others) == (told, ())
     assert last.fit.values[f"{told}.drag_nm"] == pytest.approx(0.03, rel=0.05)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.diagnosis import _as_told
+from pipeline.criticism.diagnosis import _as_reported
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
@@ -141,7 +141,7 @@ def test_what_is_over_the_floor_is_told_even_where_it_is_too_small_to_matter(sha
     assert told.size == pytest.approx(share * limit)
     assert told.matters == matters
     assert remainder(off) == ((told,) if matters else ())
-    page = _as_told(off, ())
+    page = _as_reported(off, ())
     assert [(one.signal, one.matters) for one in page] == [("torque_shaft_nm", False)]
     assert over_floor(replace(off, residual=np.where(mine, 1.2, 0.0))) == ()
 

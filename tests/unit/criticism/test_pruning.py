@@ -12,7 +12,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.selection import pruning
-from pipeline.criticism.selection.pruning import trimmed, whole
+from pipeline.criticism.selection.pruning import trimmed, with_all_terms
 from tests.unit.criticism.machines import BASE, machine
 
 SATURATION = effects()["saturation"]
@@ -68,7 +68,7 @@ def test_what_was_left_out_of_the_machine_comes_back_and_of_a_sensor_does_not():
     less = replace(SATURATION, left_out=(D_ODD, D_BEND)), replace(encoder, left_out=(1,))
     model = Model(machine(), less)
     values = {**BASE, **zero(less[0], model), **zero(less[1], model), "saturation.q_fall": 0.2}
-    full = whole(Fit((), model, values, (), BASE))
+    full = with_all_terms(Fit((), model, values, (), BASE))
     assert [effect.left_out for effect in full.model.effects] == [(), (1,)]
     assert full.values["saturation.q_fall"] == 0.2
     assert full.values["saturation.d_odd"] == 0.0 and full.values["saturation.d_bend"] == 1.0

@@ -9,7 +9,7 @@ import pytest
 from pipeline.criticism import search
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.search import ended
+from pipeline.criticism.search import search_ladder
 from pipeline.records.comparison import ModelSpec
 from tests.unit.criticism.machines import machine
 
@@ -17,10 +17,10 @@ from tests.unit.criticism.machines import machine
 @pytest.fixture
 def climbs(monkeypatch):
     """Ladders that are no more than the orders their equations look at; `sketched` says which of
-    them leave something that a state of the machine predicts, `wanders` gives a calmer one.
+    them leave something that a state of the machine predicts, `drifts` gives a calmer one.
     """
     made = SimpleNamespace(
-        orders=[], seen=(), sketched=set(), gains={}, explained=False, wanders=False
+        orders=[], seen=(), sketched=set(), gains={}, explained=False, drifts=False
     )
 
     class Ladder(SimpleNamespace):
@@ -30,13 +30,13 @@ def climbs(monkeypatch):
         def large(self):
             return ("large", *self.left)
 
-    def climbed(begun, _):
-        looked = begun if isinstance(begun, tuple) else "calm"
+    def climbed(base, _):
+        looked = base if isinstance(base, tuple) else "calm"
         made.orders.append(looked)
         fit = Fit((), Model(machine(), ()), {}, (), {})
         step = SimpleNamespace(system=None, fit=fit)
         inside = SimpleNamespace(system=SimpleNamespace(fit=fit), hum=())
-        return Ladder(looked=looked, left=(looked,), steps=(step,), begun=inside)
+        return Ladder(looked=looked, left=(looked,), steps=(step,), base=inside)
 
     def sketched(ladder, left, name, in_parts=False):
         what = ladder.looked, in_parts
@@ -48,13 +48,13 @@ def climbs(monkeypatch):
     monkeypatch.setattr(search, "fit_of", lambda found, _: tuple(found))
     monkeypatch.setattr(search, "model_of", lambda *_: None)
     monkeypatch.setattr(search, "orders_left", lambda *_: made.seen)
-    monkeypatch.setattr(search, "drifting_segments", lambda *_: () if made.wanders else None)
+    monkeypatch.setattr(search, "drifting_segments", lambda *_: () if made.drifts else None)
     monkeypatch.setattr(search, "gauss_newton", lambda *_: None)
     return made
 
 
 def end():
-    return ended(SimpleNamespace(), ModelSpec("standard"), machine(), (), {}, "m_unknown")
+    return search_ladder(SimpleNamespace(), ModelSpec("standard"), machine(), (), {}, "m_unknown")
 
 
 def test_orders_that_are_whole_join_at_once(climbs):
@@ -88,12 +88,12 @@ def test_others_are_not_tried_where_nothing_is_left(climbs):
     assert climbs.orders == [()]
 
 
-def test_wander_is_looked_for_where_nothing_predicts_what_is_left(climbs):
-    climbs.wanders = True
+def test_drift_is_looked_for_where_nothing_predicts_what_is_left(climbs):
+    climbs.drifts = True
     found = end()
     assert found.ladder.looked == "calm"
     assert found.left == ("large", "calm")
-    assert "wander" in found.notes[0]
+    assert "drift" in found.notes[0]
     climbs.sketched = {((), False)}
     assert end().notes == ()
 

@@ -17,7 +17,7 @@ from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem, own_columns
 from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.search import Ladder, ladder_from
-from pipeline.criticism.selection.requested_model import Begun
+from pipeline.criticism.selection.requested_model import BaseFit
 from pipeline.criticism.selection.score_test import Candidate, Score
 from pipeline.criticism.selection.stepwise import LadderStep, _holds, _refitted, _sure, search
 from pipeline.criticism.selection.truncation import contradiction, explained, truncated
@@ -90,10 +90,12 @@ def test_what_captures_speak_against_is_no_name_beside_an_unknown(
     monkeypatch.setattr("pipeline.criticism.search.search", lambda *_: found)
     monkeypatch.setattr("pipeline.criticism.search.leave_out", lambda *_: next(totals))
     monkeypatch.setattr("pipeline.criticism.search.in_common", lambda _, alone: list(alone))
-    cut = ladder_from(Begun(first.system, ()), {}).cut
+    cut = ladder_from(BaseFit(first.system, ()), {}).cut
     assert list(cut) == ["skin_effect"] * (kept == 1)
     score = Score(Candidate(skin, ()), 50.0, 10.0, {}, {}, 1.0, 2.0, policy=DEFAULT.selection)
-    ladder = Ladder(Begun(first.system, ()), (replace(first, scores=(score,)),), held[:1], (), cut)
+    ladder = Ladder(
+        BaseFit(first.system, ()), (replace(first, scores=(score,)),), held[:1], (), cut
+    )
     (ranked,) = _ranking(ladder, (), {})
     assert ("speak against" in ranked.shortfall) is (kept == 1)
 
