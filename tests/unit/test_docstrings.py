@@ -7,6 +7,7 @@ import doctest
 import importlib
 import re
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,15 +25,21 @@ OF_OTHERS = {"ia_ma", "time_ms", "cogging_order_12"}
 PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-+\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
+@cache
+def trees() -> dict[Path, ast.Module]:
+    """The syntax of every file."""
+    return {path: ast.parse(path.read_text()) for path in FILES}
+
+
 def named(text: str) -> list[str]:
     """The names that a Parameters section describes, in order."""
     heads = [line.partition(" :")[0] for line in text.splitlines() if line[:1].strip()]
     return [name.strip() for head in heads for name in head.split(",")]
 
 
-def wrong(source: str) -> Iterator[str]:
+def wrong(tree: ast.Module) -> Iterator[str]:
     """Functions whose Parameters section leaves one out, invents one or changes their order."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         if not isinstance(node, ast.FunctionDef):
             continue
         section = PARAMETERS.search(ast.get_docstring(node) or "")
@@ -43,10 +50,10 @@ def wrong(source: str) -> Iterator[str]:
             yield f"{node.name}: {named(section[1])} for {taken}"
 
 
-def words_of(source: str) -> set[str]:
+def words_of(tree: ast.Module) -> set[str]:
     """Every name of the code: of functions, arguments, attributes, and in short texts."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         kinds = (ast.FunctionDef, ast.ClassDef, ast.Name, ast.Attribute, ast.arg, ast.keyword)
         if isinstance(node, kinds):
             found |= {str(getattr(node, key, "")) for key in ("name", "id", "attr", "arg")}
@@ -57,9 +64,9 @@ def words_of(source: str) -> set[str]:
     return found
 
 
-def quoted(source: str) -> Iterator[str]:
+def quoted(tree: ast.Module) -> Iterator[str]:
     """Names in backticks in docstrings; those with capitals in them are patterns, as `u_NAME`."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(tree):
         if isinstance(node, (ast.FunctionDef, ast.ClassDef, ast.Module)):
             text = ast.get_docstring(node) or ""
             for name in re.findall(r"`([A-Za-z_][\w.]*_[\w.]*)`", text):
@@ -90,7 +97,7 @@ def test_the_examples_in_docstrings_run(name: str) -> None:
 
 
 def test_a_parameters_section_names_the_parameters_of_its_function() -> None:
-    found = [f"{path}: {one}" for path in FILES for one in wrong(path.read_text())]
+    found = [f"{path}: {one}" for path in FILES for one in wrong(trees()[path])]
     assert found == []
 
 
@@ -100,7 +107,7 @@ def test_a_docstring_names_what_its_function_raises() -> None:
         f"{path}: {node.name}: {error}"
         for path in FILES
         if "stages" not in path.parts
-        for node in ast.walk(ast.parse(path.read_text()))
+        for node in ast.walk(trees()[path])
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
         if not ("gates" in path.parts and node.name == "check")
         for error in raised(node.body)
@@ -111,11 +118,11 @@ def test_a_docstring_names_what_its_function_raises() -> None:
 
 def test_a_docstring_names_nothing_that_is_gone() -> None:
     """A function, field, option or column in backticks is in the code."""
-    known = {path.stem for path in FILES}.union(*(words_of(path.read_text()) for path in FILES))
+    known = {path.stem for path in FILES}.union(*(words_of(tree) for tree in trees().values()))
     gone = {
         f"{path}: {name}"
         for path in FILES
-        for name in quoted(path.read_text())
+        for name in quoted(trees()[path])
         if name not in known | OF_OTHERS and not name.startswith("_")
     }
     assert gone == set()
@@ -123,6 +130,8 @@ def test_a_docstring_names_nothing_that_is_gone() -> None:
 
 def test_a_section_that_does_not_fit_is_seen() -> None:
     source = 'def f(a, b):\n    """Adds.\n\n    Parameters\n    ----------\n    a, c\n        X."""'
-    assert list(wrong(source)) == ["f: ['a', 'c'] for ['a', 'b']"]
-    assert list(wrong(source.replace("a, c", "b, a"))) == ["f: ['b', 'a'] for ['a', 'b']"]
-    assert list(wrong(source.replace("a, c", "a, b"))) == []
+    assert list(wrong(ast.parse(source))) == ["f: ['a', 'c'] for ['a', 'b']"]
+    assert list(wrong(ast.parse(source.replace("a, c", "b, a")))) == [
+        "f: ['b', 'a'] for ['a', 'b']"
+    ]
+    assert list(wrong(ast.parse(source.replace("a, c", "a, b")))) == []

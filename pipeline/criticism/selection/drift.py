@@ -33,9 +33,20 @@ _WANDERS = ("v", "i", "torque")
 def drifting_segments(fit: Fit, left: Sequence[Remainder]) -> tuple[Segment, ...] | None:
     """The segments, knowing the drift that their instruments may have.
 
-    None if a fit with that drift leaves anything over the floor. None as well if what is `left` is
-    in captures of one test alone: instruments drift in every test, while a machine that warms up
-    changes slowly in one.
+    Parameters
+    ----------
+    fit
+        Without drift.
+    left
+        What it leaves over the floor.
+
+    Returns
+    -------
+    tuple of Segment or None
+        None if a fit with that drift leaves anything large over the floor, or if what is `left` is
+        in captures of one test alone: instruments drift in every test, while a machine that warms
+        up changes slowly in one.
+
     """
     captures = {one.capture for one in left}
     tests = {segment.test for segment in fit.segments if segment.capture in captures}
@@ -63,7 +74,36 @@ def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
 
 
 def slowest(time_s: Array, terms: int) -> Array:
-    """The slowest sines [terms, n] of a random walk that ends at a standard deviation of one."""
+    """The slowest sines of a random walk that ends at a standard deviation of one.
+
+    Parameters
+    ----------
+    time_s
+        Instants [n, s], rising.
+    terms
+        How many sines.
+
+    Returns
+    -------
+    array [terms, n]
+        Each of standard size; their sum with independent normal factors is nearly the random walk.
+
+    Notes
+    -----
+    √2 sin((k − ½) π t)/((k − ½) π) for k = 1, 2, ... and t from 0 to 1 (Karhunen-Loève).
+
+    References
+    ----------
+    Papoulis and Pillai, Probability, Random Variables and Stochastic Processes, 4th ed.,
+    McGraw-Hill,
+    2002, section 11.2.
+
+    Examples
+    --------
+    >>> round(float((slowest(np.linspace(0.0, 1.0, 9), 200)[:, -1] ** 2).sum()), 2)
+    1.0
+
+    """
     time = (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), 1e-300)
     rates = (np.arange(terms)[:, None] + 0.5) * math.pi
     sines: Array = math.sqrt(2.0) * np.sin(rates * time) / rates

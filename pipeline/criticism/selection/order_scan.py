@@ -35,8 +35,31 @@ from pipeline.numerics.projection import Projection, bump
 
 
 def orders_left(system: LinearSystem) -> tuple[float, ...]:
-    """Orders that two captures have over what is beside them and in a size that matters, of those
-    that no equation looks at; one that is no whole number as close as their angles tell it.
+    """Orders that a fit leaves in logs under load, and that no equation looks at.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+
+    Returns
+    -------
+    tuple of float
+        [1/turn]; one that is no whole number as close as the logs' angles show it.
+
+    Notes
+    -----
+    An order counts that two captures have over what is beside it and in a size that matters. What
+    the machine itself does comes back after a turn, so that its orders are whole; a bearing, a gear
+    or a belt has others.
+
+    References
+    ----------
+    Lomb, Astrophys. Space Sci. 39(2), 1976, 447 (samples that are not even),
+    doi:10.1007/BF00648343.
+    Randall and Antoni, Mech. Syst. Signal Process. 25(2), 2011, 485 (orders of bearings),
+    doi:10.1016/j.ymssp.2010.07.017.
+
     """
     policy = system.policy.order_scan
     lines = [

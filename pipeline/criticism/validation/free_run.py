@@ -58,10 +58,23 @@ class Run:
         return tuple(self.simulated)
 
     def errors(self, signal: str) -> Array:
-        """Recorded less simulated as means [W] under a smooth window.
+        """Recorded less simulated as means under a smooth window.
 
+        Parameters
+        ----------
+        signal
+            One of `signals`.
+
+        Returns
+        -------
+        array [W]
+            Unit of the signal.
+
+        Notes
+        -----
         Offsets of the capture's sensors are taken out as far as their priors allow: the means are
-        whitened by 1 + Σ d dᵀ over the drifts d, as the equations' residuals are.
+        whitened by 1 + Σ d d' over the drifts d, as the equations' residuals are.
+
         """
         floor = max(self.floor[signal], 1e-300)
         error = _means(self.recorded[signal] - self.simulated[signal]) / floor
@@ -76,8 +89,24 @@ class Run:
 def free_run(segment: Segment, model: Model, values: Values) -> Run | None:
     """The model on its own over the windows of one capture.
 
-    None if the equation has no free run of the test (`equation.Use`), if the sample period is
-    longer than the electrical time constant, or if fewer than half of the trajectories settle.
+    Parameters
+    ----------
+    segment
+        Of the capture.
+    model, values
+        With every effect and sensor in place.
+
+    Returns
+    -------
+    Run or None
+        None if the equation has no free run of the test (`equation.Use`), if the sample period is
+        longer than the electrical time constant, or if fewer than half of the trajectories settle.
+
+    Notes
+    -----
+    Every window starts from the measured state: dψ/dt = v − R i − drops − j ω_e ψ and
+    J dω/dt = T(ψ, i) − drags − T_load.
+
     """
     use = equation_of(segment).use
     if segment.test not in use.free_runs:

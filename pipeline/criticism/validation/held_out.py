@@ -37,7 +37,23 @@ class Simulated:
 def values_without(
     number: int, system: LinearSystem, held: HeldOut
 ) -> tuple[dict[str, float], Split]:
-    """Parameters fitted without a capture; those of the full fit where it alone carries one."""
+    """Parameters fitted without a capture.
+
+    Parameters
+    ----------
+    number
+        Of the capture's segment.
+    system
+        Around the full fit.
+    held
+        How far the parameters move without each capture.
+
+    Returns
+    -------
+    values, split
+        `held_out`; those of the full fit, `fit`, where the capture alone carries a parameter.
+
+    """
     step = held.steps.get(number)
     if step is None:
         return system.fit.values, "fit"
@@ -74,7 +90,28 @@ def run_errors(simulated: Sequence[Simulated]) -> Iterator[SignalError]:
 
 
 def effective(residual: Array) -> float:
-    """Independent samples in autocorrelated ones: n (1 − r)/(1 + r) with lag-one r ≥ 0."""
+    """Independent samples in autocorrelated ones.
+
+    Parameters
+    ----------
+    residual
+        In order of time [n].
+
+    Returns
+    -------
+    float
+        n (1 − r)/(1 + r) with the lag-one autocorrelation r, not below 0; n for fewer than four.
+
+    References
+    ----------
+    Bayley and Hammersley, J. R. Statist. Soc. Suppl. 8(2), 1946, 184, doi:10.2307/2983560.
+
+    Examples
+    --------
+    >>> effective(np.array([1.0, -1.0, 1.0, -1.0]))
+    4.0
+
+    """
     n = residual.size
     if n < 4:
         return float(n)
