@@ -5,6 +5,7 @@
     recordings = pipeline.read("captures/")          # validated captures by motor
     fits = pipeline.fit(recordings)                  # constants with uncertainty
     sheets = pipeline.check(fits)                    # cross-checks, datasheets
+    pipeline.operate(sheets["M1"], vdc_v=48.0, current_a=20.0)  # torque curve, ratings
     pipeline.compare(recordings, effects=["cogging"])  # where a model is off
     pipeline.diagnose(recordings)                    # which physical effect it lacks
     pipeline.simulate("gimbal-5208", ["stribeck"])   # recordings of a simulated motor
@@ -32,6 +33,7 @@ __all__ = [
     "diagnose",
     "fit",
     "load",
+    "operate",
     "read",
     "simulate",
 ]
@@ -48,6 +50,7 @@ _HOMES = {
     "diagnose": "models",
     "fit": "fits",
     "load": "datasheets",
+    "operate": "performance",
     "read": "recordings",
     "simulate": "simulated",
 }

@@ -80,6 +80,25 @@ class ModelSettings:
 
 
 @dataclass(kw_only=True)
+class OperateSettings:
+    """`operate.KEY`: what the torque curve, ratings and losses of a motor are derived at."""
+
+    vdc_v: float | None = key(None, "DC bus voltage; the highest in the captures without it")
+    current_a: float | None = key(
+        None, "current limit, phase peak; the highest in the captures without it"
+    )
+    temp_winding_degc: float | None = key(None, "winding, of the peak curve; 25 without it")
+    temp_magnet_degc: float | None = key(None, "magnet, of the peak curve; 25 without it")
+    temp_ambient_degc: float | None = key(None, "ambient, of continuous torque; 40 without it")
+    temp_limit_degc: float | None = key(
+        None, "winding's limit; 80 K over ambient without it (IEC 60034-1, class 130)"
+    )
+    voltage_share: float | None = key(None, "of vdc/√3 that the inverter uses; 1 without it")
+    drop_v: float | None = key(None, "what a conducting device of the inverter drops")
+    on_ohm: float | None = key(None, "and its resistance; neither: no inverter loss")
+
+
+@dataclass(kw_only=True)
 class RunSettings(ReadingSettings):
     """`run`: captures in; datasheets, checks, report and recordings out."""
 
@@ -141,6 +160,9 @@ class RunSettings(ReadingSettings):
     model: ModelSettings = field(default_factory=ModelSettings)
     policy: dict[str, Any] = key(
         {}, "constants of judgement: policy.SECTION.FIELD=number, or policy=NAME of conf/policy/"
+    )
+    operate: OperateSettings = field(
+        default_factory=OperateSettings, metadata={"result": False, "words": ""}
     )
     fit: dict[str, Any] = key({}, "options of an estimator: fit.ESTIMATOR.OPTION=number")
     constants: dict[str, Any] = key(

@@ -14,10 +14,12 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pipeline.physics.glossary import CONSTANTS, TESTS, Term
 from pipeline.records.capture import Integrity
 from pipeline.records.datasheet import CheckStatus, DatasheetStatus
+from pipeline.records.diagnosis import Unexcited
 from pipeline.records.estimate import Status
 from pipeline.records.finding import Severity
 from pipeline.records.lot_regression import LotRegression
 from pipeline.records.model_verdict import ModelState
+from pipeline.records.performance import Blank, Curve, Derived, MapCell, Operation
 from pipeline.records.plain_form import hints_of
 from pipeline.records.uncertainty import Kind
 
@@ -150,16 +152,7 @@ def _model() -> Schema:
             "note": TEXT,
             "held_out_with": _or_null(SPREAD),
             "unknown": TEXT,
-            "unexcited": _list(
-                _object(
-                    {
-                        "effect": NAME,
-                        "tests": _list(NAME),
-                        "experiment": TEXT,
-                        "signals": _list(NAME),
-                    }
-                )
-            ),
+            "unexcited": _list(_kind(Unexcited)),
         },
     )
 
@@ -212,6 +205,16 @@ def datasheet_schema() -> Schema:
     return _document("motor-datasheet/1", "One version of one motor's datasheet", body) | {
         "$defs": {"estimate": _estimate()}
     }
+
+
+def performance_schema() -> Schema:
+    """`performance/MOTOR.json`: what a motor does at stated conditions, 95 % intervals."""
+    lists = {"numbers": Derived, "curves": Curve, "efficiency_map": MapCell, "blanks": Blank}
+    needed = {"motor_id": NAME, "datasheet_version": SHA256}
+    needed |= {"operation": _or_null(_kind(Operation))}
+    needed |= {name: _list(_kind(record)) for name, record in lists.items()}
+    body = _object(needed, {"regimes": _list(TEXT), "notes": _list(TEXT)})
+    return _document("motor-performance/1", "A motor's curves and ratings", body)
 
 
 def findings_schema() -> Schema:
@@ -391,6 +394,8 @@ def _kind(kind: Any) -> Schema:
         return _or_null(_kind(one))
     if origin is tuple:
         return _list(_kind(inner[0]))
+    if origin is Mapping:
+        return _map(_kind(inner[1]))
     if origin is Literal:
         return _one_of(kind)
     return {float: NUMBER, int: WHOLE, str: TEXT, bool: {"type": "boolean"}}[kind]
@@ -399,6 +404,7 @@ def _kind(kind: Any) -> Schema:
 SCHEMAS: dict[str, Callable[[], Schema]] = {
     "motor-datasheet": datasheet_schema,
     "findings": findings_schema,
+    "motor-performance": performance_schema,
     "model-comparison": comparison_schema,
     "model-diagnosis": diagnosis_schema,
     "motor-truth": truth_schema,

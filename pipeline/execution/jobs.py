@@ -32,7 +32,7 @@ class MotorJob:
     must not be read, with the reason. `revoked` are the motor's revoked versions: a version of the
     same work with other content supersedes them. `model` is the model of the residual test, None
     for no test; `diagnose` is the key of a run. `model_gates` is False where what the model leaves
-    keeps no datasheet from its release.
+    keeps no datasheet from its release. `operate` are the stated conditions of the performance.
     """
 
     motor_id: str
@@ -51,6 +51,7 @@ class MotorJob:
     model: ModelSpec | None = None
     diagnose: str = "auto"
     model_gates: bool = True
+    operate: Mapping[str, float | None] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     limits: ReadLimits = field(default_factory=ReadLimits)
     revoked: tuple[Revocation, ...] = ()

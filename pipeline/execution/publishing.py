@@ -31,7 +31,7 @@ OF_BATCH = frozenset(KEY_CONSTANTS)
 """Constants that the page and the summary of the batch show."""
 MOST_NAMED = 5
 """Most names of removed files in a note; datasheets come first."""
-FOLDERS = ("datasheets", "report", "recordings", ".cache")
+FOLDERS = ("datasheets", "report", "recordings", "performance", "sheet", "diagnosis", ".cache")
 
 
 @dataclass(frozen=True, slots=True)

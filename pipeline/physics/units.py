@@ -27,6 +27,7 @@ SUFFIX_UNITS: dict[str, str] = {
     "v_krpm": "V/krpm",
     "rpm_v": "rpm/V",
     "k_w": "K/W",
+    "j_k": "J/K",
     "1_k": "1/K",
     "1_s": "1/s",
     "nm_a2": "N·m/A²",

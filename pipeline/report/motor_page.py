@@ -14,13 +14,16 @@ from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
+from pipeline.records.performance import Performance
 from pipeline.report.chart import chart
 from pipeline.report.link_block import Link, link_block
 from pipeline.report.page import render
+from pipeline.report.performance_chart import band_chart, efficiency_chart
 from pipeline.report.status_block import status_block
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
 from pipeline.views.model_words import model_words
 from pipeline.views.motor import CHECK_ORDER, LEAST_SHARE, check_number, motor_rows, ordered_checks
+from pipeline.views.performance import performance_view
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +43,13 @@ def render_motor(
     findings: tuple[Finding, ...],
     own: Mapping[str, Term] | None = None,
     links: Sequence[Link] = (),
+    performance: Performance | None = None,
 ) -> str:
     """The self-contained HTML page of one motor; equal input gives equal text.
 
     Its status is what the datasheet says of itself, until `status_block.with_status`.
     `own` are the terms of constants that the glossary does not know, by name; `links` lead to the
-    motor's other pages.
+    motor's other pages; without a `performance` the page has no such section.
     """
     rows = motor_rows(datasheet, own)
     figures = _figures(datasheet.constants, evidence)
@@ -67,8 +71,27 @@ def render_motor(
         model=model_words(datasheet.model, datasheet.motor_id),
         findings=sorted(findings),
         figures=figures,
+        performance=None if performance is None else performance_view(performance),
+        charts=[] if performance is None else _charts(performance),
         drawn={figure.estimator for figure in figures},
     )
+
+
+def _charts(found: Performance) -> list[tuple[str, str]]:
+    """Titles and drawings of the performance."""
+    peak, steady = found.curve("torque_peak"), found.curve("torque_continuous")
+    torque, power, kt = ("torque_shaft_nm", "power_w", "kt_peak_nm_a")
+    of_one = [found.curve(name) for name in ("power_peak", "kt_peak")]
+    drawn = [
+        (
+            "Torque against speed",
+            band_chart([c for c in (peak, steady) if c], torque, found.regimes),
+        ),
+        ("Efficiency, with losses on hover", efficiency_chart(found.cells, peak)),
+        ("Shaft power at peak torque", band_chart([c for c in of_one[:1] if c], power)),
+        ("Air-gap torque per ampere", band_chart([c for c in of_one[1:] if c], kt)),
+    ]
+    return [(title, svg) for title, svg in drawn if svg]
 
 
 def _figures(constants: Mapping[str, Estimate], evidence: tuple[Evidence, ...]) -> list[Figure]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.estimation.registry import estimators
+from pipeline.estimation.registry import BROKEN, estimators
 from pipeline.execution import work
 from pipeline.execution.fits import FitMemory
 from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
@@ -24,6 +24,7 @@ from pipeline.records.finding import Finding
 from pipeline.records.ledger import Revocation
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Stopwatch
+from pipeline.records.performance import Blank, Performance
 
 
 def process_motor(job: MotorJob) -> MotorResult:
@@ -92,20 +93,25 @@ def _write(
 
         with watch.stage("datasheet"):
             write(f"datasheets/{stem}.json", work.content_of(datasheet))
+        with watch.stage("performance"):
+            performance = performance_at(campaign, datasheet, job.operate)
+        write(f"performance/{stem}.json", canonical_json(performance.document()))
         if found.diagnosis is not None:
             for name, content in _diagnosis_files(job, stem, found.diagnosis):
                 write(name, content)
         if job.report:
             from pipeline.execution.page_links import links_of
             from pipeline.report.motor_page import render_motor
+            from pipeline.report.sheet_page import render_sheet
 
             with watch.stage("report"):
                 terms = {term.name: term for estimator in estimators() for term in estimator.terms}
                 coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
                 coming += [] if found.diagnosis is None else [f"diagnosis/{stem}.html"]
                 links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
-                page = render_motor(datasheet, found.evidence, findings, terms, links)
+                page = render_motor(datasheet, found.evidence, findings, terms, links, performance)
                 write(f"report/{stem}.html", page.encode())
+                write(f"sheet/{stem}.html", render_sheet(datasheet, performance).encode())
         if job.recordings:
             from pipeline.io.recordings.seal import SEAL, seal_line
 
@@ -115,6 +121,25 @@ def _write(
                     sha256 = write(name, content)
                     write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
     return tuple(files)
+
+
+def performance_at(
+    campaign: Campaign, sheet: Datasheet, stated: Mapping[str, float | None]
+) -> Performance:
+    """The performance of a motor at stated conditions, else at those of its captures.
+
+    Numbers that break on odd constants cost nothing but themselves.
+    """
+    from pipeline.performance.conditions import operation_of
+    from pipeline.performance.derive import performance_of
+
+    operation = operation_of(campaign, stated)
+    try:
+        return performance_of(sheet, operation)
+    except BROKEN as error:
+        why = f"the derivation broke on these constants: {type(error).__name__}: {error}"
+        blank = Blank("performance", "performance", why, "report the captures with this line")
+        return Performance(sheet.motor_id, sheet.version, operation, blanks=(blank,))
 
 
 def _diagnosis_files(job: MotorJob, stem: str, found: Diagnosis) -> Iterator[tuple[str, bytes]]:

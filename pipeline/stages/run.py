@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -38,6 +38,7 @@ from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.limits import limits_file, release_conditions
 from pipeline.io.storage.publish import output_folder
+from pipeline.performance.conditions import check_stated
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.finding import Finding
@@ -66,6 +67,7 @@ class Registered:
 def main(settings: RunSettings) -> Outcome:
     """Processes every motor of `input`; refused captures are named and the others go on."""
     check_options(settings)
+    check_stated(asdict(settings.operate))
     ReadLimits(settings.read_seconds, settings.read_memory_mb)
     input_folder(settings.input)
     if settings.residual_test:
@@ -264,6 +266,7 @@ def _jobs(settings: RunSettings, found: Survey, limits: Path) -> list[MotorJob]:
             model=model if settings.residual_test else None,
             diagnose=settings.diagnose,
             model_gates=model_gates,
+            operate=asdict(settings.operate),
             findings=tuple(f for f in found.findings if f.file in {e.path for e in entries}),
             limits=ReadLimits(settings.read_seconds, settings.read_memory_mb),
         )

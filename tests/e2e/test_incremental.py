@@ -113,8 +113,10 @@ def test_another_input_into_the_same_output_says_what_it_removes(
     capsys.readouterr()
     main(["run", f"input={folder.input}", f"output={folder.output}", *WORDS])
     (line,) = (one for one in capsys.readouterr().err.splitlines() if "removed" in one)
-    assert line.startswith(f"note: {folder.output} holds what comes of this input alone: 2 files")
-    assert line.endswith("removed: datasheets/gimbal~2fone.json, report/gimbal~2fone.html")
+    assert line.startswith(f"note: {folder.output} holds what comes of this input alone: 4 files")
+    kinds = {"datasheets": "json", "performance": "json", "report": "html", "sheet": "html"}
+    names = ", ".join(f"{kind}/gimbal~2fone.{form}" for kind, form in kinds.items())
+    assert line.endswith(f"removed: {names}")
     assert own.read_text() == "mine"
     main(["run", f"input={folder.input}", f"output={folder.output}", *WORDS])
     assert "removed" not in capsys.readouterr().err

@@ -72,7 +72,8 @@ def test_nothing_but_the_work_changes_the_bytes(bench: Path, tmp_path: Path) -> 
     one = results(bench / "one", tmp_path / "a", 1)
     kept = ("registry/", ".cache/")
     pages = {name for name in one if "gimbal" in name and not name.startswith(kept)}
-    assert pages == {"datasheets/gimbal~2fone.json", "report/gimbal~2fone.html"}
+    kinds = {"datasheets": "json", "performance": "json", "report": "html", "sheet": "html"}
+    assert pages == {f"{kind}/gimbal~2fone.{form}" for kind, form in kinds.items()}
 
 
 def test_auto_release_needs_every_condition(bench: Path, tmp_path: Path) -> None:

@@ -33,14 +33,22 @@ from pipeline.numerics.least_squares import (
 )
 from pipeline.numerics.plateaus import white_noise_sigma
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import Contribution, propagate, type_b
 
-METHOD = Method("thermal")
 GIVEN = "rth_winding_k_w"
+CAPACITY, WINDING_TAU, BODY_TAU = "cth_winding_j_k", "tau_thermal_winding_s", "tau_thermal_body_s"
+TERMS = (
+    Term(CAPACITY, "J/K", "heat capacity of the winding", "constant", 0.0, 1e7),
+    Term(WINDING_TAU, "s", "winding alone: C over its conductances", "constant", 0.0, 1e7),
+    Term(BODY_TAU, "s", "body alone: C over its conductances", "constant", 0.0, 1e7),
+)
+METHOD = Method("thermal", TERMS)
+GIVES = (GIVEN, CAPACITY, WINDING_TAU, BODY_TAU)
 EXPERIMENT = (
     "record a heat_run of at least three thermal time constants with temp_winding_degc, "
     "temp_ambient_degc or ambient_degc, and temp_case_degc or temp_magnet_degc"
@@ -50,7 +58,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """Steady thermal resistance [K/W] with its scatter, and the winding temperature it predicts."""
+    """Steady thermal resistance [K/W] with its scatter, and the winding temperature it predicts.
+
+    `values` are the constants of `GIVES` [k], the last missing for one node, and `scatter` [k, k]
+    their common scatter: row j holds what each of k independent sources has in constant j.
+    """
 
     rth_k_w: float
     u_rth_k_w: float
@@ -58,6 +70,16 @@ class Balance:
     fitted_degc: Array
     covered: float
     words: str
+    values: Array
+    scatter: Array
+
+
+def _common_scatter(covariance: Array) -> Array:
+    """Independent sources [k, k] of a covariance [k, k], the first constant's being the first."""
+    sizes = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    ties = covariance / np.outer(sizes, sizes) + 1e-12 * np.eye(sizes.size)
+    found: Array = sizes[:, None] * np.linalg.cholesky(ties)
+    return found
 
 
 def heat_balance(t_s: Array, losses_w: Array, rise_k: Array) -> Array:
@@ -118,8 +140,8 @@ def fit_thermal(campaign: Campaign, known: Constants, options: Mapping[str, floa
         elif best is None or balance.u_rth_k_w < best[0].u_rth_k_w:
             best = balance, record, np.array([ambient])
     if best is None:
-        return METHOD.nothing((GIVEN,), "; ".join([*reasons, EXPERIMENT]))
-    return Fit((_estimate(*best, known),), (_evidence(*best[:2]),))
+        return METHOD.nothing(GIVES, "; ".join([*reasons, EXPERIMENT]))
+    return Fit(_estimates(*best, known), (_evidence(*best[:2]),))
 
 
 def _losses_w(record: HeatRecord, known: Constants) -> Array:
@@ -163,7 +185,12 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
     u = math.hypot(u, rth * math.exp(-covered))
     words = f"one time constant of {1.0 / rate:.3g} s, {covered:.1f} of them recorded"
     fitted = winding - single.residuals
-    return Balance(rth, u, max(single.dof / tau, 1.0), fitted, covered, words)
+    values = np.array([rth, 1.0 / inverse_c, 1.0 / rate])
+    slopes = np.array([gradient, [0.0, -1.0 / inverse_c**2, 0.0], [0.0, 0.0, -1.0 / rate**2]])
+    covariance = slopes @ single.covariance @ slopes.T * tau
+    covariance[0, 0] = u**2
+    scatter = _common_scatter(covariance)
+    return Balance(rth, u, max(single.dof / tau, 1.0), fitted, covered, words, values, scatter)
 
 
 def _start(double: LinearFit, body: LinearFit) -> tuple[Array | None, bool]:
@@ -238,10 +265,17 @@ def _two_nodes(
     u = fit.u_of(slope[free]) * math.sqrt(spread)
     if not math.isfinite(u):
         return None
-    words = f"winding {1.0 / (a + b):.3g} s and body {1.0 / (c + d):.3g} s, two nodes"
+    outward, back = a + b, c + d
+    slopes = np.zeros((4, 7))
+    slopes[0], slopes[1, 0] = slope, -1.0 / k**2
+    slopes[2, 1:3], slopes[3, 3:5] = -1.0 / outward**2, -1.0 / back**2
+    covariance = slopes[:, free] @ fit.covariance @ slopes[:, free].T * spread
+    values = np.array([rth, 1.0 / k, 1.0 / outward, 1.0 / back])
+    words = f"winding {1.0 / outward:.3g} s and body {1.0 / back:.3g} s, two nodes"
     dof = max((fit.residuals.size - int(free.sum())) / tau, 1.0)
-    covered = float(t[-1] - t[0]) * (a + b)
-    return Balance(rth, u, dof, winding + halves[0] * sigmas[0], covered, words)
+    covered = float(t[-1] - t[0]) * outward
+    fitted = winding + halves[0] * sigmas[0]
+    return Balance(rth, u, dof, fitted, covered, words, values, _common_scatter(covariance))
 
 
 def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
@@ -298,34 +332,45 @@ def network(t_s: Array, losses_w: Array, variants: Array) -> Array:
     return turned
 
 
-def _estimate(balance: Balance, record: HeatRecord, ambient: Array, known: Constants) -> Estimate:
+def _estimates(
+    balance: Balance, record: HeatRecord, ambient: Array, known: Constants
+) -> tuple[Estimate, ...]:
     """Budget: the loss by the errors of R and i², or of v and i; the rise by the thermometer.
 
-    A thermometer's offset leaves the loss alone, for R25 is low by what R(T) of it is high, and
-    the rise as well where it measured the ambient too.
+    What is wrong with the loss is wrong with the heat capacity the other way round, and leaves the
+    time constants alone. A thermometer's offset leaves the loss alone, for R25 is low by what R(T)
+    of it is high, and the rise as well where it measured the ambient too.
     """
     meta = record.capture.meta
-    rth = balance.rth_k_w
     thermometer = temperature_source(meta)
     current = type_b(current_source(meta), meta.instrument_u("u_rel_current"))
     resistance = reference_resistance(record, known)
     if resistance is None:
         volts = type_b(voltage_source(meta), meta.instrument_u("u_rel_voltage"))
-        loss = propagate([(-rth, volts), (-rth, current)])
+        loss = propagate([(-1.0, volts), (-1.0, current)])
     else:
         others = tuple(part for part in resistance.budget if part.source != thermometer)
-        loss = propagate([(-2.0 * rth, current), (-rth / resistance.number, others)])
-    parts = [METHOD.scatter(GIVEN, balance.u_rth_k_w, balance.dof), *loss]
+        loss = propagate([(-2.0, current), (-1.0 / resistance.number, others)])
+    relative = list(loss)
     rise = float(record.temp_winding_degc.max()) - float(ambient[0])
     if record.temp_ambient_degc is None and rise > 0.0:
-        parts.append(Contribution(thermometer, rth * meta.instrument_u("u_temp_degc") / rise, "B"))
+        relative.append(Contribution(thermometer, meta.instrument_u("u_temp_degc") / rise, "B"))
     at = {
         "current_a": round(float(record.current_a.mean()), 4),
         "temp_ambient_degc": round(float(ambient[0]), 2),
         "temp_high_degc": round(float(record.temp_winding_degc.max()), 2),
     }
     note = f"steady state by {balance.words}; the motor as mounted on this bench"
-    return METHOD.measured(GIVEN, rth, parts, (record.capture,), at, note)
+    found = []
+    signs = {GIVEN: 1.0, CAPACITY: -1.0}
+    for name, value, row in zip(GIVES, balance.values, balance.scatter, strict=False):
+        parts = [METHOD.scatter(of, u, balance.dof) for of, u in zip(GIVES, row, strict=False) if u]
+        parts += propagate([(signs.get(name, 0.0) * float(value), tuple(relative))])
+        parts = [part for part in parts if part.u]
+        found.append(METHOD.measured(name, float(value), parts, (record.capture,), at, note))
+    if len(found) < len(GIVES):
+        found.append(METHOD.missing(BODY_TAU, f"one node explains the run; {EXPERIMENT}"))
+    return tuple(found)
 
 
 def _evidence(balance: Balance, record: HeatRecord) -> Evidence:
@@ -338,10 +383,12 @@ def _evidence(balance: Balance, record: HeatRecord) -> Evidence:
 
 ESTIMATOR = Estimator(
     METHOD.name,
-    (GIVEN,),
+    GIVES,
     ("heat_run",),
     EXPERIMENT,
     fit_thermal,
+    terms=METHOD.terms,
+    clock_powers={CAPACITY: 1, WINDING_TAU: 1, BODY_TAU: 1},
     uses=("temp_coeff_copper_1_k", "temp_coeff_magnet_1_k", *TURNING, *REFERENCE),
     options={"worst_u_rel": 0.25},
 )

@@ -16,7 +16,7 @@ from pipeline.records.capture import Capture
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import type_a
 from tests.recovery.cases_electrical import LONG_HEAT
-from tests.recovery.simulated import recorded
+from tests.recovery.simulated import MOTOR, recorded
 from tests.unit.estimation.signals import capture, estimates, known_value
 
 
@@ -150,3 +150,37 @@ def test_a_gap_in_the_log_is_no_jump_of_the_temperature(begin, end):
     assert "two nodes" in whole.note
     assert broken.number == pytest.approx(whole.number, rel=4e-3)
     assert broken.u_a < 1.2 * whole.u_a
+
+
+def test_heat_capacity_and_time_constant_of_one_node():
+    """60 s and 50 K over 15 W: C = 18 J/K; a gain of the current moves C as it moves the loss."""
+    found = estimates(thermal.ESTIMATOR, heat_capture(kind="measured", alpha=0.0))
+    capacity, tau = found["cth_winding_j_k"], found["tau_thermal_winding_s"]
+    assert tau.number == pytest.approx(60.0, rel=0.01)
+    assert capacity.number == pytest.approx(tau.number / found["rth_winding_k_w"].number, rel=1e-9)
+    rth = {part.source: part.u for part in found["rth_winding_k_w"].budget}
+    own = {part.source: part.u for part in capacity.budget}
+    for gain in ("voltage@s", "current@s"):
+        assert own[gain] / capacity.number == pytest.approx(
+            -rth[gain] / found["rth_winding_k_w"].number
+        )
+    assert found["tau_thermal_body_s"].status == "not_identifiable"
+    assert "one node" in found["tau_thermal_body_s"].note
+
+
+def test_the_network_of_two_bodies_is_that_of_the_bench():
+    """Capacity and time constants within their intervals of the simulated network's."""
+    captures, _ = recorded(LONG_HEAT, 3)
+    found = estimates(thermal.ESTIMATOR, captures.captures[0])
+    motor = MOTOR
+    truths = {
+        "cth_winding_j_k": motor.cth_winding_j_k,
+        "tau_thermal_winding_s": motor.cth_winding_j_k
+        / (1.0 / motor.rth_wa_k_w + 1.0 / motor.rth_wm_k_w),
+        "tau_thermal_body_s": motor.cth_magnet_j_k
+        / (1.0 / motor.rth_wm_k_w + 1.0 / motor.rth_ma_k_w),
+    }
+    for name, truth in truths.items():
+        low, high = found[name].interval(0.999)
+        assert low < truth < high, (name, truth, found[name].number, found[name].u)
+        assert found[name].u < 0.1 * truth, name

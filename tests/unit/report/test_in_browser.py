@@ -8,19 +8,25 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from html import escape, unescape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pipeline.performance.derive import performance_of
 from pipeline.records.comparison_history import Earlier
 from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.performance import Operation, Performance
 from pipeline.report.comparison_page import render_comparison
 from pipeline.report.fleet_page import render_fleet
 from pipeline.report.ladder_page import render_ladder
 from pipeline.report.lot_page import render_regression
 from pipeline.report.motor_page import render_motor
+from pipeline.report.sheet_page import render_sheet
 from tests.unit.ladders import make_diagnosis, make_rung
+from tests.unit.performance.constants import salient
+from tests.unit.performance.sheets import sheet_of
 from tests.unit.regressions import make_regression
 from tests.unit.report.conftest import FINDINGS, make_datasheet, make_evidence
 from tests.unit.views.test_comparison import make_comparison
@@ -61,8 +67,12 @@ def long_ladder() -> Diagnosis:
 
 PAGES: dict[str, Callable[[], str]] = {
     "motor": lambda: render_motor(
-        make_datasheet(LONG), make_evidence(np.random.default_rng(2)), FINDINGS
+        make_datasheet(LONG),
+        make_evidence(np.random.default_rng(2)),
+        FINDINGS,
+        performance=make_performance(),
     ),
+    "sheet": lambda: render_sheet(make_datasheet(LONG), make_performance()),
     "fleet": lambda: render_fleet(
         [motor(LONG, 252.0), motor("b", 364.0), make_datasheet("c", 1.02)], FINDINGS
     ),
@@ -72,6 +82,13 @@ PAGES: dict[str, Callable[[], str]] = {
     ),
     "lots": lambda: render_regression(make_regression()),
 }
+
+
+def make_performance() -> Performance:
+    """Numbers, curves and a map of a motor made up by hand."""
+    operation = Operation(24.0, 30.0, 25.0, 25.0, 25.0, 105.0)
+    return performance_of(sheet_of(salient()), operation)
+
 
 WRONG = "wrong"
 ALL_WRONG = """<!doctype html><body><p style="width:600px">beyond</p>
@@ -131,3 +148,22 @@ def test_what_is_too_wide_or_cut_off_is_seen(measured: dict[str, Any]) -> None:
     assert len(told["scrolling"]) == 1
     assert any("beyond" in one for one in told["beyond"])
     assert told["cut"] == ["text  off the drawing"]
+
+
+@pytest.mark.parametrize("size", ["A4", "Letter"])
+def test_the_sheet_prints_on_one_page(tmp_path: Path, size: str) -> None:
+    """As many constants, numbers and notes as there are; the page of the printer's size."""
+    page = PAGES["sheet"]()
+    known = "@page { margin: 12mm; }"
+    assert page.count(known) == 1
+    path = tmp_path / "sheet.html"
+    path.write_text(page.replace(known, f"@page {{ size: {size}; margin: 12mm; }}"), "utf-8")
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
+    words += ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
+    words += [f"--user-data-dir={tmp_path / 'profile'}", "--no-pdf-header-footer"]
+    printed = tmp_path / "sheet.pdf"
+    subprocess.run(
+        [browser_path(), *words, f"--print-to-pdf={printed}", path.as_uri()],
+        capture_output=True, timeout=300, check=True,
+    )  # fmt: skip
+    assert len(re.findall(rb"/Type\s*/Page\b", printed.read_bytes())) == 1

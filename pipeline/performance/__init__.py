@@ -1,0 +1,1 @@
+"""From the constants of a datasheet to its numbers: curves, ratings, losses, with intervals."""

@@ -1,0 +1,145 @@
+"""A permanent-magnet synchronous machine at stated temperatures: flux, voltage, torque, losses.
+
+Amplitude-invariant rotor frame, motor convention: IEEE Std 1812-2014; J. Pyrhönen et al., Design of
+Rotating Electrical Machines, 2nd ed. 2014, ch. 7. Every field may hold many draws [n].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """Constants [n each] at one winding and one magnet temperature.
+
+    `ld_slope_h_a` and `lq_slope_h_a2` are how the apparent inductances go with their own current;
+    `within_a` is the q current up to which that was measured, and beyond which they stay.
+    """
+
+    pole_pairs: float
+    r_ohm: Array
+    psi_wb: Array
+    ld_h: Array
+    lq_h: Array
+    ld_slope_h_a: Array
+    lq_slope_h_a2: Array
+    within_d_a: float
+    within_q_a: float
+    coulomb_nm: Array
+    viscous_nm_s_rad: Array
+
+    @property
+    def bends(self) -> bool:
+        """Whether any inductance goes with the current."""
+        return bool(np.any(self.ld_slope_h_a) or np.any(self.lq_slope_h_a2))
+
+    def one(self, draw: int) -> Machine:
+        """A machine of a single draw."""
+        at = slice(draw, draw + 1)
+        return Machine(
+            self.pole_pairs,
+            self.r_ohm[at],
+            self.psi_wb[at],
+            self.ld_h[at],
+            self.lq_h[at],
+            self.ld_slope_h_a[at],
+            self.lq_slope_h_a2[at],
+            self.within_d_a,
+            self.within_q_a,
+            self.coulomb_nm[at],
+            self.viscous_nm_s_rad[at],
+        )
+
+
+def inductances_h(machine: Machine, id_a: Array, iq_a: Array) -> tuple[Array, Array]:
+    """Apparent inductances L = (ψ - ψ_pm)/i at some currents.
+
+    Parameters
+    ----------
+    machine : Machine
+        Fields [n].
+    id_a, iq_a : array [n, ...], A
+        Currents, phase peak.
+
+    Returns
+    -------
+    array, array [n, ...], H
+
+    Notes
+    -----
+    L_d = L_d0 + s_d i_d and L_q = L_q0 + s_q i_q²: the lowest terms that the axes' symmetry allows,
+    for the d axis is biased by the magnet and the q axis is not. What one axis does to the other
+    (cross saturation) is not in them.
+
+    """
+    d = np.clip(id_a, -machine.within_d_a, machine.within_d_a)
+    q = np.clip(iq_a, -machine.within_q_a, machine.within_q_a)
+    ld = _wide(machine.ld_h, d) + _wide(machine.ld_slope_h_a, d) * d
+    lq = _wide(machine.lq_h, q) + _wide(machine.lq_slope_h_a2, q) * q**2
+    return ld, lq
+
+
+def torque_nm(machine: Machine, id_a: Array, iq_a: Array) -> Array:
+    """Air-gap torque [n, ..., N·m] of currents [n, ..., A].
+
+    T = 1.5 p (ψ_pm i_q + (L_d - L_q) i_d i_q)
+    """
+    ld, lq = inductances_h(machine, id_a, iq_a)
+    flux = _wide(machine.psi_wb, id_a) + (ld - lq) * id_a
+    found: Array = 1.5 * machine.pole_pairs * flux * iq_a
+    return found
+
+
+def voltage_v(machine: Machine, id_a: Array, iq_a: Array, omega_rad_s: Array) -> Array:
+    """Phase voltage, peak [n, ..., V], at a steady mechanical speed [..., rad/s].
+
+    v_d = R i_d - ω_e L_q i_q and v_q = R i_q + ω_e (L_d i_d + ψ_pm)
+    """
+    ld, lq = inductances_h(machine, id_a, iq_a)
+    omega = machine.pole_pairs * omega_rad_s
+    r = _wide(machine.r_ohm, id_a)
+    d = r * id_a - omega * lq * iq_a
+    q = r * iq_a + omega * (ld * id_a + _wide(machine.psi_wb, id_a))
+    found: Array = np.hypot(d, q)
+    return found
+
+
+def drag_nm(machine: Machine, omega_rad_s: Array) -> Array:
+    """Torque that rotation takes [n, ..., N·m] at speeds [..., rad/s] of one sense, 0 or more.
+
+    T_c + B ω: friction, windage and the iron loss of the magnet's flux together, as a retardation
+    with open terminals gives them (IEEE Std 1812-2014, no-load and retardation tests; IEC
+    60034-2-1, friction and windage plus iron loss).
+    """
+    speeds = np.asarray(omega_rad_s)
+    coulomb = machine.coulomb_nm.reshape(-1, *([1] * speeds.ndim))
+    viscous = machine.viscous_nm_s_rad.reshape(-1, *([1] * speeds.ndim))
+    found: Array = coulomb + viscous * speeds
+    return found
+
+
+def copper_w(machine: Machine, id_a: Array, iq_a: Array) -> Array:
+    """Copper loss [n, ..., W], P = 1.5 R (i_d² + i_q²) (IEC 60034-2-1, winding losses)."""
+    found: Array = 1.5 * _wide(machine.r_ohm, id_a) * (id_a**2 + iq_a**2)
+    return found
+
+
+def inverter_w(drop_v: float, on_ohm: float, current_a: Array) -> Array:
+    """Conduction loss of a three-phase bridge [..., W] at phase currents [..., A peak].
+
+    P = 3 (V 2 I/π + r I²/2): each phase current flows through one device at any time, which drops
+    V + r i. Switching loss is not in it.
+    """
+    found: Array = 3.0 * (drop_v * 2.0 * current_a / np.pi + on_ohm * current_a**2 / 2.0)
+    return found
+
+
+def _wide(values: Array, like: Array) -> Array:
+    """Draws [n] with axes appended until they go with [n, ...]."""
+    return values.reshape(-1, *([1] * (np.ndim(like) - 1)))

@@ -1,0 +1,146 @@
+"""The numbers of a motor datasheet, derived from constants at stated conditions, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+Numbers = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """The conditions that a motor is operated at; `origin` says by name where each comes from.
+
+    Currents are phase peaks. `voltage_share` is what the inverter uses of vdc/√3. `drop_v` [V] and
+    `on_ohm` are what one conducting device of it drops, None where that is not known.
+    """
+
+    vdc_v: float
+    current_a: float
+    temp_winding_degc: float
+    temp_magnet_degc: float
+    temp_ambient_degc: float
+    temp_limit_degc: float
+    voltage_share: float = 1.0
+    drop_v: float | None = None
+    on_ohm: float | None = None
+    origin: Mapping[str, str] = field(default_factory=dict)
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: part of `motor-performance/1`."""
+        return {**asdict(self), "origin": dict(sorted(self.origin.items()))}
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """One number [unit]: value, 95 % interval, formula, and what is conventional in it."""
+
+    name: str
+    words: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    formula: str
+    convention: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: part of `motor-performance/1`."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Blank:
+    """A number that the captures do not give: why, and the test that would."""
+
+    name: str
+    words: str
+    why: str
+    test: str
+
+    def document(self) -> dict[str, str]:
+        """The JSON form: part of `motor-performance/1`."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Values [n, unit] over `x` [n, the unit that ends `x_name`] with their 95 % intervals."""
+
+    name: str
+    words: str
+    unit: str
+    x_name: str
+    x: Numbers
+    value: Numbers
+    low: Numbers
+    high: Numbers
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: part of `motor-performance/1`."""
+        return {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
+
+
+@dataclass(frozen=True, slots=True)
+class MapCell:
+    """One operating point of the efficiency map: the currents that give it with the least copper
+    loss, losses by place [W], efficiency and its 95 % interval [1].
+    """
+
+    omega_mech_rad_s: float
+    torque_shaft_nm: float
+    id_a: float
+    iq_a: float
+    copper_w: float
+    rotation_w: float
+    inverter_w: float | None
+    efficiency: float
+    low: float
+    high: float
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form: part of `motor-performance/1`."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """What a motor does at some conditions: numbers, curves, a map, and what cannot be known.
+
+    `operation` is None where the conditions themselves are not known.
+    """
+
+    motor_id: str
+    version: str
+    operation: Operation | None
+    numbers: tuple[Derived, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    cells: tuple[MapCell, ...] = ()
+    regimes: tuple[str, ...] = ()
+    blanks: tuple[Blank, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def number(self, name: str) -> Derived | None:
+        """A number by name, None where it is blank."""
+        return next((one for one in self.numbers if one.name == name), None)
+
+    def curve(self, name: str) -> Curve | None:
+        """A curve by name, None where it is blank."""
+        return next((one for one in self.curves if one.name == name), None)
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form, schema motor-performance/1."""
+        return {
+            "schema": "motor-performance/1",
+            "motor_id": self.motor_id,
+            "datasheet_version": self.version,
+            "operation": None if self.operation is None else self.operation.document(),
+            "numbers": [one.document() for one in self.numbers],
+            "curves": [one.document() for one in self.curves],
+            "efficiency_map": [one.document() for one in self.cells],
+            "regimes": list(self.regimes),
+            "blanks": [one.document() for one in self.blanks],
+            "notes": list(self.notes),
+        }
