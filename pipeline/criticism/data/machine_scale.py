@@ -23,6 +23,8 @@ from pipeline.records.stated import stated_constants
 
 _TRACED = ("torque_map", "drive", "heat_run")
 _TABLES = (*sorted(TESTS_WITHOUT_CLOCK), "holding_current")
+_SHAFT_ALONE = ("spin_down", "cogging")
+"""Tests without a current, of which a winding's pole pairs say nothing."""
 _TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
 # orders a turn that a slow turn is searched for, and harmonics of the cogging order
@@ -59,7 +61,8 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
     slots, stated = campaign.nameplate("slots"), stated_u(campaign.captures)
     pole_pairs = pole_pairs_of(campaign, start)
     if pole_pairs is None:
-        if any(capture.has(name) for capture in campaign.captures for name in _TURNING):
+        electric = [c for c in campaign.captures if c.meta.test not in _SHAFT_ALONE]
+        if any(capture.has(name) for capture in electric for name in _TURNING):
             return None
         pole_pairs = 1
     captures = tuple(c for c in map(tellable, campaign.captures) if c is not None)

@@ -1,4 +1,4 @@
-"""A drive's log of the q axis alone, on an even clock: voltage, current and the shaft's motion."""
+"""A drive's log without both voltages, on an even clock: what there is, and the shaft's motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Sensors
-from pipeline.criticism.data.traces import even_clock, prepared, shaft_angle
+from pipeline.criticism.data.traces import SMOOTHED, even_clock, prepared, shaft_angle
 from pipeline.criticism.effect import Array, Machine
 from pipeline.records.capture import Capture
 
@@ -18,6 +18,7 @@ are like their neighbours."""
 _STALE, _LATE = 12, 1.5
 """Samples given up before a reading that came late, and twice as many from it on; periods from
 which on it did. By judgement: what a host reads after a hold-up is of before."""
+_ELECTRICAL = ("vq_v", "id_a", "iq_a", *SMOOTHED)
 _MOTION = ("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad")
 
 
@@ -36,11 +37,12 @@ class QLog:
 
 
 def q_log(capture: Capture, machine: Machine) -> QLog | None:
-    """The log of a drive that tells of the q axis alone; None of any other."""
+    """The log of a drive that lacks a voltage or the d current; None of any other."""
     moving = [name for name in _MOTION if capture.has(name)]
     if capture.has("vd_v", "vq_v", "id_a", "iq_a") or not moving:
         return None
-    period, found, keep = even_clock(capture, ("vq_v", "iq_a", *moving))
+    there = tuple(name for name in _ELECTRICAL if capture.has(name))
+    period, found, keep = even_clock(capture, (*there, *moving))
     keep &= _on_time(capture, period, keep.size)
     speed = found.get("omega_mech_rad_s")
     shaft_angle(found, period, machine)

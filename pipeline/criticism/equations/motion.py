@@ -1,8 +1,9 @@
-"""The motion of a shaft that runs free under the q current of a drive's log."""
+"""The motion of a shaft that runs free under the current of a log, with a voltage or none."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 
 TORQUE, RECORDER = "torque_shaft_nm", "log"
+_USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run")
 _MOTION_WINDOWS, _PAD = 160, 8
 """Windows of the motion at the most, and samples kept at either side. By judgement: cost goes with
 both, and the angle's second difference needs a few beyond a window."""
@@ -32,20 +34,22 @@ _FINEST = 6
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Angle and q current, in a selection of the windows: waves of the angle are dear at speed.
+    """Angle and current, in a selection of the windows: waves of the angle are dear at speed.
 
     Only where there is an angle, and no transducer: with one the shaft is not known to run free.
     """
     log = None if capture.has(TORQUE) else q_log(capture, machine)
     if log is None or not log.angle:
         return None
-    shaft = {name: log.columns[name] for name in ("theta_mech_rad", "iq_a", "travel_rad", "run")}
+    shaft = {name: log.columns[name] for name in _USED if name in log.columns}
+    warm = log.columns.get("temp_magnet_degc")
+    fixed = {} if warm is None else {"ambient_k": float(np.mean(warm)) - 25.0}
     shaft["row"] = np.arange(log.keep.size, dtype=float)
     window = window_of(log.period_s, log.keep.size)
     shaft, starts = thinned(shaft, log.keep, window, _MOTION_WINDOWS, _PAD)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     blocks = in_time(shaft.pop("row")[starts + window // 2], log.keep.size)
-    return segment_of(
+    made = segment_of(
         capture,
         "motion",
         "drive",
@@ -56,6 +60,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=blocks,
     )
+    return replace(made, fixed={**made.fixed, **fixed})
 
 
 def state(
@@ -92,14 +97,14 @@ EQUATION = Equation(
     name="motion",
     words="J dω/dt = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags",
     tests=("drive",),
-    columns=("t_s", "vq_v", "iq_a"),
+    columns=("t_s", "iq_a"),
     channels=(Channel(TORQUE, "torque_nm", acceleration=True, as_torque=True),),
     cut=cut,
     state=state,
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("psi_wb", "j_kgm2", "b_nm_s_rad"),
+        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"angle", "current", "clock"}),
         form="affine",

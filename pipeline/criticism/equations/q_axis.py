@@ -108,7 +108,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("r_ohm", "lead_share", "lq_h", "psi_wb"),
+        ("r_ohm", "lead_share", "ld_h", "lq_h", "psi_wb"),
         hooks=frozenset({"flux", "drop"}),
         sensors=frozenset({"angle", "current", "voltage", "clock"}),
         form="affine",

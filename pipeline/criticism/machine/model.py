@@ -85,6 +85,8 @@ BASE: tuple[Constant, ...] = (
     Constant("gain_clock", "1", "recorded time over true time, less one", 1e-4, hook="gain"),
     Constant("offset_temp_k", "K", "offset of the thermometers", 2.0, hook="gain"),
     # most motors on a bench lie within twice that of their surroundings
+    # of a third of the current along d, of a field a fifth of the magnet's, of axes a third apart
+    Constant("unlogged_d_share", "1", "reluctance torque of an unlogged i_d", 0.02, hook="gain"),
     Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", 20.0, hook="gain"),
     Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", 20.0, hook="gain"),
 )

@@ -228,7 +228,7 @@ class _Sampler:
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            **{one: one in self.segment.fixed for one in UNLOGGED.values()},
+            **{n: n in self.segment.fixed for n in ("unlogged_d_share", *UNLOGGED.values())},
             "gain_clock": observes_sensor(self.segment, "clock"),
             self.segment.meter: observes_sensor(self.segment, "voltage"),
             self.segment.ammeter: observes_sensor(self.segment, "current"),

@@ -80,7 +80,7 @@ class Drag:
     )  # fmt: skip
     speed_share: float = chosen(
         0.02, unit="1", meaning="relative standard uncertainty of J, T_c and B where a bench's own "
-        "speed is all that tells of the motion",
+        "speed is the only record of the motion",
         why="what smooths or delays a speed does so to the acceleration, and does not say how much",
     )  # fmt: skip
 

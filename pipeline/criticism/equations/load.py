@@ -1,0 +1,140 @@
+"""The torque that a transducer shows under the current of a log that lacks a voltage."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.criticism.data.q_log import in_time
+from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
+from pipeline.criticism.data.traces import (
+    SMOOTHED,
+    even_angle,
+    even_clock,
+    prepared,
+    shaft_angle,
+    thinned,
+    window_of,
+    with_angle,
+)
+from pipeline.criticism.effect import Array, Machine, Operating, Values
+from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.signals.shaft import net_torque, sensed_torque, true_load
+from pipeline.criticism.signals.true_state import (
+    at_true_angle,
+    drive_current,
+    motion_of,
+    operating,
+)
+from pipeline.numerics.projection import projection
+from pipeline.records.capture import Capture
+
+TORQUE, SHARE = "torque_shaft_nm", "unlogged_d_share"
+_BOTH_AXES = ("vd_v", "vq_v", "id_a", "iq_a")
+_WINDOWS = 48
+"""Windows at the most; by judgement: cost goes with them."""
+
+
+def cut(capture: Capture, machine: Machine) -> Segment | None:
+    """Current, torque and angle of a log that has no voltages of both axes.
+
+    A d current that was not logged is taken as zero, and what its reluctance torque may be of the
+    magnet's is a nuisance.
+    """
+    angle = with_angle(capture, [])
+    if capture.has(*_BOTH_AXES) or not angle:
+        return None
+    others = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
+    period, found, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle))
+    shaft_angle(found, period, machine)
+    window, size = window_of(period, keep.size), keep.size
+    sensors = prepared(found, period)
+    if capture.meta.test == "torque_map":
+        noise = dict(sensors.noise)
+        noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
+        even_angle(found, noise, window)
+        sensors = replace(sensors, noise=noise)
+    found["t_s"] = period * np.arange(size, dtype=np.float64)
+    found["row"] = np.arange(size, dtype=np.float64)
+    cut_out, starts = thinned(found, keep, window, _WINDOWS)
+    by_angle = "omega_mech_rad_s" not in angle
+    orders = electrical_orders(machine) if by_angle else ()
+    weak = projection(cut_out["theta_mech_rad"], starts, window, orders)
+    blocks = in_time(cut_out.pop("row")[weak.starts + window // 2], size)
+    made = segment_of(
+        capture,
+        "load",
+        "drive",
+        period,
+        found=cut_out,
+        sensors=sensors,
+        channels=(TORQUE,),
+        weak=weak,
+        blocks=blocks,
+    )
+    share = {} if "id_a" in cut_out else {SHARE: 1.0}
+    return replace(made, fixed={**made.fixed, **share})
+
+
+def state(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Operating:
+    """True current, angle and speed [n]."""
+    motion = motion_of(segment, signals, model.machine)
+    current = drive_current(segment, signals, model, values, motion.theta_rad.size)
+    x = operating(segment, signals, model, values, current, motion)
+    return at_true_angle(segment, x, model, values)
+
+
+def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+    """The torque less the dynamics of its transducer [1, n, N·m]."""
+    return true_load(segment, signals, model, values)[None]
+
+
+def predicted(
+    segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
+) -> Array:
+    """The torque that the transducer shows [1, n, N·m].
+
+    Notes
+    -----
+    T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags − J dω/dt; without the d current 1.5 p s ψ i_q as well, of
+    the share s that the reluctance torque is of the magnet's.
+
+    References
+    ----------
+    IEEE Std 1812-2014, 4.4 (torque against current).
+
+    """
+    torque = net_torque(x, pieces)
+    if SHARE in segment.fixed:
+        share = values[SHARE] * values["psi_wb"]
+        torque = torque + 1.5 * x.machine.pole_pairs * share * x.iq_a
+    return sensed_torque(segment, x, torque, model, values)[None]
+
+
+EQUATION = Equation(
+    name="load",
+    words="T = 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags − J dω/dt",
+    tests=("torque_map", "drive"),
+    columns=("t_s", "iq_a", TORQUE),
+    channels=(Channel(TORQUE, "torque_nm"),),
+    cut=cut,
+    state=state,
+    measured=measured,
+    predicted=predicted,
+    observes=Observes(
+        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
+        hooks=frozenset({"flux", "torque"}),
+        sensors=frozenset({"angle", "current", "load", "clock"}),
+        torque_in=TORQUE,
+    ),
+    recorder="log",
+    use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"flux"}), angle_maps=True),
+    # behind the voltage of the same log
+    rank=1,
+)

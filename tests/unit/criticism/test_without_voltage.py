@@ -1,0 +1,97 @@
+"""Logs that lack a voltage: the torque or the motion alone, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import pytest
+
+import pipeline
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.truth import truth
+from tests.simulated import campaign_of, design
+
+MOTOR = replace(design("gimbal-5208"), effects={})
+TRUE = truth(MOTOR)["constants"]
+J, PSI, DRY = TRUE["j_rotor_kgm2"], TRUE["psi_pm_wb"], TRUE["torque_coulomb_nm"]
+DRY_NAME = "coulomb_friction.torque_nm"
+PAIRS = {"pole_pairs": TRUE["pole_pairs"]}
+REACH = 2.576
+
+
+def recorded(
+    *plan: tuple[str, Mapping[str, object]], keep: Collection[str], **meta: object
+) -> pipeline.Recordings:
+    """Captures of a plan with these columns, and what is said of them."""
+    steps = tuple((f"{test}_{n}", test, how) for n, (test, how) in enumerate(plan))
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 2, steps))
+    cut = []
+    for one in whole.captures:
+        tables = (t.select([n for n in t.columns if n in {"t_s", *keep}]) for t in one.tables)
+        meta_of = replace(one.meta, **{"pole_pairs": None, **meta})
+        cut.append(replace(one, meta=meta_of, tables=tuple(t for t in tables if t.width > 1)))
+    return pipeline.Recordings({whole.motor_id: replace(whole, captures=tuple(cut))})
+
+
+def compared(recordings: pipeline.Recordings, **constants: float):
+    (found,) = pipeline.compare(recordings, constants=constants).motors.values()
+    return found
+
+
+def holds(one, true: float) -> bool:
+    return bool(abs(one.value - true) <= REACH * one.u)
+
+
+MAP = (("torque_map", {"speed": 0.3}), ("torque_map", {"speed": -0.5}))
+
+
+def test_a_torque_map_without_voltages():
+    keep = ("id_a", "iq_a", "torque_shaft_nm", "theta_mech_rad", "temp_magnet_degc")
+    found = compared(recorded(*MAP, keep=keep, **PAIRS))
+    psi = found.parameters["psi_wb"]
+    assert holds(psi, PSI)
+    assert psi.u < 0.02 * PSI
+    assert {one.signal for one in found.errors} == {"torque_shaft_nm"}
+    assert found.held_out < 1.5
+    (salient,) = (one for one in found.combinations if "lq_h" in one.of)
+    assert salient.expression == "ld_h - 1*lq_h"
+    assert holds(salient, TRUE["ld_h"] - TRUE["lq_h"])
+
+
+def test_a_torque_map_without_its_d_current_is_as_uncertain_as_that_makes_it():
+    keep = ("iq_a", "torque_shaft_nm", "theta_mech_rad", "temp_magnet_degc")
+    psi = compared(recorded(*MAP, keep=keep, **PAIRS)).parameters["psi_wb"]
+    assert holds(psi, PSI)
+    assert psi.u > 0.015 * PSI
+
+
+def test_a_drive_of_current_and_angle_has_the_inertia_over_the_flux():
+    free = ("drive", {"load": 0.0})
+    found = compared(recorded(free, keep=("iq_a", "theta_mech_rad"), **PAIRS))
+    assert found.parameters["j_kgm2"].value is None
+    together = {one.expression: one for one in found.combinations}
+    assert holds(together["j_kgm2/psi_wb"], J / PSI)
+    log = recorded(free, keep=("id_a", "iq_a", "theta_mech_rad"), **PAIRS)
+    with_flux = compared(log, psi_pm_wb=PSI, u_psi_pm_wb=0.01 * PSI).parameters
+    assert holds(with_flux["j_kgm2"], J)
+    assert with_flux["j_kgm2"].u == pytest.approx(0.01 * J, rel=0.3)
+    assert with_flux["psi_wb"].status == "stated"
+
+
+def test_a_q_axis_log_has_its_winding_temperature_and_its_torque():
+    keep = ("iq_a", "vq_v", "theta_mech_rad", "temp_winding_degc", "torque_shaft_nm")
+    found = compared(recorded(("drive", {}), keep=keep, **PAIRS))
+    assert {one.signal for one in found.errors} >= {"vq_v", "torque_shaft_nm"}
+    assert not any("no temp_winding_degc" in note for note in found.notes)
+
+
+def test_coasts_ask_for_no_pole_pairs():
+    coasts = recorded(("spin_down", {"direction": 1}), ("spin_down", {"direction": -1}),
+                      keep=("theta_mech_rad", "omega_mech_rad_s"))  # fmt: skip
+    found = compared(coasts)
+    together = {one.expression: one for one in found.combinations}
+    assert holds(together[f"{DRY_NAME}/j_kgm2"], DRY / J)
+    turned = recorded(("drive", {}), keep=("iq_a", "vq_v", "theta_mech_rad"))
+    assert "pole pairs" in compared(turned).notes[0]
