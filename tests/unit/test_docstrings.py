@@ -1,4 +1,4 @@
-"""Docstrings of the whole package: examples run, and a Parameters section fits its signature."""
+"""Docstrings of the whole package: examples run, and what they say of the code is so."""
 
 from __future__ import annotations
 
