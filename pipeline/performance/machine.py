@@ -19,7 +19,8 @@ class Machine:
     """Constants [n each] at one winding and one magnet temperature.
 
     `ld_slope_h_a` and `lq_slope_h_a2` are how the apparent inductances go with their own current;
-    `within_a` is the q current up to which that was measured, and beyond which they stay.
+    `within_d_a` and `within_q_a` are the currents up to which that was measured, and beyond which
+    they stay.
     """
 
     pole_pairs: float

@@ -34,7 +34,7 @@ def trees() -> dict[Path, ast.Module]:
 def named(text: str) -> list[str]:
     """The names that a Parameters section describes, in order."""
     heads = [line.partition(" :")[0] for line in text.splitlines() if line[:1].strip()]
-    return [name.strip() for head in heads for name in head.split(",")]
+    return [name.strip(" *") for head in heads for name in head.split(",")]
 
 
 def wrong(tree: ast.Module) -> Iterator[str]:
