@@ -86,6 +86,25 @@ def refined(port: Port, machine: Machine, policy: Discovery) -> Port:
 
 
 def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
+    one, omega, sense, iq, load = _torque_carriers(machine)
+    warm, turn = ("temp_winding_degc", "temp_magnet_degc"), ("theta_mech_rad", "theta_elec_rad")
+    pairs = (
+        *((one, name) for name in ("omega_mech_rad_s", "iq_a", "id_a", *warm, *turn)),
+        *((omega, name) for name in (*warm, turn[0], "i_a")),
+        *((sense, name) for name in (*warm, turn[0], "i_a")),
+        *((iq, name) for name in (*warm, *turn, "omega_mech_rad_s")),
+        (load, turn[0]),
+    )
+    known = variables(machine)
+    shaft = ("torque_shaft_nm",)
+    return [
+        _port("torque", known[name], coarse(known[name], machine, policy), (carrier,), shaft)
+        for carrier, name in pairs
+    ]
+
+
+def _torque_carriers(machine: Machine) -> tuple[Carrier, ...]:
+    """One, the speed, its sense, the q current and its magnitude."""
     speed, current = machine.scales["speed_rad_s"], machine.scales["current_a"]
     one = Carrier((), "", "1.0", lambda _: 1.0)
     omega = Carrier(
@@ -112,20 +131,7 @@ def _torque_ports(machine: Machine, policy: Discovery) -> list[Port]:
         f"np.abs(np.real(x.iq_a)) / {current:.6g}",
         lambda x: np.abs(np.real(x.iq_a)) / float(f"{current:.6g}"),
     )
-    warm, turn = ("temp_winding_degc", "temp_magnet_degc"), ("theta_mech_rad", "theta_elec_rad")
-    pairs = (
-        *((one, name) for name in ("omega_mech_rad_s", "iq_a", "id_a", *warm, *turn)),
-        *((omega, name) for name in (*warm, turn[0], "i_a")),
-        *((sense, name) for name in (*warm, turn[0], "i_a")),
-        *((iq, name) for name in (*warm, *turn, "omega_mech_rad_s")),
-        (load, turn[0]),
-    )
-    known = variables(machine)
-    shaft = ("torque_shaft_nm",)
-    return [
-        _port("torque", known[name], coarse(known[name], machine, policy), (carrier,), shaft)
-        for carrier, name in pairs
-    ]
+    return one, omega, sense, iq, load
 
 
 def _constant(unit: complex) -> Callable[[Operating], Any]:

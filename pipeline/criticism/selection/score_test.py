@@ -244,28 +244,18 @@ class _Scoring:
         known = {
             f"{candidate.effect.name}.{p.name}": p for p in candidate.effect.parameters_of(machine)
         }
-        live = places
-        while live.size:
-            end = self.normal_equations.along(np.concatenate([self.own, live])).best(*effort)
-            steps = end.step[self.own.size :].tolist()
-            mine = dict(zip((system.columns[n].name for n in live), steps, strict=True))
-            wrong = [
-                n
-                for n in live
-                if _outside(mine[system.columns[n].name], known[system.columns[n].name])
-            ]
-            if not wrong:
-                break
-            live = np.array([n for n in live if n not in wrong], dtype=int)
-        if live.size == 0:
+        best = self._inside(places, known, effort)
+        if best is None:
             return None
+        live, end = best
+        mine = dict(zip(self._names(live), end.step[self.own.size :].tolist(), strict=True))
         sizes = [
             abs(value) / (known[name].negligible * machine.scale(known[name]))
             for name, value in mine.items()
             if known[name].negligible > 0
         ]
         after = Standing.of(system, np.concatenate([self.own, live]), end)
-        names = (system.columns[n].name for n in self.own)
+        names = self._names(self.own)
         return Score(
             candidate,
             self.before.deviance - after.deviance,
@@ -279,6 +269,28 @@ class _Scoring:
             and clears(system, self.significant, self.before.reduced_chi2, after.reduced_chi2),
             policy=system.policy.selection,
         )
+
+    def _names(self, places: NDArray[np.int64]) -> list[str]:
+        return [self.system.columns[n].name for n in places]
+
+    def _inside(
+        self,
+        places: NDArray[np.int64],
+        known: Mapping[str, Parameter],
+        effort: tuple[tuple[float, ...], int],
+    ) -> tuple[NDArray[np.int64], Descent] | None:
+        """The places along which no parameter is on the wrong side of its bound, and the best fit
+        along them and the model's own; None where there are none.
+        """
+        live = places
+        while live.size:
+            end = self.normal_equations.along(np.concatenate([self.own, live])).best(*effort)
+            steps = zip(self._names(live), end.step[self.own.size :].tolist(), strict=True)
+            keep = np.array([not _outside(step, known[name]) for name, step in steps])
+            if keep.all():
+                return live, end
+            live = live[keep]
+        return None
 
     def confounder(
         self, score: Score, best: Mapping[str, tuple[Score, NDArray[np.int64]]]
