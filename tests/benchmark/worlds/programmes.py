@@ -94,10 +94,34 @@ PROGRAMMES: Mapping[str, tuple[Step, ...]] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """Sizes of what is in a plant, each 0 where absent; a world's `TYPICAL` has their units."""
+
+    sizes: Mapping[str, float]
+
+    def __getitem__(self, name: str) -> float:
+        return self.sizes.get(name, 0.0)
+
+
+Q_ALONE = ("resistance_ab", "current_step_q", "cogging", "spin_down", "drive")
+"""Captures of a machine with a single winding: what q current and a commutator tell."""
+
+
+def steps_of(programme: str, axes: str) -> tuple[Step, ...]:
+    """The captures of a programme that a machine of both axes, `dq`, or of `q` alone can give."""
+    steps = PROGRAMMES[programme]
+    return steps if axes == "dq" else tuple(step for step in steps if step[0].startswith(Q_ALONE))
+
+
 class Plant(Protocol):
-    """What a world's motor does where no converter drives it; `motor` is its nameplate."""
+    """What a world's motor does where no converter drives it; `motor` is its nameplate.
+
+    `axes` is `dq`, or `q` for a machine with one winding: its current is told as a q current.
+    """
 
     motor: Motor
+    axes: str
 
     def emf(self, theta: Array, omega: Array) -> Array:
         """Open terminals: phase voltages [n, 3, V] at angles and speeds [n each]."""
@@ -125,7 +149,7 @@ class Campaigner:
 
     def sessions(self) -> dict[str, Session]:
         """One session a capture, with instruments drawn once and randomness of its own."""
-        steps = PROGRAMMES[self.programme]
+        steps = steps_of(self.programme, self.plant.axes)
         first, *rest = np.random.SeedSequence(self.seed).spawn(1 + len(steps))
         bench = BENCHES[self.programme]
         fixed = replace(bench, instruments=bench.drawn(np.random.default_rng(first)))
@@ -141,14 +165,14 @@ class Campaigner:
         }
 
 
-def lanes_of(sessions: Mapping[str, Session], programme: str) -> dict[str, Lane]:
-    """The runs of a programme that a converter drives."""
+def lanes_of(sessions: Mapping[str, Session], programme: str, axes: str) -> dict[str, Lane]:
+    """The runs of a programme that a converter drives; a log of q alone has no transducer."""
     found = {}
-    for stem, test, how in PROGRAMMES[programme]:
+    for stem, test, how in steps_of(programme, axes):
         if test == "torque_map":
             found[stem] = _map_lane(sessions[stem], how)
         elif test == "drive":
-            found[stem] = _drive_lane(sessions[stem], bool(how["loaded"]))
+            found[stem] = _drive_lane(sessions[stem], axes == "dq" and bool(how["loaded"]))
     return found
 
 
@@ -187,18 +211,16 @@ def recordings(
 ) -> list[Recording]:
     """Every capture of a programme; `rows` are those of its lanes."""
     made = []
-    for stem, test, how in PROGRAMMES[programme]:
+    for stem, test, how in steps_of(programme, plant.axes):
         session = sessions[stem]
-        if stem in rows:
-            table, meta = (
-                _logged(session, rows[stem], programme),
-                {
-                    "voltage_kind": "commanded",
-                    "voltage_timing": "held",
-                },
-            )
+        if stem in rows and plant.axes == "q":
+            table, meta = _logged_q(session, rows[stem]), {"voltage_timing": "centred"}
+        elif stem in rows:
+            table, meta = _logged(session, rows[stem], programme), {"voltage_timing": "held"}
         else:
             table, meta = TESTS[test](plant, session, **how)
+        if stem in rows:
+            meta["voltage_kind"] = "commanded"
         made.append(Recording(stem, session.meta(test, **meta), (table,)))
     return made
 
@@ -220,8 +242,22 @@ def _logged(session: Session, rows: Array, programme: str) -> Table:
     return slow
 
 
+def _logged_q(session: Session, rows: Array) -> Table:
+    """A slow log of the q axis alone, its voltage a mean over half a row either side."""
+    table = log(session, rows, 1.0 / PWM_HZ)
+    half = LOG_EVERY // 2 + 1
+    # a period's voltage is held after its sample: so many before a row as from it on, ends by half
+    weights = np.full(2 * half, 1.0 / LOG_EVERY)
+    weights[[0, -1]] = 0.5 * (1.0 - (2 * half - 2) / LOG_EVERY)
+    mean = np.convolve(table["vq_v"], weights[::-1], mode="valid")
+    at = np.arange(half, mean.size + half, LOG_EVERY)
+    names = ("t_s", "iq_a", "theta_mech_rad", "omega_mech_rad_s", "temp_winding_degc")
+    slow = {name: table[name][at] for name in names}
+    return {**slow, "vq_v": mean[at - half]}
+
+
 def _resistance(plant: Plant, session: Session, pair: str) -> Made:
-    """DC plateaus, each after a supply's rise of 2 ms, on a rotor aligned with the pair."""
+    """DC plateaus, each after a rise of 2 ms, on a rotor that has an axis along the pair."""
     m, rate, dwell = session.motor, 1000.0, 0.25
     levels = 2.0 * m.r_phase_ohm * m.current_rated_a
     levels = levels * np.array([0.0, 0.15, 0.3, 0.08, -0.08, -0.3, -0.15])
@@ -234,7 +270,8 @@ def _resistance(plant: Plant, session: Session, pair: str) -> Made:
     t_s, stamps = session.clock(round(levels.size * dwell * rate), rate)
     # along the pair's axis a vector of v/√3 is v between its terminals, i·2/√3 is i in its line
     breaks = [k * dwell for k in range(1, levels.size)]
-    amps = plant.locked(lambda t: volts(t) / math.sqrt(3.0), breaks, t_s, 0.0)
+    eps = 0.0 if plant.axes == "dq" else -0.5 * math.pi
+    amps = plant.locked(lambda t: volts(t) / math.sqrt(3.0), breaks, t_s, eps)
     line = amps * math.sqrt(3.0) / 2.0
     first = "abc".index(pair[0])
     table = {

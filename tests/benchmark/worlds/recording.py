@@ -12,9 +12,15 @@ from pipeline.simulator.effects import parameters
 from tests.benchmark.sealing import MOTOR_TYPE, captures
 from tests.benchmark.worlds.case import WorldCase
 from tests.benchmark.worlds.lanes import Array, Lane, run
-from tests.benchmark.worlds.programmes import PWM_HZ, Campaigner, lanes_of, recordings
+from tests.benchmark.worlds.programmes import (
+    PWM_HZ,
+    Campaigner,
+    Hidden,
+    lanes_of,
+    recordings,
+)
 
-WORLDS: Mapping[str, str] = {"motulator": "motulator"}
+WORLDS: Mapping[str, str] = {"motulator": "motulator", "mujoco": "mujoco"}
 """Worlds, and the package that each needs."""
 
 AT_ONCE = 40
@@ -46,7 +52,8 @@ def campaigns(cases: Sequence[WorldCase]) -> list[Campaign]:
     plants = [_plant(place, case) for case in cases]
     people = [Campaigner(p, c.programme, c.seed) for p, c in zip(plants, cases, strict=True)]
     sessions = [one.sessions() for one in people]
-    lanes = [lanes_of(s, c.programme) for s, c in zip(sessions, cases, strict=True)]
+    axes = place.Plant.axes
+    lanes = [lanes_of(s, c.programme, axes) for s, c in zip(sessions, cases, strict=True)]
     rows = _driven(place, plants, lanes)
     found = []
     for case, plant, own, logged in zip(cases, plants, sessions, rows, strict=True):
@@ -64,7 +71,7 @@ def _plant(place: ModuleType, case: WorldCase):  # type: ignore[no-untyped-def]
             faults[name] = share * parameters(name, bare)["size"]
         else:
             inside[name] = share * place.TYPICAL[name](bare)
-    return place.Plant(bare.having(**faults), place.Hidden(inside))
+    return place.Plant(bare.having(**faults), Hidden(inside))
 
 
 def _driven(

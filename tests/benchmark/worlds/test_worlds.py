@@ -12,7 +12,7 @@ from pipeline.records.errors import UsageError
 from tests.benchmark.command import main, options
 from tests.benchmark.worlds.case import WorldCase, marked
 from tests.benchmark.worlds.lanes import Lane, run
-from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner
+from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner, Hidden
 from tests.benchmark.worlds.table import table
 
 NULL = WorldCase("motulator", "laboratory", 1)
@@ -81,36 +81,47 @@ def place() -> Any:
     return with_motulator
 
 
+@pytest.fixture(scope="module")
+def hinge() -> Any:
+    pytest.importorskip("mujoco", reason="group worlds is not installed")
+    from tests.benchmark.worlds import with_mujoco
+
+    return with_mujoco
+
+
 def driven(place: Any, sizes: dict[str, float], omega: float, i_dq: complex, n: int = 250) -> Any:
-    """Motor and the means of the last 100 rows, by a dynamometer at a speed."""
-    motor, hidden = place.motor(3), place.Hidden(sizes)
+    """Motor and means of the last 100 rows: current, voltage, torque, speed, acceleration."""
+    motor, hidden = place.motor(3), Hidden(sizes)
     session = Campaigner(place.Plant(motor, hidden), "laboratory", 5).sessions()["torque_map_0"]
     lane = Lane(session, np.full(n, i_dq), np.zeros(n), omega, True, 0.3)
     (rows,) = run(place.Converted([lane], [hidden]), [lane], 1.0 / PWM_HZ)
     turn = np.exp(-1j * motor.pole_pairs * rows[:, 4])
     current = (rows[:, 0] + 1j * rows[:, 1]) * turn / session.instruments.current
     voltage = (rows[:, 2] + 1j * rows[:, 3]) * turn
-    return motor, current[-100:].mean(), voltage[-100:].mean(), rows[-100:, 6].mean()
+    slope = (rows[-1, 10] - rows[-100, 10]) * PWM_HZ / 99.0
+    speed = rows[-100:, 10].mean()
+    return motor, current[-100:].mean(), voltage[-100:].mean(), rows[-100:, 6].mean(), speed, slope
 
 
 @pytest.mark.parametrize("omega", [60.0, -60.0])
 def test_a_machine_of_motulator_keeps_the_contract_of_frame_and_signs(
     place: Any, omega: float
 ) -> None:
-    motor, i, v, torque = driven(place, {}, omega, -1.5 + 3.0j)
+    motor, i, v, torque, turned, slope = driven(place, {}, omega, -1.5 + 3.0j)
     assert i == pytest.approx(-1.5 + 3.0j, abs=0.02)
-    omega_e = motor.pole_pairs * omega
+    assert turned == pytest.approx(omega, abs=3.0)
+    omega_e = motor.pole_pairs * turned
     flux = motor.ld_h * i.real + motor.psi_pm_wb + 1j * motor.lq_h * i.imag
     # the mean of a vector that stands while the rotor turns is a little shorter
     short = np.sinc(omega_e / PWM_HZ / 2.0 / np.pi)
     assert v * short == pytest.approx(motor.r_phase_ohm * i + 1j * omega_e * flux, rel=2e-3)
     made = 1.5 * motor.pole_pairs * (np.conj(flux) * i).imag
-    drag = motor.torque_coulomb_nm * np.sign(omega) + motor.b_visc_nm_s_rad * omega
-    assert torque == pytest.approx(made - drag, rel=2e-3)
+    drag = motor.torque_coulomb_nm * np.sign(omega) + motor.b_visc_nm_s_rad * turned
+    assert torque == pytest.approx(made - drag - motor.j_rotor_kgm2 * slope, rel=2e-3)
 
 
 def test_both_switches_off_cost_a_share_of_the_link_against_the_current(place: Any) -> None:
-    motor, i, v, _ = driven(place, {"dead_time": 2e-6}, 2.0, 5.0 + 0j, n=400)
+    motor, i, v, *_ = driven(place, {"dead_time": 2e-6}, 2.0, 5.0 + 0j, n=400)
     lost = v.real - motor.r_phase_ohm * i.real
     step = 2e-6 * PWM_HZ * motor.vdc_v
     # each phase loses a step of the link against its current: 4/π in space, at most 4/3 in a sector
@@ -120,7 +131,7 @@ def test_both_switches_off_cost_a_share_of_the_link_against_the_current(place: A
 def test_a_locked_rotor_answers_a_step_with_its_time_constant(place: Any) -> None:
     motor = place.motor(3)
     t = np.linspace(0.0, 0.05, 200)
-    along = place.Plant(motor, place.Hidden({})).locked(lambda _: 10.0, (), t, -np.pi / 2.0)
+    along = place.Plant(motor, Hidden({})).locked(lambda _: 10.0, (), t, -np.pi / 2.0)
     tau = motor.lq_h / motor.r_phase_ohm
     assert along == pytest.approx(10.0 / motor.r_phase_ohm * -np.expm1(-t / tau), abs=1e-5)
 
@@ -128,7 +139,7 @@ def test_a_locked_rotor_answers_a_step_with_its_time_constant(place: Any) -> Non
 def test_open_terminals_show_the_magnet_in_the_order_abc(place: Any) -> None:
     motor = place.motor(3)
     theta = np.linspace(0.0, 0.5, 50)
-    v = place.Plant(motor, place.Hidden({})).emf(theta, np.full(50, 80.0))
+    v = place.Plant(motor, Hidden({})).emf(theta, np.full(50, 80.0))
     eps = motor.pole_pairs * theta
     height = -motor.pole_pairs * 80.0 * motor.psi_pm_wb
     for k in range(3):
@@ -137,7 +148,7 @@ def test_open_terminals_show_the_magnet_in_the_order_abc(place: Any) -> None:
 
 def test_a_coast_follows_coulomb_and_viscous_friction(place: Any) -> None:
     motor = place.motor(3)
-    path = place.Plant(motor, place.Hidden({})).coast(0.3, 100.0, 100.0, 200)
+    path = place.Plant(motor, Hidden({})).coast(0.3, 100.0, 100.0, 200)
     t = np.arange(200) / 100.0
     rate, end = motor.b_visc_nm_s_rad / motor.j_rotor_kgm2, motor.torque_coulomb_nm
     end = end / motor.b_visc_nm_s_rad
@@ -149,7 +160,7 @@ def test_a_coast_follows_coulomb_and_viscous_friction(place: Any) -> None:
 def test_current_follows_from_one_energy_when_iron_saturates(place: Any) -> None:
     """Reciprocity: ∂i_d/∂ψ_q = ∂i_q/∂ψ_d."""
     motor = place.motor(3)
-    sizes = place.Hidden({"saturation": 0.18, "cross_saturation": 0.1})
+    sizes = Hidden({"saturation": 0.18, "cross_saturation": 0.1})
     current = place._flux_to_current([motor], [sizes])
     at, h = motor.psi_pm_wb - 0.1 + 0.2j, 1e-6
     across = (current(np.array([at + 1j * h])) - current(np.array([at - 1j * h]))).real
@@ -169,3 +180,84 @@ def test_a_programme_is_the_same_bytes_again_and_holds_the_contract(place: Any) 
         f"{stem}.mcap" for stem, _, _ in PROGRAMMES["end of line"]
     )
     assert {c.meta.motor_type for c in one.captures} == {"unit"}
+
+
+def hidden_in(hinge: Any, *names: str) -> Any:
+    motor = hinge.motor(2)
+    return hinge.Plant(motor, Hidden({name: hinge.TYPICAL[name](motor) for name in names}))
+
+
+def test_the_winding_of_mujoco_is_a_q_axis_of_the_contract(hinge: Any) -> None:
+    """Power, torque and back-EMF of v, i are those of v_q = v, i_q = 2/3 i."""
+    plant = hidden_in(hinge)
+    m, t = plant.motor, np.arange(200) * 1e-4
+    amps = plant.locked(lambda _: 1.0, (), t, -np.pi / 2.0)
+    rise = -np.expm1(-t * m.r_phase_ohm / m.lq_h) / m.r_phase_ohm
+    assert amps == pytest.approx(rise, abs=1e-6)
+    rotor = hinge._Rotor(m, Hidden({}), 0.0, 90.0, held=True)
+    rotor.on(12.0, 20000)
+    emf = m.pole_pairs * m.psi_pm_wb * 90.0
+    assert rotor.amps == pytest.approx((12.0 - emf) / m.r_phase_ohm, rel=1e-6)
+    made = 1.5 * m.pole_pairs * m.psi_pm_wb * rotor.amps
+    drag = m.torque_coulomb_nm + m.b_visc_nm_s_rad * 90.0
+    assert rotor.shaft_torque() == pytest.approx(made - drag, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "at"),
+    [
+        ("windage", lambda m, w, _: m.torque_rated_nm * 0.012 * (w / m.speed_rated_rad_s) ** 2),
+        ("constant_load", lambda m, _, __: 0.01 * m.torque_rated_nm),
+        ("unbalance", lambda m, _, theta: 0.01 * m.torque_rated_nm * np.cos(theta)),
+    ],
+)
+def test_what_is_hidden_in_mujoco_brakes_a_coast_as_it_is_meant_to(
+    hinge: Any, name: str, at: Any
+) -> None:
+    plant = hidden_in(hinge, name)
+    m = plant.motor
+    path = plant.coast(0.4, 150.0, 1000.0, 60)
+    speed, theta = (0.5 * (path[1:, k] + path[:-1, k]) for k in (1, 0))
+    brake = -m.j_rotor_kgm2 * np.diff(path[:, 1]) * 1000.0
+    extra = brake - m.torque_coulomb_nm - m.b_visc_nm_s_rad * speed
+    assert extra == pytest.approx(at(m, speed, theta), abs=0.03 * 0.012 * m.torque_rated_nm)
+
+
+def test_the_bristles_of_mujoco_hold_before_they_slide(hinge: Any) -> None:
+    """LuGre friction builds up over its travel, and is whole far beyond it."""
+    plant = hidden_in(hinge, "presliding")
+    m, travel = plant.motor, plant.hidden["presliding"]
+    rotor = hinge._Rotor(m, plant.hidden, 0.0, 0.01, held=True, powered=False)
+    seen = []
+    for _ in range(30):
+        rotor.on(0.0, 2000)
+        seen.append((float(rotor.data.qpos[0]), -rotor.shaft_torque()))
+    theta, brake = np.array(seen).T
+    brake = brake - m.b_visc_nm_s_rad * 0.01
+    early = theta < 0.3 * travel
+    assert early.any()
+    assert brake[early] == pytest.approx(m.torque_coulomb_nm * theta[early] / travel, rel=0.2)
+    assert brake[-1] == pytest.approx(m.torque_coulomb_nm, rel=0.05)
+
+
+def test_a_log_of_q_alone_holds_means_around_its_samples(hinge: Any) -> None:
+    from tests.benchmark.worlds.programmes import LOG_EVERY, _logged_q
+
+    plant = hidden_in(hinge)
+    session = Campaigner(plant, "telemetry", 5).sessions()["drive_0"]
+    rows = np.zeros((400, 11))
+    # a q voltage that grows evenly: held from k to k + 1 it is k + 1/2 there
+    rows[:, 3] = 0.01 * (np.arange(400) + 0.5)
+    table = _logged_q(session, rows)
+    at = table["t_s"] * PWM_HZ
+    assert np.diff(at) == pytest.approx(LOG_EVERY)
+    gain = session.instruments.voltage_commanded
+    assert table["vq_v"] == pytest.approx(gain * 0.01 * at, abs=session.voltage_step_v)
+    assert set(table) == {
+        "t_s",
+        "iq_a",
+        "vq_v",
+        "theta_mech_rad",
+        "omega_mech_rad_s",
+        "temp_winding_degc",
+    }

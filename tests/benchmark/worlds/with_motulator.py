@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from motulator.drive.model import (
@@ -29,7 +29,10 @@ from scipy.integrate import solve_ivp
 from pipeline.simulator.design import Motor
 from pipeline.simulator.effects import cogging_order
 from tests.benchmark.worlds.lanes import Array, Complex, Lane
-from tests.benchmark.worlds.programmes import Supply
+from tests.benchmark.worlds.programmes import Hidden, Supply
+
+DYNAMOMETER, DYNAMOMETER_HZ = 20.0, 6.0
+"""Inertia of a dynamometer's rotor, in that of the motor, and the width of its speed control."""
 
 EPS_RAD_S = 0.02
 """Speed over which Coulomb friction turns its sign."""
@@ -84,7 +87,7 @@ at rated speed for windage, rad of twist at rated torque."""
 
 def motor(seed: int) -> Motor:
     """A 2.2 kW servo of motulator's examples, its constants drawn by a fifth."""
-    draw = np.exp(np.random.default_rng([seed, 11]).uniform(-0.2, 0.2, 8))
+    draw = np.exp(np.random.default_rng([seed, 11]).uniform(-0.2, 0.2, 8)).tolist()
     return Motor(
         motor_type="unit",
         pole_pairs=3,
@@ -105,16 +108,6 @@ def motor(seed: int) -> Motor:
         cth_winding_j_k=1e3,
         cth_magnet_j_k=1e3,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Hidden:
-    """Sizes of what is in the plant, each 0 where absent; see `TYPICAL`."""
-
-    sizes: Mapping[str, float]
-
-    def __getitem__(self, name: str) -> float:
-        return self.sizes.get(name, 0.0)
 
 
 def _each(values: Sequence[float]) -> Array:
@@ -189,22 +182,21 @@ def _machine(motors: Sequence[Motor], hidden: Sequence[Hidden]) -> SynchronousMa
 
 
 def _mechanics(motors: Sequence[Motor], hidden: Sequence[Hidden], held: Array) -> Any:
-    """One mass, or two and a spring under compliance; a dynamometer's mass is infinite."""
+    """One mass, or two and a spring under compliance; a dynamometer's rotor is on the shaft."""
     shaft = Shaft(motors, hidden)
     j = _each([m.j_rotor_kgm2 for m in motors])
     twist = _each([h["compliance"] for h in hidden])
+    brake = np.where(held, DYNAMOMETER * j, 0.0)
     if np.any(twist > 0.0):
         stiff = _each([m.torque_rated_nm for m in motors]) / np.maximum(twist, 1e-12)
         damping = 2.0 * 0.03 * np.sqrt(stiff * j * 0.25)
-        par = TwoMassMechanicalSystemPars(
-            J_M=0.5 * j, J_L=np.where(held, np.inf, 0.5 * j), K_S=stiff, C_S=damping
-        )
+        par = TwoMassMechanicalSystemPars(J_M=0.5 * j, J_L=0.5 * j + brake, K_S=stiff, C_S=damping)
         par.B_L = shaft.friction
         found = TwoMassMechanicalSystem(par, tau_L=shaft.load)
         found.state.w_L = found.state.theta_ML = np.zeros(j.size)
     else:
-        found = StiffMechanicalSystem(np.where(held, np.inf, j), shaft.friction, shaft.load)
-    found.shaft = shaft
+        found = StiffMechanicalSystem(j + brake, shaft.friction, shaft.load)
+    found.shaft, found.brake = shaft, brake
     return found
 
 
@@ -220,6 +212,7 @@ class Converted:
         self.dead_s = _each([h["dead_time"] for h in hidden])
         self.ambient = _each([m.ambient_degc for m in motors])
         self.shaft: Shaft = mechanics.shaft
+        self.wanted, self.lag = _each([x.omega for x in lanes]), np.zeros(len(lanes))
         theta, omega = _each([x.theta for x in lanes]), _each([x.omega for x in lanes])
         mechanics.state.exp_j_theta_M = np.exp(1j * theta)
         mechanics.state.w_M = omega
@@ -254,18 +247,28 @@ class Converted:
         return found
 
     def shaft_torque(self) -> Array:
-        """What is left of the machine's torque behind friction, or behind the spring."""
-        inside = self.model.mechanics
-        passed = inside.out.tau_S if self.two else self.model.machine.out.tau_M
-        delivered: Array = passed - (inside.out.tau_L_tot - self.shaft.external)
+        """What is left behind friction and the motor's own inertia."""
+        mechanics = self.model.mechanics
+        passed = mechanics.out.tau_S if self.two else self.model.machine.out.tau_M
+        last = mechanics.par.J_L if self.two else mechanics.par.J
+        net = passed - mechanics.out.tau_L_tot
+        delivered: Array = self.shaft.external + net * mechanics.brake / last
         return delivered
+
+    def _braked(self, load: Array, period_s: float) -> Array:
+        """Torque of load [N·m] or of the dynamometer, which holds its speed as well as it can."""
+        off = self.model.mechanics.out.w_M.real - self.wanted
+        self.lag = self.lag + off * period_s
+        width = 2.0 * math.pi * DYNAMOMETER_HZ
+        torque = width * self.model.mechanics.brake * (off + 0.25 * width * self.lag)
+        return np.where(self.held, torque, load)
 
     def temperatures(self) -> tuple[Array, Array]:
         return self.ambient, self.ambient
 
     def advance(self, voltage: Complex, load: Array, period_s: float) -> None:
         """One carrier period: each leg on once, around the middle; both switches off at edges."""
-        self.shaft.external = load
+        self.shaft.external = self._braked(load, period_s)
         share = np.stack([np.real(voltage * np.exp(-2j * math.pi * k / 3.0)) for k in range(3)])
         share = share / self.vdc
         share = 0.5 + share - 0.5 * (share.max(axis=0) + share.min(axis=0))
@@ -315,12 +318,13 @@ def _runge_kutta(model: Any, t: Any, h: Any) -> None:
     model.set_outputs(t + h)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plant:
     """One motor of this world where no converter drives it."""
 
     motor: Motor
     hidden: Hidden
+    axes: ClassVar[str] = "dq"
 
     def emf(self, theta: Array, omega: Array) -> Array:
         """The voltage under which the machine's flux stays what it is without current."""
