@@ -116,7 +116,7 @@ def segment_of(
         blocks,
         offsets,
         sensors.runs_rad,
-        steps=sensors.steps,
+        steps={name: step for name, step in sensors.steps.items() if name in found},
     )
 
 

@@ -68,7 +68,7 @@ def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
     made += [
         disturbed(segment, segment.weak, model, values, name, sigma * sines)
         for name, sigma in segment.noise.items()
-        if sigma > 0.0 and name.startswith(_WANDERS)
+        if sigma > 0.0 and name.startswith(_WANDERS) and name in segment.recorded
     ]
     return replace(segment, lines=np.concatenate(made)) if made else segment
 

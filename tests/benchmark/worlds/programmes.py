@@ -214,7 +214,7 @@ def recordings(
     for stem, test, how in steps_of(programme, plant.axes):
         session = sessions[stem]
         if stem in rows and plant.axes == "q":
-            table, meta = _logged_q(session, rows[stem]), {"voltage_timing": "centred"}
+            table, meta = _logged_q(session, rows[stem], programme), {"voltage_timing": "centred"}
         elif stem in rows:
             table, meta = _logged(session, rows[stem], programme), {"voltage_timing": "held"}
         else:
@@ -242,16 +242,21 @@ def _logged(session: Session, rows: Array, programme: str) -> Table:
     return slow
 
 
-def _logged_q(session: Session, rows: Array) -> Table:
-    """A slow log of the q axis alone, its voltage a mean over half a row either side."""
+def _logged_q(session: Session, rows: Array, programme: str) -> Table:
+    """The q axis alone, its voltage a mean over half a row either side.
+
+    In a laboratory every period; telemetry is slow and has the drive's late speed too.
+    """
     table = log(session, rows, 1.0 / PWM_HZ)
-    half = LOG_EVERY // 2 + 1
+    every = 1 if programme == "laboratory" else LOG_EVERY
+    half = every // 2 + 1
     # a period's voltage is held after its sample: so many before a row as from it on, ends by half
-    weights = np.full(2 * half, 1.0 / LOG_EVERY)
-    weights[[0, -1]] = 0.5 * (1.0 - (2 * half - 2) / LOG_EVERY)
+    weights = np.full(2 * half, 1.0 / every)
+    weights[[0, -1]] = 0.5 * (1.0 - (2 * half - 2) / every)
     mean = np.convolve(table["vq_v"], weights[::-1], mode="valid")
-    at = np.arange(half, mean.size + half, LOG_EVERY)
-    names = ("t_s", "iq_a", "theta_mech_rad", "omega_mech_rad_s", "temp_winding_degc")
+    at = np.arange(half, mean.size + half, every)
+    names = ("t_s", "iq_a", "theta_mech_rad", "temp_winding_degc")
+    names += () if programme == "laboratory" else ("omega_mech_rad_s",)
     slow = {name: table[name][at] for name in names}
     return {**slow, "vq_v": mean[at - half]}
 

@@ -230,7 +230,7 @@ def test_the_bristles_of_mujoco_hold_before_they_slide(hinge: Any) -> None:
     rotor = hinge._Rotor(m, plant.hidden, 0.0, 0.01, held=True, powered=False)
     seen = []
     for _ in range(30):
-        rotor.on(0.0, 2000)
+        rotor.on(0.0, round(0.04 / hinge.STEP_S))
         seen.append((float(rotor.data.qpos[0]), -rotor.shaft_torque()))
     theta, brake = np.array(seen).T
     brake = brake - m.b_visc_nm_s_rad * 0.01
@@ -238,6 +238,23 @@ def test_the_bristles_of_mujoco_hold_before_they_slide(hinge: Any) -> None:
     assert early.any()
     assert brake[early] == pytest.approx(m.torque_coulomb_nm * theta[early] / travel, rel=0.2)
     assert brake[-1] == pytest.approx(m.torque_coulomb_nm, rel=0.05)
+
+
+def test_the_shaft_of_mujoco_turns_under_the_current_of_its_instant(hinge: Any) -> None:
+    plant, period = hidden_in(hinge), 2e-4
+    m, rotor = plant.motor, hinge._Rotor(plant.motor, Hidden({}), 0.0, 120.0)
+    volts = 7.0 + np.cumsum(np.random.default_rng(0).normal(0.0, 0.05, 400))
+    rows = []
+    for v in volts:
+        rotor.on(float(v), round(period / hinge.STEP_S))
+        rows.append((rotor.theta, rotor.omega, rotor.amps))
+    theta, omega, amps = np.array(rows).T
+    bend = amps[2:] - 2.0 * amps[1:-1] + amps[:-2]
+    made = 1.5 * m.pole_pairs * m.psi_pm_wb * (amps[1:-1] + bend / 12.0)
+    slope = 1.5 * m.pole_pairs * m.psi_pm_wb * np.gradient(amps, period)[1:-1]
+    pull = made - m.torque_coulomb_nm - m.b_visc_nm_s_rad * omega[1:-1]
+    off = m.j_rotor_kgm2 * (theta[2:] - 2.0 * theta[1:-1] + theta[:-2]) / period**2 - pull
+    assert abs(float(off @ slope / (slope @ slope))) < 0.2 * hinge.STEP_S
 
 
 def test_a_log_of_q_alone_holds_means_around_its_samples(hinge: Any) -> None:
@@ -248,7 +265,7 @@ def test_a_log_of_q_alone_holds_means_around_its_samples(hinge: Any) -> None:
     rows = np.zeros((400, 11))
     # a q voltage that grows evenly: held from k to k + 1 it is k + 1/2 there
     rows[:, 3] = 0.01 * (np.arange(400) + 0.5)
-    table = _logged_q(session, rows)
+    table = _logged_q(session, rows, "telemetry")
     at = table["t_s"] * PWM_HZ
     assert np.diff(at) == pytest.approx(LOG_EVERY)
     gain = session.instruments.voltage_commanded

@@ -125,6 +125,7 @@ class Shaft:
         for name in ("stribeck", "windage", "cogging", "unbalance", "pulsation", "belt"):
             setattr(self, name, _each([h[name] for h in hidden]))
         self.external = np.zeros(len(motors))
+        self.dynamometer: Callable[[Any], Any] = lambda _: 0.0
         self.angle: Callable[[], Array] = lambda: np.zeros(len(motors))
 
     def friction(self, speed: Array) -> Array:
@@ -137,7 +138,9 @@ class Shaft:
     def load(self, t: float | Array) -> Array:
         """Torques that do not depend on speed, motulator's `tau_L` [N·m]."""
         theta = self.angle()
-        total = self.external + self.cogging * np.sin(self.order * theta + 0.7)
+        total = (
+            self.external + self.dynamometer(t) + self.cogging * np.sin(self.order * theta + 0.7)
+        )
         total = total + self.unbalance * np.sin(theta + 1.1)
         total = total + self.belt * np.sin(2.37 * theta)
         return total + self.pulsation * np.sin(2.0 * math.pi * 17.3 * np.asarray(t))
@@ -212,7 +215,6 @@ class Converted:
         self.dead_s = _each([h["dead_time"] for h in hidden])
         self.ambient = _each([m.ambient_degc for m in motors])
         self.shaft: Shaft = mechanics.shaft
-        self.wanted, self.lag = _each([x.omega for x in lanes]), np.zeros(len(lanes))
         theta, omega = _each([x.theta for x in lanes]), _each([x.omega for x in lanes])
         mechanics.state.exp_j_theta_M = np.exp(1j * theta)
         mechanics.state.w_M = omega
@@ -221,8 +223,8 @@ class Converted:
             mechanics.state.w_L = omega
         machine.state.exp_j_theta_m = np.exp(1j * machine.par.n_p * theta)
         # orders of the rotor's angle that are no whole numbers need its turns
-        self.turns = theta
-        self.shaft.angle = self._angle
+        self.turns, self.start, self.wanted = theta, theta, omega
+        self.shaft.angle, self.shaft.dynamometer = self._angle, self._dynamometer
         self.t_s = 0.0
         self._settle()
 
@@ -252,23 +254,23 @@ class Converted:
         passed = mechanics.out.tau_S if self.two else self.model.machine.out.tau_M
         last = mechanics.par.J_L if self.two else mechanics.par.J
         net = passed - mechanics.out.tau_L_tot
-        delivered: Array = self.shaft.external + net * mechanics.brake / last
+        delivered: Array = self._dynamometer(self.t_s) + net * mechanics.brake / last
         return delivered
 
-    def _braked(self, load: Array, period_s: float) -> Array:
-        """Torque of load [N·m] or of the dynamometer, which holds its speed as well as it can."""
-        off = self.model.mechanics.out.w_M.real - self.wanted
-        self.lag = self.lag + off * period_s
-        width = 2.0 * math.pi * DYNAMOMETER_HZ
-        torque = width * self.model.mechanics.brake * (off + 0.25 * width * self.lag)
-        return np.where(self.held, torque, load)
+    def _dynamometer(self, t: Any) -> Array:
+        """Torque [N·m] of a dynamometer that holds its speed as well as it can."""
+        mechanics, width = self.model.mechanics, 2.0 * math.pi * DYNAMOMETER_HZ
+        turns = np.real(mechanics.state.w_L if self.two else mechanics.state.w_M)
+        lag = self._angle() - self.start - self.wanted * t
+        torque: Array = width * mechanics.brake * (turns - self.wanted + 0.25 * width * lag)
+        return torque
 
     def temperatures(self) -> tuple[Array, Array]:
         return self.ambient, self.ambient
 
     def advance(self, voltage: Complex, load: Array, period_s: float) -> None:
         """One carrier period: each leg on once, around the middle; both switches off at edges."""
-        self.shaft.external = self._braked(load, period_s)
+        self.shaft.external = load
         share = np.stack([np.real(voltage * np.exp(-2j * math.pi * k / 3.0)) for k in range(3)])
         share = share / self.vdc
         share = 0.5 + share - 0.5 * (share.max(axis=0) + share.min(axis=0))

@@ -23,7 +23,7 @@ from pipeline.simulator.effects import cogging_order
 from tests.benchmark.worlds.lanes import Array, Complex, Lane
 from tests.benchmark.worlds.programmes import Hidden, Supply
 
-STEP_S = 2e-5
+STEP_S = 1e-5
 HELD_KGM2 = 1e5
 """Step of the integrator, and a rotor's inertia that no torque here can move."""
 
@@ -169,11 +169,18 @@ class _Rotor:
         self.data.qfrc_applied[0] = -h["constant_load"]
         # the winding's current is the first activation where it has one, LuGre's bristle the last
         self.winding = kind.get("powered", True)
+        self.theta, self.omega = theta, omega
 
     def on(self, volts: float, steps: int) -> None:
+        """On by steps, after which angle and speed are those that go with the current.
+
+        MuJoCo moves the shaft by the current that the same step ends with: it is a step ahead.
+        """
         if self.winding:
             self.data.ctrl[0] = volts
-        mujoco.mj_step(self.model, self.data, steps)
+        mujoco.mj_step(self.model, self.data, steps - 1)
+        self.theta, self.omega = float(self.data.qpos[0]), float(self.data.qvel[0])
+        mujoco.mj_step(self.model, self.data)
 
     @property
     def amps(self) -> float:
@@ -205,10 +212,10 @@ class Converted:
         return found
 
     def angle(self) -> Array:
-        return np.array([r.data.qpos[0] for r in self.rotors])
+        return np.array([r.theta for r in self.rotors])
 
     def speed(self) -> Array:
-        return np.array([r.data.qvel[0] for r in self.rotors])
+        return np.array([r.omega for r in self.rotors])
 
     def shaft_torque(self) -> Array:
         """Of no dynamometer: every lane is free."""

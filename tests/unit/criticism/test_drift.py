@@ -115,3 +115,10 @@ def test_what_is_small_for_the_machine_stops_no_wander(large: bool, noise: bool,
 
     monkeypatch.setattr("pipeline.criticism.selection.drift.remainder", still_left)
     assert (drifting_segments(system.fit, left) is not None) is noise
+
+
+def test_a_sensor_that_the_segment_does_not_hold_drifts_nowhere():
+    segment = walked(5, "drive")
+    more = replace(segment, noise={**segment.noise, "vdc_v": 0.1})
+    lines = (with_drift(one, Model(machine(), ()), BASE).lines for one in (segment, more))
+    assert np.array_equal(*lines)

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.segment import clock, projected
+from pipeline.criticism.data.segment import Sensors, clock, projected, segment_of
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.noise_floors import window_gain
 from pipeline.criticism.residuals.residual import residual
@@ -156,3 +156,20 @@ def test_of_a_long_coast_an_even_selection_of_windows_is_kept(seconds, windows):
     assert len(run.t_s) == (windows if seconds == 20 else 73)
     assert np.abs(run.simulated["omega_mech_rad_s"] - speed).max() < 0.02
     assert np.abs(run.recorded["omega_mech_rad_s"] - speed).max() < 0.02
+
+
+def test_rounding_is_that_of_the_columns_a_segment_holds():
+    """A log of the q axis is cut into voltage and motion; the latter once asked for the former."""
+    sensors = Sensors({"theta_mech_rad": 1e-4, "vq_v": 0.1}, {"theta_mech_rad": 1e-3, "vq_v": 0.2})
+    turned = {"theta_mech_rad": np.linspace(0.0, 1.0, 50)}
+    made = segment_of(
+        slow_turn(1.0),
+        "motion",
+        "drive",
+        1e-3,
+        found=turned,
+        sensors=sensors,
+        channels=("torque_shaft_nm",),
+        weak=None,
+    )
+    assert made.steps == {"theta_mech_rad": 1e-3}
