@@ -548,3 +548,38 @@ def test_plots_lay_the_fit_on_what_was_read() -> None:
     )
     (series,) = fit.evidence[0].series
     assert series.fitted == pytest.approx(series.measured, abs=0.2)
+
+
+# Numbers of judgement
+
+
+@pytest.mark.parametrize(("rate", "share"), [(400.0, 0.05), (60.0, None)])
+def test_windows_of_a_coast_are_a_twentieth_of_it(rate: float, share: float | None) -> None:
+    """And half a second at most; each overlaps the next by half."""
+    made = coasting() if share else coasting(a=4.0, b=0.05, rate=rate)
+    rows = shaft_rows([made], {})
+    assert rows is not None
+    t = made.arrays("t_s")["t_s"]
+    width = share * float(t[-1] - t[0]) if share else 0.5
+    assert float(np.median(np.diff(rows.time_s))) == pytest.approx(0.5 * width, rel=0.02)
+
+
+@pytest.mark.parametrize(("drives", "coasts", "most"), [(120, 12, 5), (120, 0, 3), (20, 0, 0),
+                                                        (900, 12, 14)])  # fmt: skip
+def test_a_nuisance_takes_ten_windows(drives, coasts, most, monkeypatch) -> None:
+    """Of windows that share no sample, less the columns that drives must determine; 14 at most."""
+    asked: list[int] = []
+
+    def needed(base, pool, y, sigma, level, limit, tau):
+        asked.append(limit)
+        return []
+
+    monkeypatch.setattr(drag, "needed_columns", needed)
+    rng = np.random.default_rng(0)
+    speed = rng.uniform(-1.0, 1.0, drives + coasts)
+    y = rng.standard_normal(speed.size)
+    rows = rows_of((drives, coasts), y=y)
+    forms = {name: form(speed) for name, form in DRAG_FORMS.items()}
+    law = np.column_stack([rng.standard_normal(speed.size), -np.sign(speed), -speed])
+    drag.drag_of(replace(rows, columns=forms), law, [], 0.01)
+    assert asked[0] == most

@@ -26,6 +26,7 @@ from pipeline.estimation.estimators.current_step import along_ramp, inductances
 from pipeline.estimation.estimators.heat_run import _alpha_alone, _line, _resistance
 from pipeline.estimation.thermal.heat_record import HeatRecord
 from pipeline.estimation.uncertainty.regimes import (
+    Partition,
     Regression,
     _of_partition,
     halves,
@@ -767,8 +768,6 @@ def test_information_is_a_columns_own_part() -> None:
 
 
 def test_a_coefficient_of_each_regime_relative_to_the_common_one() -> None:
-    from pipeline.estimation.uncertainty.regimes import Partition
-
     made, labels = regressed([1.0, 1.1])
     told = information(made, 0)
     found = _of_partition(made, 0, told, Partition("half", labels, ("one", "other")))
@@ -886,3 +885,19 @@ def test_plots_of_flux_over_speed_have_the_line_of_their_temperature() -> None:
         assert plain.fitted == pytest.approx([g.flux.psi_wb])
         assert plain.measured == pytest.approx([g.flux.psi_wb])
         assert line_.fitted == pytest.approx([g.flux.psi_wb * 100.0])
+
+
+@pytest.mark.parametrize("scale", [8.0, 0.125])
+def test_what_regimes_say_has_no_unit(scale: float) -> None:
+    """All in another unit: relative values, their scatter and its chance stay."""
+    made, labels = regressed([1.0, 1.15], noise=0.3)
+    told = information(made, 0)
+    half = Partition("half", labels, ("one", "other"))
+    other = replace(made, y=scale * made.y, sigma=scale * made.sigma)
+    one, same = _of_partition(made, 0, told, half), _of_partition(other, 0, told, half)
+    assert one is not None
+    assert same is not None
+    assert same.relative == pytest.approx(one.relative)
+    assert 0.0 < one.found.p_value < 1.0
+    assert same.found.p_value == pytest.approx(one.found.p_value)
+    assert same.found.sd == pytest.approx(one.found.sd)
