@@ -65,6 +65,7 @@ PACKAGES = {
             ),
         ),
         Package("crosscheck", ("pipeline/crosscheck/**/*.py",), ("tests/unit/crosscheck",)),
+        Package("performance", ("pipeline/performance/*.py",), ("tests/unit/performance",)),
         Package("cli", ("pipeline/cli/*.py",), ("tests/unit/cli",)),
         Package("criticism", ("pipeline/criticism/**/*.py",), ("tests/unit/criticism",)),
         Package("lots", ("pipeline/lots/*.py",), ("tests/unit/lots",)),
