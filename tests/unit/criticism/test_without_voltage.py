@@ -87,6 +87,13 @@ def test_a_q_axis_log_has_its_winding_temperature_and_its_torque():
     assert not any("no temp_winding_degc" in note for note in found.notes)
 
 
+def test_a_log_that_lacks_the_d_voltage_alone_has_its_d_current():
+    keep = ("id_a", "iq_a", "vq_v", "theta_mech_rad", "torque_shaft_nm")
+    told = compared(recorded(("drive", {}), keep=keep, **PAIRS)).parameters
+    assert holds(told["ld_h"], TRUE["ld_h"])
+    assert told["ld_h"].u < 0.1 * TRUE["ld_h"]
+
+
 def test_coasts_ask_for_no_pole_pairs():
     coasts = recorded(("spin_down", {"direction": 1}), ("spin_down", {"direction": -1}),
                       keep=("theta_mech_rad", "omega_mech_rad_s"))  # fmt: skip

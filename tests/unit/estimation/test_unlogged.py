@@ -76,6 +76,15 @@ def test_a_thermometer_goes_before_an_assumption() -> None:
     )
 
 
+def test_no_coefficient_from_assumed_temperatures() -> None:
+    """Two spins whose captures state another ambient each, and hold no temperature."""
+    bare = recorded(("open_circuit", {}), ("open_circuit", WARM), without={"temp_magnet_degc"})
+    rooms = zip(bare.captures, (25.0, 58.0), strict=True)
+    stated = tuple(replace(c, meta=replace(c.meta, ambient_degc=t)) for c, t in rooms)
+    constants = fit_all(replace(bare, captures=stated), {})[0]
+    assert constants.best("temp_coeff_magnet_1_k") is None
+
+
 def test_a_torque_map_without_its_d_current() -> None:
     """Reluctance torque of a d current that nobody logged made Kt 1.7 % high."""
     one = found(recorded(("torque_map", {}), without={"id_a"}), "kt_peak_nm_a")
