@@ -44,7 +44,7 @@ def operate(sheet: Datasheet, *, vdc_v: float, current_a: float, **others: float
     >>> found = pipeline.operate(sheet, vdc_v=24.0, current_a=9.0)
     >>> peak = found.number("torque_peak_nm")
     >>> print(f"{peak.value:.3f} N·m, {peak.low:.3f} to {peak.high:.3f}")
-    0.664 N·m, 0.663 to 0.666
+    0.663 N·m, 0.662 to 0.664
 
     """
     unknown = sorted(set(others) - CONDITIONS)

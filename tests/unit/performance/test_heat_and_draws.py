@@ -88,3 +88,11 @@ def test_what_lies_between_two_values_is_drawn_between_them() -> None:
     assert drawn.max() <= 120.0
     assert np.std(drawn[1:]) == pytest.approx(80.0 / math.sqrt(12.0), rel=0.06)
     assert not np.array_equal(drawn, uniform_draws("drag heat", 40.0, 120.0))
+
+
+def test_a_source_keeps_its_sign_in_each_constant() -> None:
+    """A current that is read too high makes the one large and the other small: the sum stays."""
+    known = {"a": estimate("a", 1.0, "1", current=0.1), "b": estimate("b", 1.0, "1", current=-0.1)}
+    drawn = joint_draws(known)
+    assert np.std(drawn["a"]) > 0.05
+    assert drawn["a"] + drawn["b"] == pytest.approx(2.0)
