@@ -167,7 +167,7 @@ def _refit_best(
         without = predicted_chi2(wide, one) * shrunk
         after = predicted_chi2(tried, other) * _shrunk(tried)
         holds = _holds(wide, without, tried, after, promised, doubts)
-        if holds and not _spoils(tried, without, after):
+        if holds and not spoils(tried, without, after):
             best, least = tried, cost
     return best
 
@@ -262,7 +262,7 @@ def _holds(
     return fall > least[0] and (helps or quiet > least[1])
 
 
-def _spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
+def spoils(tried: LinearSystem, before: Array, after: Array) -> bool:
     """Whether the newest effect adds more power than it takes, of what other captures predict.
 
     A deviance is logarithmic: it falls where a small error is halved and a large one doubled. Only
