@@ -934,3 +934,60 @@ def test_one_value_is_no_dead_channel() -> None:
     values[9] = 2.0
     two = capture("drive", iq_a=values, vq_v=rng.standard_normal(500))
     assert said("stuck_channel", two) == "refused"
+
+
+def test_a_channel_with_values_in_half_of_the_rows_is_no_slow_one() -> None:
+    """Exactly half counts as dense: its blanks are set aside; one row less is a slow stream."""
+    for there, masks in ((200, 1), (199, 0)):
+        current = np.where(np.arange(400) < there, 1.0, np.nan)
+        made = capture("drive", iq_a=current, vq_v=1.0, theta_mech_rad=np.arange(400.0))
+        try:
+            passed = GATES["missing_values"].check(made, OPTIONS["missing_values"])
+        except CaptureError:
+            assert masks == 0
+            continue
+        assert len(passed.masks) == masks
+
+
+def test_a_short_record_has_blocks_of_eight_rows() -> None:
+    """400 rows are 50 blocks: the scatter is that of their increments."""
+    angle = np.linspace(0.0, 10.0, 400)
+    phase = 5.0 * angle + 0.05 * np.sin(40.0 * angle)
+    found = turning(capture("open_circuit", theta_mech_rad=angle, **turned(VOLTS, phase)))
+    assert found is not None
+    edges = np.linspace(0, 399, 51).astype(int)
+    electrical, mechanical = np.diff(phase[edges]), np.diff(angle[edges])
+    slope = mechanical @ electrical / (mechanical @ mechanical)
+    left = electrical - slope * mechanical
+    u = math.sqrt(left @ left / 49.0 / (mechanical @ mechanical))
+    assert found.cycles_per_turn == pytest.approx(slope)
+    assert found.u == pytest.approx(u)
+
+
+def test_a_voltage_that_misses_a_row_is_there() -> None:
+    phase = np.linspace(0.0, 12.0, 900)
+    lines = turned(VOLTS, phase)
+    lines["vbc_v"] = np.where(np.arange(900) == 7, np.nan, lines["vbc_v"])
+    found = line_voltage_vector(capture("open_circuit", vab_v=lines["vab_v"], vbc_v=lines["vbc_v"]))
+    assert found is not None
+    assert np.count_nonzero(np.isfinite(found[1])) == 899
+
+
+def test_a_steady_d_current_counts_by_its_largest() -> None:
+    """0.19 to 0.21 of a limit of 0.2: some of it may cancel the magnet."""
+    assert phase_order.back_emf_slope(frame(0.03, d=0.2, swing=0.02)) == (0.0, np.inf)
+
+
+def test_a_table_without_angle_or_too_short_is_passed_over() -> None:
+    made = ratio_of(1.7)
+    other = pl.DataFrame({"t_s": [0.0, 1.0], "iq_a": [0.0, 1.0]})
+    late = replace(made, tables=(other, made.tables[0].head(9), *made.tables))
+    assert speed_against_angle.speed_over_angle(late, 1.0) == pytest.approx(1.7)
+
+
+def test_a_line_without_a_value_leaves_the_step_to_the_others() -> None:
+    t = np.arange(-200, 2000)
+    current = np.where(t > 0, -np.expm1(-t / 5.0), 0.0)
+    blank = np.full(t.size, np.nan)
+    made = capture("current_step", ia_a=blank, ib_a=10.0 * current)
+    assert said("sampling_rate", made) == "warned"
