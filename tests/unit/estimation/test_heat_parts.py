@@ -230,13 +230,15 @@ def test_what_an_instrument_makes_of_the_resistance() -> None:
     assert balance is not None
 
     def budget(made, known):
-        found = thermal._estimate(balance, made, np.array([25.0]), known)
+        found = thermal._estimates(balance, made, np.array([25.0]), known)[0]
         return {p.source: p.u / balance.rth_k_w for p in found.budget}, found
 
     parts, found = budget(run, Constants())
     assert parts["voltage@s"] == pytest.approx(-gains["u_rel_voltage"])
     assert parts["current@s"] == pytest.approx(-gains["u_rel_current"])
     assert "temperature@s" not in parts
+    # 1.5 K/W and 60 s make 40 J/K
+    assert balance.values == pytest.approx([1.5, 40.0, 60.0], rel=1e-3)
     assert found.at["temp_high_degc"] == pytest.approx(winding.max(), abs=0.01)
     assert found.at["current_a"] == pytest.approx(math.sqrt(40.0 / 0.6), abs=1e-4)
     known = Constants((known_value("r_phase_ohm", 0.4, 0.004, "ohm"),))
