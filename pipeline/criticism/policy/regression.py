@@ -53,6 +53,18 @@ class GaussNewton:
         meaning="share of its promise that a step must keep for its columns to stay",
         why="at 1 columns are made anew at every step; much lower, and stale ones gain little",
     )
+    pinned: float = chosen(
+        1e-3,
+        unit="1",
+        meaning="share of its standard uncertainty by which a stated constant may move at first",
+        why="all but fixed, until the other constants have left their orders of magnitude",
+    )
+    contradicted: float = derived(
+        2.5758,
+        unit="standard uncertainties",
+        meaning="difference beyond which captures contradict a stated constant",
+        source="the 99 % interval of a normal distribution",
+    )
     least_reach: float = chosen(
         0.1,
         unit="machine scales",

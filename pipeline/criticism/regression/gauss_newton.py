@@ -22,8 +22,6 @@ from pipeline.criticism.regression.linearise import Column
 from pipeline.criticism.regression.noise_floors import rough_floor
 from pipeline.criticism.residuals.segments import sparse
 
-_PINNED = 1e-3
-"""Share of its uncertainty by which a stated constant may move at first, by judgement."""
 _SIDES = (
     ("vd_v", "vq_v", "v_pair_v", "lab_h", "rab_ohm"),
     ("torque_shaft_nm", "omega_mech_rad_s", "iq_a"),
@@ -167,7 +165,8 @@ def _pinned(model: Model) -> Model:
     From orders of magnitude a step moves an inertia that nothing but its prior tells, and the way
     back is a narrow curve of friction over inertia.
     """
-    stated = {n: (value, _PINNED * u) for n, (value, u) in model.machine.stated.items()}
+    share = model.policy.fit.pinned
+    stated = {n: (value, share * u) for n, (value, u) in model.machine.stated.items()}
     return replace(model, machine=replace(model.machine, stated=stated))
 
 

@@ -30,8 +30,6 @@ from pipeline.records.comparison import KnownCombination, ModelParameter
 
 POSITIVE = ("psi_wb", "j_kgm2", "r_ohm", "ld_h", "lq_h")
 """Constants that no motor is without, in the order in which others are reported over them."""
-SURE = 2.5758
-"""Standard uncertainties beyond which a stated constant is spoken against: the 99 % interval."""
 _EDGE = 1e-9
 """Share of a bound by which a value that stands there may miss it."""
 
@@ -220,7 +218,7 @@ def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
         if not math.isfinite(alone):
             continue
         value = alone**2 * (system.fit.values[column.name] / u**2 - said / u_said**2)
-        if abs(value - said) > SURE * math.hypot(alone, u_said):
+        if abs(value - said) > policy.contradicted * math.hypot(alone, u_said):
             notes.append(
                 f"{column.name} is stated as {said:.4g} ± {u_said:.2g}, and without that these "
                 f"captures say {value:.4g} ± {alone:.2g}"
