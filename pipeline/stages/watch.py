@@ -45,6 +45,8 @@ class Watch:
     perform: Pass
     workers: ExitStack
     arrivals: Arrivals = field(init=False)
+    _inside: bool = False
+    _ended: bool = False
     _shown: dict[str, str] = field(default_factory=dict)
     _errors: frozenset[str] = frozenset()
 
@@ -54,18 +56,30 @@ class Watch:
 
     def begin(self) -> Outcome:
         """The first line; what follows are the passes, until Ctrl-C or a termination signal."""
-        terminate_as_interrupt()
+        end_at_once_or_next(self._signalled)
         text = f"watching {self.settings.input}; Ctrl-C ends it, and the same command goes on"
         return Outcome(text=text, then=self._next)
 
     def _next(self) -> Outcome:
         """Waits until a pass is due, and performs it; its outcome goes on with the next one."""
+        self._inside = True
         try:
+            if self._ended:
+                raise KeyboardInterrupt
             outcome = self._pass(self._wait())
         except BaseException:
+            self._ended = True
             self.workers.close()
             raise
+        finally:
+            self._inside = False
         return replace(outcome, exit_code=0, then=self._next)
+
+    def _signalled(self, *_: object) -> None:
+        """Ends a pass at once; between two passes, while a line is printed, the next one ends."""
+        ended, self._ended = self._ended, True
+        if self._inside and not ended:
+            raise KeyboardInterrupt
 
     def _wait(self) -> Snapshot:
         folder = Path(self.settings.input)
@@ -112,7 +126,8 @@ class Watch:
         return Outcome(text="\n".join(lines), errors=errors)
 
 
-def terminate_as_interrupt() -> None:
-    """Ends on SIGTERM, as service managers send it, the way Ctrl-C does."""
+def end_at_once_or_next(signalled: Callable[..., None]) -> None:
+    """Ctrl-C, and SIGTERM as service managers send it, call `signalled`."""
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+        signal.signal(signal.SIGINT, signalled)
+        signal.signal(signal.SIGTERM, signalled)

@@ -217,7 +217,10 @@ def test_a_file_that_killed_its_reader_once_is_read_again(
 
 OF_DASK = {"executor", "scheduler", "tls_ca", "tls_cert", "tls_key"}
 """tests/faults/test_dask.py holds that such workers write the same bytes."""
+OF_WATCH = {"watch"}
+"""tests/e2e/test_watch.py: such a run stays."""
 ELSEWHERE = {
+    "settle_s": "settle_s=5",
     "input": "input={place}/moved",
     "output": "output={place}/another",
     "workers": "workers=3",
@@ -232,7 +235,7 @@ ELSEWHERE = {
 @pytest.mark.parametrize("name", sorted(ELSEWHERE))
 def test_what_no_key_holds_changes_no_byte(hall: Hall, tmp_path: Path, name: str) -> None:
     """Each setting that is left out of the keys of motor and batch."""
-    assert set(ELSEWHERE) | OF_DASK == keys.NOT_OF_A_BATCH
+    assert set(ELSEWHERE) | OF_DASK | OF_WATCH == keys.NOT_OF_A_BATCH
     assert {"input", "output", "key", "refused"} == keys.NOT_OF_A_MOTOR
     shutil.copytree(hall.input, tmp_path / "moved")
     shutil.copytree(hall.conf, tmp_path / "in_another_place")

@@ -99,11 +99,14 @@ def test_the_motor_with_nothing_hidden_leaves_nothing_over_the_noise(
     assert model["residual"] < math.sqrt(2.0)
 
 
-def test_a_motor_with_hidden_effects_says_where_they_show(
+def test_a_motor_with_hidden_effects_names_them_with_their_sizes(
     sheets: dict[str, dict[str, Any]],
 ) -> None:
     model, why = sheets["P1"]["model"], sheets["P1"]["why"]
-    assert (model["verdict"], model["missing"]) == ("missing", [])
+    found = {one["effect"]: one["parameters"] for one in model["missing"]}
+    assert (model["verdict"], set(found)) == ("missing", {"cogging", "dead_time"})
+    loss = found["dead_time"]["loss_v"]
+    assert loss["value"] == pytest.approx(0.18, abs=3.0 * loss["u"])
     assert model["residual"] == model["worst"]["floors"] > 10.0
     (said,) = [one for one in why if one.startswith("model: ")]
     assert model["worst"]["capture"] in said

@@ -13,7 +13,7 @@ import pytest
 import pipeline
 
 HEAD = re.compile(r"^(\w[\w ]*)\n-+$", re.MULTILINE)
-ENTRY = re.compile(r"^(\w+(?:, \w+)*) :", re.MULTILINE)
+ENTRY = re.compile(r"^\**(\w+(?:, \w+)*) :", re.MULTILINE)
 
 FUNCTIONS = [n for n in pipeline.__all__ if inspect.isfunction(getattr(pipeline, n))]
 RECORDS = [n for n in pipeline.__all__ if inspect.isclass(getattr(pipeline, n))]

@@ -86,7 +86,7 @@ def test_nothing_left_is_said_as_diagnose_says_it() -> None:
 
 @pytest.mark.parametrize(("tests", "why"), [(("resistance",), TOO_LITTLE), ((), PAIRLESS)])
 def test_captures_that_fit_no_model_are_insufficient(tests: tuple[str, ...], why: str) -> None:
-    campaign = only(*tests) if tests else unnamed(only("spin_down"))
+    campaign = only(*tests) if tests else unnamed(only("drive"))
     found, told = judged(campaign, STANDARD), diagnose(campaign, STANDARD, Constants())
     assert (found.verdict, told.verdict) == ("insufficient", "insufficient")
     assert (found.note, found.tested, found.passed) == (why, False, False)

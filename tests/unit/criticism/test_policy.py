@@ -45,7 +45,7 @@ def test_a_fit_goes_by_it():
 
 def test_a_kept_verdict_of_another_policy_does_not_count():
     keys = {
-        key_of(model_parts("code", "libraries", [], spec, [], None))
+        key_of(model_parts("code", "libraries", [], spec, [], None, search=True))
         for spec in (ModelSpec(), ModelSpec(policy=CHANGES))
     }
     assert len(keys) == 2

@@ -71,7 +71,7 @@ def test_a_folder_that_is_gone_is_one_error(tmp_path: Path) -> None:
 def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RunSettings:
     monkeypatch.setattr(watch, "LOOK_EVERY_S", 0.01)
     monkeypatch.setattr(watch, "RETRY_S", 0.01)
-    monkeypatch.setattr(watch, "terminate_as_interrupt", lambda: None)
+    monkeypatch.setattr(watch, "end_at_once_or_next", lambda _: None)
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "a.csv").write_text("1")
     return RunSettings(
@@ -135,6 +135,29 @@ def test_the_end_closes_the_workers(settings: RunSettings) -> None:
     with pytest.raises(KeyboardInterrupt):
         following(Watch(settings, perform, workers).begin())
     assert closed == [True]
+
+
+def test_a_signal_between_two_passes_ends_the_next(settings: RunSettings) -> None:
+    """While a line is printed nothing is torn: the watch ends where it would have gone on."""
+    passes: list[int] = []
+
+    def perform(surveyed: Callable[[], None]) -> Outcome:
+        passes.append(1)
+        if len(passes) == 2:
+            watching._signalled()
+        return Outcome()
+
+    watching = Watch(settings, perform, ExitStack())
+    first = following(watching.begin())
+    (Path(settings.input) / "b.csv").write_text("")
+    with pytest.raises(KeyboardInterrupt):
+        following(first)
+    again = Watch(settings, perform, ExitStack())
+    third = following(again.begin())
+    again._signalled()
+    with pytest.raises(KeyboardInterrupt):
+        following(third)
+    assert len(passes) == 3
 
 
 @pytest.mark.parametrize("wrong", [{"settle_s": -1.0}, {"json": True}])
