@@ -109,8 +109,8 @@ def test_a_motor_with_hidden_effects_names_them_with_their_sizes(
     assert loss["value"] == pytest.approx(0.18, abs=3.0 * loss["u"])
     assert model["residual"] == model["worst"]["floors"] > 10.0
     (said,) = [one for one in why if one.startswith("model: ")]
-    assert model["worst"]["capture"] in said
-    assert "`diagnose input=FOLDER motor=" in said
+    assert "cogging torque of 6.0" in said
+    assert "`run input=FOLDER model.effects=[dead_time,cogging]` adds them" in said
 
 
 @pytest.mark.slow
