@@ -16,6 +16,8 @@ from pipeline.records.capture import Capture
 
 PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 """Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
+UNSMOOTHED = "theta_recorded_rad"
+"""The angle as it was recorded, where a smoother one took its place."""
 _REFERENCE_DEGC = 25.0
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.clocks import counted, sampled_unevenly
-from pipeline.criticism.data.segment import Sensors
+from pipeline.criticism.data.segment import UNSMOOTHED, Sensors
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.projection import window_starts
@@ -40,9 +40,11 @@ _SHORTEST = 24
 """Fewest rows of a capture with a clock: three windows of eight, by judgement."""
 _SLACK = 6.0
 """Standard deviations of the angle's noise that a shaft must turn back for a reversal."""
-_RIPPLE = 1.5
-"""Scatter of an angle about its local parabola, over its noise, from which on the shaft itself
-moves, by judgement: too high a limit would take a ripple of the speed away."""
+_MOVING = 2.0
+"""Scatter of an angle about its parabola within one width, over its noise, from which on the shaft
+itself moves: a rounding error is √3 of its standard deviation at the most."""
+_NARROWEST = 5
+"""Samples of the shortest parabola that leaves less noise than there is."""
 
 
 def tellable(capture: Capture) -> Capture | None:
@@ -347,12 +349,12 @@ def coarse_steps(found: Mapping[str, Array], noise: Mapping[str, float]) -> dict
 
 
 def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) -> None:
-    """Takes an angle that shows nothing but its noise about an even run as its local parabola.
+    """Takes an angle as its local parabola, as long a one as the motion of the shaft allows.
 
     Parameters
     ----------
     found
-        Columns; `theta_mech_rad` [n] is replaced.
+        Columns; `theta_mech_rad` [n] is replaced, and stays as `UNSMOOTHED`.
     noise
         Of each column; that of the angle is lowered to what the parabola leaves [rad].
     window
@@ -361,22 +363,29 @@ def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) ->
     Notes
     -----
     A dynamometer that holds its speed leaves only the encoder's rounding to difference twice; times
-    J that would be a torque, and a model that takes inertia away would seem to explain it.
+    J that would be a torque, and a model that takes inertia away would seem to explain it. Where
+    the speed gives way for a moment, at a step of the load, a long parabola would take that
+    acceleration away: the width is halved until no stretch of one width scatters by more than the
+    angle's noise does. An acceleration that hides in that noise may still be more than the noise of
+    the torque: what the smoothing changes in an equation is part of its noise floor.
 
     References
     ----------
     Savitzky and Golay, Anal. Chem. 36(8), 1964, 1627, doi:10.1021/ac60214a047.
 
     """
-    theta, width = found["theta_mech_rad"], 2 * (window // 2) + 1
-    if theta.size < 3 * width or noise["theta_mech_rad"] <= 0.0:
+    theta, half = found["theta_mech_rad"], window // 2
+    if theta.size < 3 * (2 * half + 1) or noise["theta_mech_rad"] <= 0.0:
         return
-    run = _parabolas(theta, width)
-    if float(np.std(theta - run)) > _RIPPLE * noise["theta_mech_rad"]:
-        return
-    found["theta_mech_rad"] = run
-    # variance of a parabola's middle by least squares
-    noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
+    while (width := 2 * half + 1) >= _NARROWEST:
+        run = _parabolas(theta, width)
+        power = np.convolve((theta - run) ** 2, np.full(width, 1.0 / width), mode="valid")
+        if float(power.max()) <= (_MOVING * noise["theta_mech_rad"]) ** 2:
+            found |= {"theta_mech_rad": run, UNSMOOTHED: theta}
+            # variance of a parabola's middle by least squares
+            noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
+            return
+        half //= 2
 
 
 def _parabolas(signal: Array, width: int) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, projected, row_index
+from pipeline.criticism.data.segment import UNSMOOTHED, Segment, projected, row_index
 from pipeline.criticism.data.sensor_noise import rounding_error, unrounded
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Values
 from pipeline.criticism.library.equations import equation_of
@@ -67,7 +67,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     -----
     Noise is added to the recording and the residual computed again; the variance of the change is
     pooled over the windows. The noise is white, of each sensor's own level; an angle that is
-    rounded, and signals that are coarse, are rounded anew besides.
+    rounded, and signals that are coarse, are rounded anew besides. Where an angle was smoothed,
+    what that changes in the residual counts too: it may have been noise or motion.
 
     """
     policy = model.policy.noise_floors
@@ -95,7 +96,13 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
         change = projected(segment, residual(segment, model, values, noisy)) - plain
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
-    return np.sqrt(total / np.maximum(count, 1.0)) + 1e-300
+    variance = total / np.maximum(count, 1.0)
+    if UNSMOOTHED in segment.recorded:
+        rough = {**segment.recorded, "theta_mech_rad": segment.recorded[UNSMOOTHED]}
+        change = projected(segment, residual(segment, model, values, rough)) - plain
+        power = np.bincount(group[valid], change[valid] ** 2, len(groups))
+        variance += power / np.maximum(np.bincount(group[valid], minlength=len(groups)), 1)
+    return np.sqrt(variance) + 1e-300
 
 
 def _white(segment: Segment, name: str) -> float:
