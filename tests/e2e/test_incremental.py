@@ -13,7 +13,7 @@ from pipeline.execution import fits
 from pipeline.execution.worker_pool import WorkerPool
 from pipeline.stages import run
 
-WORDS = ("report=true", "recordings=false")
+WORDS = ("report=true", "recordings=false", "diagnose=false")
 CLEAN: dict[object, tuple[int, dict[str, bytes]]] = {}
 """Clean runs by the bytes of their input and their words."""
 

@@ -18,6 +18,7 @@ def regressed(folder: Path, fleet: str) -> tuple[int, dict]:  # type: ignore[typ
     captures, output = folder / "captures", folder / "out"
     assert main(["simulate", f"output={captures}", f"fleet={fleet}"]) == 0
     words = [f"input={captures}", f"output={output}", "report=false", "recordings=false"]
+    words.append("diagnose=false")
     assert main(["run", *words]) in (0, 4)
     code = main(["regress", "baseline=lot:2026-W20", "candidate=lot:2026-W24", f"output={output}"])
     return code, json.loads((output / "regression" / "report.json").read_bytes())

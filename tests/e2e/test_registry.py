@@ -37,7 +37,7 @@ class Bench:
         (self.input / name).write_text(text)
 
     def run(self, *more: str) -> int:
-        words = [f"input={self.input}", f"output={self.output}", "workers=1"]
+        words = [f"input={self.input}", f"output={self.output}", "workers=1", "diagnose=false"]
         return main(["run", *words, "report=false", "recordings=false", *more])
 
     def sheet(self) -> tuple[bytes, dict[str, Any]]:

@@ -67,7 +67,7 @@ def output(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for name in FILES:
             shutil.copy(ROOT / "data/demo" / motor / name, folder / "in" / motor / name)
     words = [f"input={folder / 'in'}", f"output={folder / 'out'}", "report=false", "workers=1"]
-    assert main(["run", *words, "registry=null"]) == 1
+    assert main(["run", *words, "registry=null", "diagnose=false"]) == 1
     recordings = folder / "out" / "recordings"
     write_ladder_recording(make_diagnosis(), recordings / f"ladder-{FAULTY}.rrd")
     write_lots_recording(make_regression(), recordings / lots_name(make_regression()))

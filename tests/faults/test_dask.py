@@ -16,7 +16,7 @@ from pipeline.records.errors import UsageError
 from tests.faults.fleet import ROOT, command, family, make_fleet, simulated
 from tests.faults.kills import results
 
-WORDS = ("report=false", "recordings=false")
+WORDS = ("report=false", "recordings=false", "diagnose=false")
 
 
 def listening(processes: list[int]) -> set[str]:

@@ -19,7 +19,7 @@ from tests.faults.fleet import ROOT, command, make_fleet, simulated
 from tests.faults.kills import results
 
 pytestmark = pytest.mark.slow
-WORDS = ("report=false", "recordings=false")
+WORDS = ("report=false", "recordings=false", "diagnose=false")
 # What docs/fleet.md tells everybody who starts a cluster to say.
 SAFE = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
 
