@@ -111,7 +111,7 @@ def _constants() -> Iterable[Term]:
     yield constant("lq_h", "H", "incremental q inductance near zero current", TINY, 10.0)
     yield constant("ld_rated_h", "H", "apparent d inductance at rated current", TINY, 10.0)
     yield constant("lq_rated_h", "H", "apparent q inductance at rated current", TINY, 10.0)
-    yield constant("saliency_ratio", "1", "lq_h over ld_h", 0.01, 100.0)
+    yield constant("saliency_ratio", "1", "saliency, lq_h over ld_h", 0.01, 100.0)
     yield constant("psi_pm_wb", "Wb", "magnet flux linkage, phase peak, at 25 degC", TINY, 100.0)
     yield constant("temp_coeff_magnet_1_k", "1/K", "of psi_pm_wb, at 25 degC", -0.02, 0.02)
     yield constant("ke_phase_peak_v_s_rad", "V·s/rad", "back-EMF, phase peak per mechanical rad/s")
@@ -130,8 +130,8 @@ def _constants() -> Iterable[Term]:
     yield constant("j_rotor_kgm2", "kg·m²", "rotor inertia", TINY, 1e4)
     yield constant("torque_coulomb_nm", "N·m", "Coulomb friction torque")
     yield constant("b_visc_nm_s_rad", "N·m·s/rad", "viscous friction coefficient", -1.0, 1e4)
-    yield constant("tau_elec_s", "s", "lq_h over r_phase_ohm", 0.0, 100.0)
-    yield constant("tau_mech_s", "s", "J R over 1.5 (p psi)²", 0.0, 1e5)
+    yield constant("tau_elec_s", "s", "electrical time constant, lq_h over r_phase_ohm", 0.0, 100.0)
+    yield constant("tau_mech_s", "s", "mechanical time constant, J R over 1.5 (p psi)²", 0.0, 1e5)
     yield constant("rth_winding_k_w", "K/W", "winding to ambient, steady state", 0.0, 1e4)
 
 

@@ -388,6 +388,21 @@ def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) ->
         half //= 2
 
 
+def evened(
+    capture: Capture, found: dict[str, Array], sensors: Sensors, machine: Machine, window: int
+) -> Sensors:
+    """The sensors of a log after `even_angle`, which a torque map has: a dynamometer turns it.
+
+    Its encoder is as coarse as the drive's logs show: an even speed hides the step.
+    """
+    if capture.meta.test != "torque_map":
+        return sensors
+    noise = dict(sensors.noise)
+    noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
+    even_angle(found, noise, window)
+    return replace(sensors, noise=noise)
+
+
 def _parabolas(signal: Array, width: int) -> Array:
     """Local parabolas [n] of an odd width by least squares, those of the ends to the ends.
 

@@ -12,8 +12,8 @@ from pipeline.criticism.data.segment import Segment, electrical_orders, segment_
 from pipeline.criticism.data.traces import (
     ANGLES,
     SMOOTHED,
-    even_angle,
     even_clock,
+    evened,
     prepared,
     shaft_angle,
     thinned,
@@ -68,12 +68,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     size = found["vd_v"].size
     window = window_of(period, size)
     orders = electrical_orders(machine) if angle and turned > 0.1 else ()
-    told = prepared(found, period)
-    if capture.meta.test == "torque_map":
-        noise = dict(told.noise)
-        noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
-        even_angle(found, noise, window)
-        told = replace(told, noise=noise)
+    sensors = evened(capture, found, prepared(found, period), machine, window)
     most = _WINDOWS_MAP if capture.meta.test == "torque_map" else _WINDOWS_LOG
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
@@ -82,7 +77,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     made = segment_of(
-        capture, "dq", "drive", period, found=found, sensors=told, channels=channels, weak=weak
+        capture, "dq", "drive", period, found=found, sensors=sensors, channels=channels, weak=weak
     )
     return replace(made, whole=whole, log=log)
 

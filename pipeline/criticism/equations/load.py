@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -12,8 +11,8 @@ from pipeline.criticism.data.q_log import in_time
 from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
 from pipeline.criticism.data.traces import (
     SMOOTHED,
-    even_angle,
     even_clock,
+    evened,
     prepared,
     shaft_angle,
     thinned,
@@ -52,12 +51,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle))
     shaft_angle(found, period, machine)
     window, size = window_of(period, keep.size), keep.size
-    sensors = prepared(found, period)
-    if capture.meta.test == "torque_map":
-        noise = dict(sensors.noise)
-        noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
-        even_angle(found, noise, window)
-        sensors = replace(sensors, noise=noise)
+    sensors = evened(capture, found, prepared(found, period), machine, window)
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     found["row"] = np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(found, keep, window, _WINDOWS)
