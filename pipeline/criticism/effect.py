@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -24,18 +24,6 @@ RECORDERS = ("log", "open", "shaft", "step")
 """What a bench may record on clocks of their own: logs under load, open windings, a shaft alone
 (coasts and slow turns), steps of a locked rotor."""
 
-SAMPLED = (
-    "id_a",
-    "iq_a",
-    "eps_rad",
-    "theta_rad",
-    "omega_rad_s",
-    "winding_k",
-    "magnet_k",
-    "travel_rad",
-    "freq_hz",
-)
-"""The arrays of an `Operating` that have one number a sample."""
 _NEIGHBOURS = 2
 _HIGHEST_COGGING = 400
 """Order a turn beyond which slots and poles cog next to nothing together."""
@@ -123,28 +111,48 @@ class Machine:
         return 1.0 if parameter.scale == "1" else self.scales[parameter.scale]
 
 
-@dataclass(slots=True)
-class Operating:
-    """Where the machine is at each sample [n]; what hooks are evaluated on.
+@dataclass(frozen=True, slots=True)
+class Supply:
+    """How a drive feeds the machine, where that is known.
 
-    Currents are true machine currents in the true rotor frame (amplitude-invariant), angles and
-    speed are true shaft quantities. `inverter`: the machine is fed and logged by a drive, so that
-    inverter and drive-sensor effects apply. `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit.
-    `ts_s` is the sample period, `travel_rad` the angle turned since the last reversal (infinite
-    before the first), `run` the number of reversals before and `runs_rad` [runs] the angle turned
-    from each to the next, negative backwards. `kept` is what `once` made.
-    `q_alone`: the log tells of the q axis only, so that of a voltage's delay its envelope is what
-    shows.
-    `psi_wb` (complex, d + jq) and `torque_em_nm` are there for drop and torque hooks. `held`: a
-    dynamometer holds the far end of the shaft; else the recorded torque is the far end's load.
-    `alone`: nothing records the torque that the shaft passes on, so that its load is a drag.
     `pwm_s`, `vdc_v`: period of the inverter's switching and voltage of its link, 0 where not known.
     `volts_v`: the voltage that the drive's log records, in the true rotor frame, where it has both
-    axes; a leg near zero current goes by the voltage that it is told.
+    axes; a leg near zero current goes by the voltage that it is told. `q_alone`: the log shows the
+    q axis only, so that of a voltage's delay its envelope is what shows.
     """
 
-    machine: Machine
-    base: Mapping[str, float]
+    pwm_s: float = 0.0
+    vdc_v: float = 0.0
+    volts_v: Complex | None = None
+    q_alone: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftState:
+    """How the shaft is held and what records it.
+
+    `held`: a dynamometer holds the far end of the shaft; else the recorded torque is the far end's
+    load. `alone`: nothing records the torque that the shaft passes on, so that its load is a drag.
+    `finer`: points a sample of the angle. `run` [n] is the number of reversals before a sample and
+    `runs_rad` [runs] the angle turned from each to the next, negative backwards.
+    """
+
+    held: bool = False
+    alone: bool = False
+    finer: int = 1
+    run: NDArray[np.int64] | None = None
+    runs_rad: Array | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class Samples:
+    """What has one number a sample [n]: the machine's true state.
+
+    Currents are true machine currents in the true rotor frame (amplitude-invariant), angles and
+    speed are true shaft quantities. `travel_rad` is the angle turned since the last reversal,
+    infinite before the first.
+    """
+
     id_a: Any
     iq_a: Any
     eps_rad: Any
@@ -153,21 +161,32 @@ class Operating:
     winding_k: Array
     magnet_k: Array
     travel_rad: Array
-    inverter: bool
     freq_hz: Array
+
+
+@dataclass(slots=True, kw_only=True)
+class Operating(Samples):
+    """Where the machine is at each sample; what hooks are evaluated on.
+
+    `base` holds r_ohm, ld_h, lq_h, psi_wb of the fit, `ts_s` is the sample period. `inverter`: the
+    machine is fed and logged by a drive, so that inverter and drive-sensor effects apply; `supply`
+    says how. `psi_wb` [n] (complex, d + jq) and `torque_em_nm` [n] are there for drop and torque
+    hooks. `kept` is what `once` made.
+    """
+
+    machine: Machine
+    base: Mapping[str, float]
     ts_s: float
-    q_alone: bool = False
+    inverter: bool
+    supply: Supply = Supply()
+    shaft: ShaftState = ShaftState()
     psi_wb: Complex | None = None
     torque_em_nm: Array | None = None
-    held: bool = False
-    alone: bool = False
-    pwm_s: float = 0.0
-    vdc_v: float = 0.0
-    volts_v: Complex | None = None
-    finer: int = 1
-    run: NDArray[np.int64] | None = None
-    runs_rad: Array | None = None
     kept: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
+
+    def fed(self, **supply: Any) -> Operating:
+        """The same machine, fed and logged by a drive of which that much more is known."""
+        return replace(self, inverter=True, supply=replace(self.supply, **supply))
 
     def once(self, column: Any, name: Hashable, make: Callable[[], Any]) -> Any:
         """What depends on a column alone, made once for all copies that share the array."""
@@ -190,28 +209,36 @@ class Operating:
         that mean is taken over `finer` points a sample, and each has the mean of its own part: a
         wave that turns many times from point to point would beat with them.
         """
-        name = ("shaft", order, self.held)
+        name = ("shaft", order, self.shaft.held)
         waves: tuple[Array, Array] = self.once(self.theta_rad, name, lambda: self._turned(order))
         return waves
 
     def _turned(self, order: int) -> tuple[Array, Array]:
         angle = order * self.theta_rad
         power = 2 if self.inverter else 1
-        if self.held or (power == 1 and self.finer == 1) or angle.size < _NEIGHBOURS:
+        if self.shaft.held or (power == 1 and self.shaft.finer == 1) or angle.size < _NEIGHBOURS:
             return np.cos(angle), np.sin(angle)
         seen = np.sinc(np.gradient(angle) / (2.0 * math.pi)) ** power
         return seen * np.cos(angle), seen * np.sin(angle)
 
     def one_sample(self) -> Operating:
         """The first sample alone [1]."""
-        return replace(self.at(np.zeros(1, dtype=np.int64)), run=None)
+        first = self.at(np.zeros(1, dtype=np.int64))
+        return replace(first, shaft=replace(first.shaft, run=None))
 
     def at(self, rows: NDArray[np.int64]) -> Operating:
         """Some of the samples, for hooks that ask for nothing before or after a sample."""
-        arrays = {name: getattr(self, name)[rows] for name in SAMPLED}
-        run = None if self.run is None else self.run[rows]
-        moved = replace(self, **arrays, run=run, kept={})
-        return replace(moved, psi_wb=None, torque_em_nm=None, volts_v=None)
+        samples = {one.name: getattr(self, one.name)[rows] for one in fields(Samples)}
+        run = None if self.shaft.run is None else self.shaft.run[rows]
+        return replace(
+            self,
+            **samples,
+            shaft=replace(self.shaft, run=run),
+            supply=replace(self.supply, volts_v=None),
+            psi_wb=None,
+            torque_em_nm=None,
+            kept={},
+        )
 
     @property
     def i_a(self) -> Complex:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,57 +23,82 @@ _REFERENCE_DEGC = 25.0
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """What a recording says of its sensors: `noise` of every column, its rounding in it; `steps` of
-    the columns that are rounded too coarsely for their noise to dither; the shaft's runs.
+    """What a recording shows of its sensors.
+
+    `noise`: standard deviation of every column, its rounding in it. `steps`: resolution of the
+    columns that are rounded too coarsely for their noise to dither, so that the rounding error
+    follows the signal. `runs_rad`: angles turned between the reversals that stand out of the
+    angle's noise; the column `run` numbers the one at hand. `angle_step_rad`: resolution of an
+    angle whose noise is its rounding.
     """
 
     noise: Mapping[str, float]
     steps: Mapping[str, float] = field(default_factory=dict)
     runs_rad: Array | None = None
+    angle_step_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
+class Instrument:
+    """What recorded a capture: `name` (drive or bench), how its voltages were sampled (`timing`),
+    and the nuisances that are the gains of its voltmeter (`meter`) and of its current sensors.
+    """
+
+    name: str
+    timing: str
+    meter: str = "gain_voltage"
+    ammeter: str = "gain_current"
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbances:
+    """What may disturb a capture and is no effect of the machine; the noise floor takes it out.
+
+    `offsets` [K, n]: offsets of the channel, of their prior size. `lines` [K, C, W, M]: weak
+    samples of mains lines and of the drift of sensors.
+    """
+
+    offsets: Array | None = None
+    lines: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unthinned:
+    """Columns [N] of a log before it was thinned to its windows.
+
+    `columns`: those of a drive log, with `good`, the samples that were recorded well. `late`: what
+    an instrument may be late with.
+    """
+
+    columns: Mapping[str, Array] | None = None
+    late: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
     """One capture's signals [n] for one kind of equation, with its weak form.
 
     `kind` is the name of its equation (`equation.Equation`). `recorded` holds capture columns on an
-    even clock of period `ts_s`; `noise` the standard
-    deviation of each one's sensor. `channels` are the equations: the recorded signal that each
+    even clock of period `ts_s`. `channels` are the equations: the recorded signal that each
     predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `pwm_s`, `vdc_v`,
-    `ke_v_s_rad`, `ambient_k`, 1 by the name of each unlogged temperature's nuisance), `meter` and
-    `ammeter` the nuisances that are the gains of its voltmeter and of its current sensors;
-    `angle_step_rad` is the resolution of an angle whose noise
-    is its rounding. `blocks` [W] numbers the parts of a capture that are held out one by one where
-    there is no other capture to predict it from; `offsets` [K, n] are offsets of the channel, of
-    their prior size, that the capture may have; `runs_rad` the angles turned between reversals, of
-    which the column `run` numbers the one at hand; `lines` [K, C, W, M] are weak samples of the
-    mains lines, and of the drift of sensors, that there may be; `whole` are the columns of a drive
-    log before it was thinned, with `good`, the samples that were recorded well; `steps` the
-    resolution of columns whose rounding error follows the signal; `log` what an instrument may be
-    late with, at all samples, where the others were thinned.
+    `ke_v_s_rad`, `ambient_k`, 1 by the name of each unlogged temperature's nuisance). `blocks` [W]
+    numbers the parts of a capture that are held out one by one where there is no other capture to
+    predict it from.
     """
 
     capture: str
     test: str
     kind: str
-    instrument: str
-    timing: str
     ts_s: float
     recorded: Mapping[str, Array]
-    noise: Mapping[str, float]
     channels: tuple[str, ...]
     weak: Projection | None
+    instrument: Instrument
+    sensors: Sensors
     fixed: Mapping[str, float] = field(default_factory=dict)
-    meter: str = "gain_voltage"
-    angle_step_rad: float = 0.0
+    disturbances: Disturbances = Disturbances()
+    unthinned: Unthinned = Unthinned()
     blocks: NDArray[np.int64] | None = None
-    offsets: Array | None = None
-    runs_rad: Array | None = None
-    lines: Array | None = None
-    whole: Mapping[str, Array] | None = None
-    steps: Mapping[str, float] = field(default_factory=dict)
-    log: Mapping[str, Array] = field(default_factory=dict)
-    ammeter: str = "gain_current"
 
     @property
     def size(self) -> int:
@@ -98,28 +123,34 @@ def segment_of(
     """A segment with what the capture's metadata says of it."""
     stated = capture.meta.ambient_degc
     ambient = 0.0 if stated is None else stated - _REFERENCE_DEGC
-    timing, pwm_hz = capture.meta.voltage_timing, capture.meta.pwm_hz
+    pwm_hz = capture.meta.pwm_hz
     if pwm_hz:
         fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}
+    meter = "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage"
+    theta = found.get("theta_mech_rad")
     return Segment(
-        capture.path,
-        capture.meta.test,
-        kind,
-        instrument,
-        timing,
-        period,
-        found,
-        sensors.noise,
-        channels,
-        weak,
-        {"ambient_k": ambient, **fixed},
-        "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage",
-        rounding_step(found["theta_mech_rad"]) if "theta_mech_rad" in found else 0.0,
-        blocks,
-        offsets,
-        sensors.runs_rad,
-        steps={name: step for name, step in sensors.steps.items() if name in found},
+        capture=capture.path,
+        test=capture.meta.test,
+        kind=kind,
+        ts_s=period,
+        recorded=found,
+        channels=channels,
+        weak=weak,
+        instrument=Instrument(instrument, capture.meta.voltage_timing, meter),
+        sensors=replace(
+            sensors,
+            steps={name: step for name, step in sensors.steps.items() if name in found},
+            angle_step_rad=0.0 if theta is None else rounding_step(theta),
+        ),
+        fixed={"ambient_k": ambient, **fixed},
+        disturbances=Disturbances(offsets),
+        blocks=blocks,
     )
+
+
+def with_lines(segment: Segment, lines: Array) -> Segment:
+    """A segment with other weak samples [K, C, W, M] of what may disturb it."""
+    return replace(segment, disturbances=replace(segment.disturbances, lines=lines))
 
 
 def clock(segment: Segment) -> Array:

@@ -8,7 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment, electrical_orders, slow_orders
+from pipeline.criticism.data.segment import (
+    Instrument,
+    Segment,
+    Sensors,
+    electrical_orders,
+    slow_orders,
+)
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.regression.fit import Fit
@@ -63,8 +69,8 @@ def _noise(fit: Fit) -> Mapping[str, float]:
     found["theta_mech_rad"] = policy.noise_angle_rad
     for segment in fit.segments:
         for name in (*_NOISE, "theta_mech_rad"):
-            if segment.noise.get(name, 0.0) > 0.0:
-                found[name] = segment.noise[name]
+            if segment.sensors.noise.get(name, 0.0) > 0.0:
+                found[name] = segment.sensors.noise[name]
     return found
 
 
@@ -88,21 +94,18 @@ def _torque_map(fit: Fit, noise: Mapping[str, float]) -> list[Segment]:
         }
         window = policy.map_samples // 2
         weak = projection(theta, window_starts(keep, window), window, electrical_orders(machine))
-        channels = ("vd_v", "vq_v", "torque_shaft_nm")
         made.append(
             Segment(
-                f"planned torque_map {speed:g}",
-                "torque_map",
-                "dq",
-                "drive",
-                "instant",
-                period,
-                recorded,
-                noise,
-                channels,
-                weak,
-                {"ambient_k": 0.0},
-                "gain_commanded",
+                capture=f"planned torque_map {speed:g}",
+                test="torque_map",
+                kind="dq",
+                ts_s=period,
+                recorded=recorded,
+                channels=("vd_v", "vq_v", "torque_shaft_nm"),
+                weak=weak,
+                instrument=Instrument("drive", "instant", "gain_commanded"),
+                sensors=Sensors(noise),
+                fixed={"ambient_k": 0.0},
             )
         )
     return made
@@ -124,9 +127,17 @@ def _shaft(
     starts = 1 + window_starts(keep, window)
     cycles, margin = (0.9, 12.0) if slow else (3.0, 16.0)
     weak = projection(theta, starts, window, orders, cycles=cycles, margin=margin)
-    fixed = {"ambient_k": 0.0}
     return Segment(
-        name, test, "shaft", "bench", "instant", period, recorded, noise, (channel,), weak, fixed
+        capture=name,
+        test=test,
+        kind="shaft",
+        ts_s=period,
+        recorded=recorded,
+        channels=(channel,),
+        weak=weak,
+        instrument=Instrument("bench", "instant"),
+        sensors=Sensors(noise),
+        fixed={"ambient_k": 0.0},
     )
 
 

@@ -9,7 +9,7 @@ from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Value
 
 def _torque(x: Operating, q: Values) -> Array:
     # what a transducer passes on is no drag: it is in the recorded load
-    size = q["torque_nm"] if x.alone else 0.0
+    size = q["torque_nm"] if x.shaft.alone else 0.0
     return np.full(x.omega_rad_s.shape, size)
 
 

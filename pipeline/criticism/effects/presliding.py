@@ -18,14 +18,14 @@ def _state(x: Operating, travel_rad: float) -> Array:
     Within a run of sense s it is s (1 − c exp(−|Δθ|/θ_s)); of the run before there remains
     c_r = 2 − c_(r−1) exp(−|A_(r−1)|/θ_s), A the angle turned in that run.
     """
-    if x.run is None or x.runs_rad is None:
+    if x.shaft.run is None or x.shaft.runs_rad is None:
         lack, sense = np.full(x.travel_rad.size, 2.0), np.sign(x.omega_rad_s)
     else:
-        fading = np.exp(-np.abs(x.runs_rad) / travel_rad)
+        fading = np.exp(-np.abs(x.shaft.runs_rad) / travel_rad)
         lacks = [2.0]
         for left in fading[:-1].tolist():
             lacks.append(2.0 - lacks[-1] * left)
-        lack, sense = np.array(lacks)[x.run], np.sign(x.runs_rad)[x.run]
+        lack, sense = np.array(lacks)[x.shaft.run], np.sign(x.shaft.runs_rad)[x.shaft.run]
     state: Array = sense * (1.0 - lack * np.exp(-x.travel_rad / travel_rad))
     return state
 

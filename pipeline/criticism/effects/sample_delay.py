@@ -11,7 +11,7 @@ def _voltage(v_v: Complex, x: Operating, q: Values, _: str) -> Complex:
     if not x.inverter:
         return v_v
     turn = x.machine.pole_pairs * x.omega_rad_s * q["delay_s"]
-    if x.q_alone:
+    if x.supply.q_alone:
         # what is turned into the q axis cannot be known without the d axis
         late: Complex = v_v + 1j * q["delay_s"] / x.ts_s * np.gradient(v_v.imag)
         return late

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
+from pipeline.criticism.data.segment import Segment, Unthinned, electrical_orders, segment_of
 from pipeline.criticism.data.traces import (
     ANGLES,
     SMOOTHED,
@@ -79,7 +79,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     made = segment_of(
         capture, "dq", "drive", period, found=found, sensors=sensors, channels=channels, weak=weak
     )
-    return replace(made, whole=whole, log=log)
+    return replace(made, unthinned=Unthinned(whole, log))
 
 
 def state(
@@ -90,8 +90,8 @@ def state(
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
-    volts = volts / (1.0 + values[segment.meter])
-    return at_true_angle(segment, replace(x, inverter=True, volts_v=volts), model, values)
+    volts = volts / (1.0 + values[segment.instrument.meter])
+    return at_true_angle(segment, x.fed(volts_v=volts), model, values)
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
@@ -130,12 +130,12 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     A log that is slower than the PWM has the mean of such vectors in the rotor frame. `ripple_edge`
     and `ripple_shift` are what the log samples otherwise.
     """
-    period, held = segment.ts_s, segment.timing == "held"
+    period, held = segment.ts_s, segment.instrument.timing == "held"
     difference = forward if held else central
     omega, turn = x.once(x.theta_rad, "pace", lambda: _pace(segment, x, difference))
     voltage = (held_voltage if held else rotor_voltage)(pieces, omega, period)
     edge, shift = values["ripple_edge"], values["ripple_shift"]
-    averaged = 1.0 if segment.timing != "instant" else 0.0
+    averaged = 1.0 if segment.instrument.timing != "instant" else 0.0
     mean: Complex = _shortened((averaged / 24.0 + edge) * turn**2) * voltage
     if shift:
         psi = ahead(pieces.psi_wb) if held else pieces.psi_wb
@@ -178,7 +178,7 @@ def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> 
     The current moves on for a part of a period; and while a held voltage turns, both are off their
     means. A free shaft is turned by the means; what a transducer tells of a held one is its own.
     """
-    flux, current = ripple(x, values["ripple_held" if x.held else "ripple_mean"], values)
+    flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
     current = values["ripple_torque"] * segment.ts_s * central(x.i_a, segment.ts_s) - current
     moved = np.conj(pieces.psi_wb) * current - np.conj(flux) * x.i_a
     torque: Array = 1.5 * x.machine.pole_pairs * moved.imag

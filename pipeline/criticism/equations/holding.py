@@ -84,10 +84,11 @@ def _current_slope(segment: Segment, model: Model, values: Values) -> float:
     """
     zero = np.zeros(4)
     nothing, ampere = (
-        Recorded(current, zero, zero, zero, segment.ts_s, False, segment.instrument)
+        Recorded(current, zero, zero, zero, segment.ts_s, False, segment.instrument.name)
         for current in (zero.astype(np.complex128), np.full(4, 1j))
     )
-    still, moved = (true_current(one, segment.ammeter, model, values) for one in (nothing, ampere))
+    meter = segment.instrument.ammeter
+    still, moved = (true_current(one, meter, model, values) for one in (nothing, ampere))
     return float((moved - still)[0].imag)
 
 

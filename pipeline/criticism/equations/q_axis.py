@@ -60,7 +60,7 @@ def state(
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     motion = replace(motion, omega_rad_s=signals.get(SPEED, motion.omega_rad_s))
     x = operating(segment, signals, model, values, current, motion)
-    return at_true_angle(segment, replace(x, inverter=True, q_alone=True), model, values)
+    return at_true_angle(segment, x.fed(q_alone=True), model, values)
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Values) -> Array:

@@ -93,8 +93,9 @@ def state(
         * np.exp(1j * (segment.fixed["pair_rad"] - math.pi / 6))
     )
     phase = int(segment.fixed["phase"])
-    bench = Recorded(stationary, zero, eps, zero, segment.ts_s, False, segment.instrument, phase)
-    current = true_current(bench, segment.ammeter, model, values) * np.exp(-1j * eps)
+    by = segment.instrument
+    bench = Recorded(stationary, zero, eps, zero, segment.ts_s, False, by.name, phase)
+    current = true_current(bench, by.ammeter, model, values) * np.exp(-1j * eps)
     return replace(operating(segment, signals, model, values, current, at_rest(n)), eps_rad=eps)
 
 

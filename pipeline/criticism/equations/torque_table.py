@@ -61,7 +61,7 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
         offsets=np.full((1, torque.size), float(np.abs(torque).max())),
     )
     # angles that were set stand apart by more than the encoder's step
-    return replace(made, angle_step_rad=0.0)
+    return replace(made, sensors=replace(made.sensors, angle_step_rad=0.0))
 
 
 def state(

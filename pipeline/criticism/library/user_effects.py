@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import TracebackType
@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import (
     RECORDERS,
-    SAMPLED,
     SCALES,
     Effect,
     Machine,
     Operating,
     Parameter,
     Recorded,
+    Samples,
+    ShaftState,
 )
 from pipeline.records.errors import PipelineError, UsageError
 
@@ -98,7 +99,7 @@ def _inputs(first: Any) -> list[NDArray[Any]]:
     names: tuple[str, ...] = ()
     if isinstance(first, Operating):
         # the angle since a reversal is infinite before the first, and no fault of a hook's
-        names = ("omega_rad_s", *(name for name in SAMPLED if name != "travel_rad"))
+        names = ("omega_rad_s", *(one.name for one in fields(Samples) if one.name != "travel_rad"))
     elif isinstance(first, Recorded):
         names = _OF_RECORDED
     return [np.asarray(getattr(first, name)) for name in names]
@@ -273,8 +274,7 @@ def _operating() -> Operating:
         ts_s=1e-4,
         psi_wb=steps.astype(np.complex128),
         torque_em_nm=steps,
-        run=np.zeros(_TRIED, dtype=np.int64),
-        runs_rad=steps[:1],
+        shaft=ShaftState(run=np.zeros(_TRIED, dtype=np.int64), runs_rad=steps[:1]),
     )
 
 

@@ -60,21 +60,23 @@ def lost_shares(
     """
     inductance = 0.5 * (x.base["ld_h"] + x.base["lq_h"])
     width = max(width_a, _SHARP)
-    known = x.pwm_s and x.vdc_v and inductance > 0.0 and x.psi_wb is not None and loss_v > 0.0
+    supply = x.supply
+    switched = supply.pwm_s and supply.vdc_v and inductance > 0.0
+    known = switched and x.psi_wb is not None and loss_v > 0.0
     if not known:
         share: Array = np.tanh(current_a / width)
         return share
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
     winding = _phases(x.base["r_ohm"] * x.i_a + induced, eps_rad)
-    told = None if x.volts_v is None else _phases(x.volts_v, eps_rad)
+    told = None if supply.volts_v is None else _phases(supply.volts_v, eps_rad)
     late = keeps = (current_a > 0.0).astype(float)
-    per_volt = x.pwm_s / (2.0 * inductance)
+    per_volt = supply.pwm_s / (2.0 * inductance)
     ramp = 4.0 / 3.0 * loss_v * per_volt
-    dead = loss_v / x.vdc_v
+    dead = loss_v / supply.vdc_v
     for _ in range(_ROUNDS):
         volts = winding + loss_v * (late + keeps - 1.0) if told is None else told
         middle = 0.5 * (volts.max(axis=0) + volts.min(axis=0))
-        duty = np.clip(0.5 + (volts - middle) / x.vdc_v, 0.0, 1.0)
+        duty = np.clip(0.5 + (volts - middle) / supply.vdc_v, 0.0, 1.0)
         low, before = _beside(volts, loss_v, late, -1.0)
         rise = current_a - per_volt * (before + winding * (1.0 - duty + dead))
         low_after, after = _beside(volts, loss_v, 1.0 - keeps, 1.0)

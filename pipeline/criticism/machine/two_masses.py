@@ -134,7 +134,7 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
-    moved = x.theta_rad if x.held or between else twist_rad()
+    moved = x.theta_rad if x.shaft.held or between else twist_rad()
     drag = np.zeros(x.theta_rad.size)
     drag[1:-1] = -far / x.ts_s**2 * np.diff(moved, 2)
     return drag

@@ -230,15 +230,15 @@ class _Sampler:
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
             **{n: n in self.segment.fixed for n in ("unlogged_d_share", *UNLOGGED.values())},
             "gain_clock": observes_sensor(self.segment, "clock"),
-            self.segment.meter: observes_sensor(self.segment, "voltage"),
-            self.segment.ammeter: observes_sensor(self.segment, "current"),
+            self.segment.instrument.meter: observes_sensor(self.segment, "voltage"),
+            self.segment.instrument.ammeter: observes_sensor(self.segment, "current"),
         }
         if not observed.get(column.name, False):
             return None
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        if column.name in (self.segment.ammeter, "offset_temp_k", *UNLOGGED.values()):
+        if column.name in (self.segment.instrument.ammeter, "offset_temp_k", *UNLOGGED.values()):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
         there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step

@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.segment import Segment, clock
+from pipeline.criticism.data.segment import Segment, clock, with_lines
 from pipeline.criticism.effect import Array, Machine, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import Model
@@ -128,7 +128,7 @@ def _humming(segment: Segment, hums: Sequence[Hum], model: Model, values: Values
     for name, rms, freq in _in_currents(segment, mine):
         waves = rms * _waves(segment, freq)
         lines.append(disturbed(segment, weak, model, values, name, waves))
-    return replace(segment, lines=np.concatenate(lines))
+    return with_lines(segment, np.concatenate(lines))
 
 
 def _sensors(segment: Segment) -> tuple[str, ...]:
@@ -148,10 +148,12 @@ def _as_sensed(segment: Segment, model: Model, values: Values) -> Mapping[str, A
 
 def _in_currents(segment: Segment, mine: Sequence[Hum]) -> Iterator[tuple[str, float, float]]:
     """Name, rms [A] and frequency of what the current sensors may have of a voltage's lines."""
-    sensed = [h for h in mine if segment.noise.get(h.signal, 0.0) > 0.0 and "_v" in h.signal]
+    sensed = [
+        h for h in mine if segment.sensors.noise.get(h.signal, 0.0) > 0.0 and "_v" in h.signal
+    ]
     for freq in sorted({h.freq_hz for h in sensed}):
-        times = max(h.rms / segment.noise[h.signal] for h in sensed if h.freq_hz == freq)
-        for name, sigma in segment.noise.items():
+        times = max(h.rms / segment.sensors.noise[h.signal] for h in sensed if h.freq_hz == freq)
+        for name, sigma in segment.sensors.noise.items():
             if sigma > 0.0 and name.startswith("i"):
                 yield name, times * sigma, freq
 

@@ -77,22 +77,23 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
     wanted = policy.pooled // max(int(valid.sum()) // max(len(groups), 1), 1)
     replicates = min(max(wanted, policy.replicates), policy.pooled)
-    if segment.steps:
+    sensors = segment.sensors
+    if sensors.steps:
         replicates = max(replicates, policy.shifts)
     shifts = _shifts(segment, replicates, seed)
-    smooth = {name: unrounded(segment.recorded[name], q) for name, q in segment.steps.items()}
+    smooth = {name: unrounded(segment.recorded[name], q) for name, q in sensors.steps.items()}
     for replicate in range(replicates):
         generator = np.random.default_rng([seed, replicate])
         noisy = {
             name: column + generator.normal(0.0, _white(segment, name), column.size)
             for name, column in segment.recorded.items()
         }
-        for name, step in segment.steps.items():
+        for name, step in sensors.steps.items():
             noisy[name] += rounding_error(smooth[name], step, shifts[name][replicate])
-        if segment.angle_step_rad:
+        if sensors.angle_step_rad:
             theta = segment.recorded["theta_mech_rad"]
             shift = generator.uniform(-0.5, 0.5)
-            noisy["theta_mech_rad"] = theta + rounding_error(theta, segment.angle_step_rad, shift)
+            noisy["theta_mech_rad"] = theta + rounding_error(theta, sensors.angle_step_rad, shift)
         change = projected(segment, residual(segment, model, values, noisy)) - plain
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)
@@ -107,8 +108,8 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
 
 def _white(segment: Segment, name: str) -> float:
     """Standard deviation of a column's noise, without the rounding that follows the signal."""
-    rounding = segment.steps.get(name, 0.0) / math.sqrt(12.0)
-    return math.sqrt(max(segment.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
+    rounding = segment.sensors.steps.get(name, 0.0) / math.sqrt(12.0)
+    return math.sqrt(max(segment.sensors.noise.get(name, 0.0) ** 2 - rounding**2, 0.0))
 
 
 def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
@@ -119,7 +120,7 @@ def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
     """
     even = (np.arange(count) + 0.5) / count - 0.5
     generator = np.random.default_rng([seed, count])
-    return {name: generator.permutation(even) for name in segment.steps}
+    return {name: generator.permutation(even) for name in segment.sensors.steps}
 
 
 def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
@@ -215,7 +216,7 @@ def reading_error(
     ]
     reading = np.zeros((len(sizes), weak.starts.size, weak.orders.size))
     reading[:, :, 0] = policy.reading * np.abs(weak.project(np.stack(sizes)))[:, :, 0]
-    part = policy.model_drive if segment.instrument == "drive" else policy.model_bench
+    part = policy.model_drive if segment.instrument.name == "drive" else policy.model_bench
     scales = [
         channel_scale(segment, channel, model.machine, values) for channel in segment.channels
     ]
@@ -280,7 +281,7 @@ def _jumps(segment: Segment, policy: NoiseFloors) -> Array:
     if weak is None:
         return np.zeros(segment.size)
     voltage = segment.recorded["vd_v"] + 1j * segment.recorded["vq_v"]
-    noise = math.hypot(segment.noise["vd_v"], segment.noise["vq_v"])
+    noise = math.hypot(segment.sensors.noise["vd_v"], segment.sensors.noise["vq_v"])
     bend = np.zeros(voltage.size)
     # a jump bends the line twice, there and back
     bend[1:-1] = np.abs(np.diff(voltage, 2)) / math.sqrt(2.0)
@@ -340,7 +341,7 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
     theta = segment.recorded["theta_mech_rad"]
     span = (weak.length - 1) * segment.ts_s
     omega = (theta[weak.starts + weak.length - 1] - theta[weak.starts]) / span
-    step = math.sqrt(12.0) * segment.noise["theta_mech_rad"]
+    step = math.sqrt(12.0) * segment.sensors.noise["theta_mech_rad"]
     wave = window_gain(segment) / math.sqrt(2.0) * policy.encoder_line * step * values["j_kgm2"]
     lines: Array = wave * (omega[:, None] * weak.orders[None, :]) ** 2
     return lines
@@ -352,15 +353,16 @@ def offsets(
     """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
     offset of each channel's sensor, mains lines and drift.
     """
-    made = [] if segment.lines is None else [line[valid] * row_weight for line in segment.lines]
-    if segment.offsets is not None:
-        own = [projected(segment, one[None])[valid] * row_weight for one in segment.offsets]
+    shapes, lines = segment.disturbances.offsets, segment.disturbances.lines
+    made = [] if lines is None else [line[valid] * row_weight for line in lines]
+    if shapes is not None:
+        own = [projected(segment, one[None])[valid] * row_weight for one in shapes]
         return own + made
     if segment.weak is None:
         return []
     for place, channel in enumerate(segment.channels):
         offset = channel_of(segment, channel).offset
-        prior = policy.offset * segment.noise.get(channel, 0.0)
+        prior = policy.offset * segment.sensors.noise.get(channel, 0.0)
         if offset == "voltmeter":
             prior = math.hypot(prior, policy.terminal_offset * largest_reading(segment, (channel,)))
         if offset == "none" or prior == 0.0:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Segment, with_lines
 from pipeline.criticism.data.sensor_noise import is_rounded
 from pipeline.criticism.data.traces import PAD, tellable
 from pipeline.criticism.effect import Machine
@@ -68,7 +68,7 @@ def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
     """The segment with the gains of the instruments that recorded it, by kind."""
     volts = gains.get("gain_commanded") or gains.get("gain_voltage", "gain_voltage")
     amps = gains.get("gain_current") or gains.get("gain_current_bench", "gain_current")
-    return replace(segment, meter=volts, ammeter=amps)
+    return replace(segment, instrument=replace(segment.instrument, meter=volts, ammeter=amps))
 
 
 def _by_encoder(segment: Segment, step: float) -> Segment:
@@ -79,7 +79,9 @@ def _by_encoder(segment: Segment, step: float) -> Segment:
     """
     theta = segment.recorded.get("theta_mech_rad")
     known = theta is not None and is_rounded(theta, step)
-    return replace(segment, angle_step_rad=step) if known else segment
+    if not known:
+        return segment
+    return replace(segment, sensors=replace(segment.sensors, angle_step_rad=step))
 
 
 def sparse(segment: Segment) -> Segment:
@@ -95,5 +97,6 @@ def sparse(segment: Segment) -> Segment:
     moved = PAD + (weak.length + 2 * PAD) * np.arange(_FEW)
     few = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     blocks = None if segment.blocks is None else segment.blocks[chosen]
-    lines = None if segment.lines is None else segment.lines[:, :, chosen]
-    return replace(segment, recorded=cut, weak=few, blocks=blocks, lines=lines)
+    short = replace(segment, recorded=cut, weak=few, blocks=blocks)
+    lines = segment.disturbances.lines
+    return short if lines is None else with_lines(short, lines[:, :, chosen])

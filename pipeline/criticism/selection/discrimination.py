@@ -22,13 +22,13 @@ def discriminate(fit: Fit, effect: Effect) -> Discrimination | None:
     if effect.discriminator is None:
         return None
     model, values = fit.model.without(effect.name), fit.values
-    logs = [_whole(s, model, fit) for s in fit.segments if s.whole is not None]
+    logs = [_whole(s, model, fit) for s in fit.segments if s.unthinned.columns is not None]
     return effect.discriminator(logs, values_of(effect, model.machine, values))
 
 
 def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
     """One log at full rate, as a model without the effect sees it."""
-    signals = dict(segment.whole or {})
+    signals = dict(segment.unthinned.columns or {})
     good = signals.pop("good") > 0
     values = fit.values
     full = replace(segment, recorded=signals, weak=None)
@@ -36,7 +36,7 @@ def _whole(segment: Segment, model: Model, fit: Fit) -> FullLog:
     drag = evaluate(model, x, values).drag_nm
     shaft = _undone(measured(full, signals, model, values)[-1], model, values)
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
-    noise = segment.noise
+    noise = segment.sensors.noise
     u_air_gap = kt * math.hypot(noise["id_a"], noise["iq_a"]) / math.sqrt(2.0)
     return FullLog(
         x, drag, shaft, good, noise["theta_mech_rad"], noise["torque_shaft_nm"], u_air_gap

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment, clock
+from pipeline.criticism.data.segment import Segment, clock, with_lines
 from pipeline.criticism.effect import Array, Values
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit
@@ -64,13 +64,14 @@ def with_drift(segment: Segment, model: Model, values: Values) -> Segment:
         return segment
     policy = model.policy.selection
     sines = policy.drift_size * slowest(clock(segment), policy.drift_terms)
-    made = [] if segment.lines is None else [segment.lines]
+    known = segment.disturbances.lines
+    made = [] if known is None else [known]
     made += [
         disturbed(segment, segment.weak, model, values, name, sigma * sines)
-        for name, sigma in segment.noise.items()
+        for name, sigma in segment.sensors.noise.items()
         if sigma > 0.0 and name.startswith(_WANDERS) and name in segment.recorded
     ]
-    return replace(segment, lines=np.concatenate(made)) if made else segment
+    return with_lines(segment, np.concatenate(made)) if made else segment
 
 
 def slowest(time_s: Array, terms: int) -> Array:

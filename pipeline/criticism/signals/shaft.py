@@ -133,7 +133,7 @@ def true_load(
         zero,
         segment.ts_s,
         inverter,
-        segment.instrument,
+        segment.instrument.name,
         ahead=ahead_in(segment, signals, model.machine.pole_pairs),
     )
     for effect in hooks:

@@ -17,6 +17,8 @@ from pipeline.criticism.effect import (
     Machine,
     Operating,
     Recorded,
+    ShaftState,
+    Supply,
     Values,
     between,
 )
@@ -99,16 +101,17 @@ def operating(
         winding_k=_warmth(segment, signals, "temp_winding_degc", theta.size, values),
         magnet_k=_warmth(segment, signals, "temp_magnet_degc", theta.size, values),
         travel_rad=_travel(signals, theta.size),
-        run=_run(signals, theta.size),
-        runs_rad=segment.runs_rad,
         inverter=False,
         ts_s=segment.ts_s,
         freq_hz=motion.freq_hz,
-        held=segment.test == "torque_map",
-        alone="torque_shaft_nm" not in signals,
-        pwm_s=segment.fixed.get("pwm_s", 0.0),
-        vdc_v=segment.fixed.get("vdc_v", 0.0),
-        finer=theta.size // segment.size,
+        supply=Supply(segment.fixed.get("pwm_s", 0.0), segment.fixed.get("vdc_v", 0.0)),
+        shaft=ShaftState(
+            held=segment.test == "torque_map",
+            alone="torque_shaft_nm" not in signals,
+            finer=theta.size // segment.size,
+            run=_run(signals, theta.size),
+            runs_rad=segment.sensors.runs_rad,
+        ),
     )
 
 
@@ -124,12 +127,12 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
         error = zero + angle_error(nearer, model, values)
     turned = error / model.machine.pole_pairs
     ahead = np.exp(1j * error)
-    current = current * ahead
+    current, volts = current * ahead, x.supply.volts_v
     return replace(
         x,
         id_a=current.real,
         iq_a=current.imag,
-        volts_v=None if x.volts_v is None else x.volts_v * ahead,
+        supply=x.supply if volts is None else replace(x.supply, volts_v=volts * ahead),
         eps_rad=x.eps_rad - error,
         theta_rad=theta - turned,
         omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, theta.size // segment.size),
@@ -144,7 +147,7 @@ def drive_current(
     zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"] if segment.kind == "dq" else 0.0
     if zero:
         recorded = replace(recorded, i_a=recorded.i_a - zero * np.exp(-1j * recorded.eps_rad))
-    current = true_current(recorded, segment.ammeter, model, values)
+    current = true_current(recorded, segment.instrument.ammeter, model, values)
     if current.size < size:
         at = np.arange(size) * (current.size / size)
         current = np.interp(at, np.arange(current.size), current)
@@ -162,9 +165,9 @@ def table_current(
     """True current [n, A] of a table's rows, at their electrical angle and speed [n]."""
     nothing = np.zeros(current.size)
     recorded = Recorded(
-        current, nothing, eps_rad, omega_e_rad_s, segment.ts_s, False, segment.instrument
+        current, nothing, eps_rad, omega_e_rad_s, segment.ts_s, False, segment.instrument.name
     )
-    return true_current(recorded, segment.ammeter, model, values)
+    return true_current(recorded, segment.instrument.ammeter, model, values)
 
 
 def _speed(theta: Array, period: float, finer: int) -> Array:
@@ -210,7 +213,7 @@ def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> R
         omega_e_rad_s=np.gradient(eps, segment.ts_s),
         ts_s=segment.ts_s,
         inverter=True,
-        instrument=segment.instrument,
+        instrument=segment.instrument.name,
         ahead=ahead_in(segment, signals, model.machine.pole_pairs),
     )
 
@@ -221,7 +224,7 @@ def ahead_in(
     """What currents, torque and electrical angle are later in the whole log of a segment, less what
     they are now; None where nothing was thinned. The segment is on its true clock.
     """
-    log, rows = segment.log, segment.recorded.get("t_s")
+    log, rows = segment.unthinned.late, segment.recorded.get("t_s")
     if not log or rows is None:
         return None
     steps = np.diff(rows)

@@ -102,11 +102,11 @@ def recorded_voltage(
     for effect in model.effects:
         if effect.voltage is not None:
             q = values_of(effect, model.machine, values)
-            voltage = effect.voltage(voltage, x, q, segment.instrument)
+            voltage = effect.voltage(voltage, x, q, segment.instrument.name)
     zero = zero_angle(segment, values)
     if in_frame and (zero or any(effect.angle is not None for effect in model.effects)):
         voltage = voltage * np.exp(-1j * (zero + angle_error(x, model, values)))
-    return voltage * (1.0 + values[segment.meter])
+    return voltage * (1.0 + values[segment.instrument.meter])
 
 
 def central(signal: Any, period_s: float) -> Any:

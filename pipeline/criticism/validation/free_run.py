@@ -177,7 +177,7 @@ def _floor(response: _Response) -> dict[str, float]:
     allowed is added to the equations.
     """
     batch = response.batch
-    noise = batch.segment.noise
+    noise = batch.segment.sensors.noise
     policy = response.batch.model.policy.validation
     total: dict[str, list[Array]] = {name: [] for name in response.names}
     for replicate in range(
@@ -196,7 +196,7 @@ def _floor(response: _Response) -> dict[str, float]:
 
 def _drift(response: _Response) -> dict[str, Array]:
     """Moves [K, W] of the window means with an offset of each sensor, of its prior size."""
-    noise = response.batch.segment.noise
+    noise = response.batch.segment.sensors.noise
     prior = response.batch.model.policy.noise_floors.offset
     offsets = [name for name in _OFFSETS if noise.get(name, 0.0) > 0.0]
     moves = [response.to({name: prior * noise[name]}) for name in offsets]

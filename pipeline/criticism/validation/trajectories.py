@@ -189,7 +189,7 @@ def _defects(batch: Batch, signals: Mapping[str, Array]) -> tuple[Complex, Array
         return np.zeros(torque.shape, dtype=complex), torque
     voltage = batch.folded(left[0] + 1j * left[1])
     torque = -batch.folded(left[2]) if batch.shaft else np.zeros(voltage.shape)
-    if segment.timing == "held":
+    if segment.instrument.timing == "held":
         return voltage, torque
     psi = batch.folded(pieces.psi_wb)
     central = np.zeros_like(psi)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Instrument, Segment, Sensors
 from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import GAINS, STATE, Model
@@ -112,17 +112,16 @@ def log(n: int = 8000, seed: int = 5, noise: float = 0.0) -> Segment:
     starts = np.arange(40, n - 440, 200)
     weak = projection(theta, starts, 400, (1, 7, 14, 42))
     return Segment(
-        "log",
-        "drive",
-        "dq",
-        "drive",
-        "instant",
-        ts,
-        noisy,
-        sigma,
-        ("vd_v", "vq_v", "torque_shaft_nm"),
-        weak,
-        {"ambient_k": 0.0},
+        capture="log",
+        test="drive",
+        kind="dq",
+        ts_s=ts,
+        recorded=noisy,
+        channels=("vd_v", "vq_v", "torque_shaft_nm"),
+        weak=weak,
+        instrument=Instrument("drive", "instant"),
+        sensors=Sensors(sigma),
+        fixed={"ambient_k": 0.0},
     )
 
 
@@ -138,17 +137,16 @@ def coasting(n: int = 3000, seed: int = 5) -> Segment:
     noise = {"theta_mech_rad": sigma}
     channels = ("omega_mech_rad_s",)
     return Segment(
-        "coast",
-        "spin_down",
-        "shaft",
-        "bench",
-        "instant",
-        ts,
-        signals,
-        noise,
-        channels,
-        weak,
-        {"ambient_k": 0.0},
+        capture="coast",
+        test="spin_down",
+        kind="shaft",
+        ts_s=ts,
+        recorded=signals,
+        channels=channels,
+        weak=weak,
+        instrument=Instrument("bench", "instant"),
+        sensors=Sensors(noise),
+        fixed={"ambient_k": 0.0},
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.segment import Sensors
 from pipeline.criticism.discovery.unknown_structure import unknown_structure
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
@@ -24,8 +25,9 @@ def walked(seed: int, test: str, size: float = 3.0):
     segment = log(noise=1.0, seed=seed)
     rng = np.random.default_rng([seed, 7])
     n = segment.size
+    noise = segment.sensors.noise
     moved = {
-        name: column + size * segment.noise[name] * rng.standard_normal(n).cumsum() / np.sqrt(n)
+        name: column + size * noise[name] * rng.standard_normal(n).cumsum() / np.sqrt(n)
         for name, column in segment.recorded.items()
         if name.startswith(("v", "i", "torque"))
     }
@@ -69,7 +71,7 @@ def test_wander_in_captures_of_two_tests_leaves_nothing():
     assert len({one.capture for one in left}) == 2
     told = drifting_segments(system.fit, left)
     assert told is not None
-    assert told[0].lines.shape[0] == 5 * 8
+    assert told[0].disturbances.lines.shape[0] == 5 * 8
 
 
 def test_in_captures_of_one_test_it_may_be_the_machine():
@@ -119,6 +121,6 @@ def test_what_is_small_for_the_machine_stops_no_wander(large: bool, noise: bool,
 
 def test_a_sensor_that_the_segment_does_not_hold_drifts_nowhere():
     segment = walked(5, "drive")
-    more = replace(segment, noise={**segment.noise, "vdc_v": 0.1})
-    lines = (with_drift(one, Model(machine(), ()), BASE).lines for one in (segment, more))
-    assert np.array_equal(*lines)
+    more = replace(segment, sensors=Sensors({**segment.sensors.noise, "vdc_v": 0.1}))
+    drifting = (with_drift(one, Model(machine(), ()), BASE) for one in (segment, more))
+    assert np.array_equal(*(one.disturbances.lines for one in drifting))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.segment import slow_orders
-from pipeline.criticism.effect import Recorded
+from pipeline.criticism.effect import Recorded, ShaftState
 from pipeline.criticism.effects import cogging
 from pipeline.criticism.library.registry import chosen, effects
 from pipeline.criticism.machine.model import Model, base_flux, effect_flux, evaluate, values_of
@@ -215,7 +215,7 @@ def test_torque_comes_from_the_co_energy_of_the_linear_machine():
     ],
 )
 def test_a_drag_of_a_held_shaft_is_its_formula(name, values, closed):
-    x = ready(replace(operating(), held=True))
+    x = ready(replace(operating(), shaft=ShaftState(held=True)))
     assert LIBRARY[name].torque(x, values) == pytest.approx(closed(x), abs=1e-14)
 
 
@@ -228,7 +228,7 @@ def test_a_free_shaft_s_second_difference_tells_the_mean_of_its_cogging(step_rad
     theta = step_rad / order * np.arange(n)
     bend = -np.sin(order * theta) / step_rad**2  # ∬ sin over (samples)²
     told = np.diff(bend, 2)
-    x = replace(operating(n), theta_rad=theta, held=False)
+    x = replace(operating(n), theta_rad=theta)
     drag = LIBRARY["cogging"].torque(x, {f"sin_{order}_nm": 0.3})
     assert drag[1:-1] == pytest.approx(0.3 * told, abs=1e-12)
 
@@ -335,7 +335,7 @@ def test_a_resistance_beside_the_magnetising_branch_is_the_iron_s_loss_in_both_e
 def test_a_constant_load_is_a_drag_only_where_no_transducer_records_it():
     effect, x = LIBRARY["constant_load"], operating()
     assert not effect.torque(x, {"torque_nm": 0.03}).any()
-    alone = replace(x, alone=True)
+    alone = replace(x, shaft=ShaftState(alone=True))
     assert effect.torque(alone, {"torque_nm": 0.03}) == pytest.approx(np.full(60, 0.03))
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.segment import Sensors
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.policy.policy import DEFAULT
@@ -152,7 +153,7 @@ def test_an_open_circuit_spin_is_mapped_over_the_motor_s_own_angle(zero_rad):
         kind="open",
         test="open_circuit",
         recorded={"vab_v": a - b, "vbc_v": b - c, "vca_v": c - a, "theta_mech_rad": theta},
-        noise={"vab_v": 1e-3, "vbc_v": 1e-3, "vca_v": 1e-3, "theta_mech_rad": 1e-6},
+        sensors=Sensors({"vab_v": 1e-3, "vbc_v": 1e-3, "vca_v": 1e-3, "theta_mech_rad": 1e-6}),
         channels=("vd_v", "vq_v"),
         weak=projection(theta, np.arange(40, n - 440, 200), 400, ()),
     )

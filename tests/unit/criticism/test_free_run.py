@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Instrument, Segment, Sensors
 from pipeline.criticism.effect import Array
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
@@ -75,17 +75,16 @@ def drive(noise: float = 0.0, seed: int = 1, drag: Callable = lambda omega: 0.0 
     recorded |= {"travel_rad": np.full(N, np.inf), "t_s": t}
     starts = np.arange(0, N - WINDOW + 1, WINDOW // 2)
     return Segment(
-        "drive",
-        "drive",
-        "dq",
-        "drive",
-        "instant",
-        TS,
-        recorded,
-        {k: noise * s for k, s in SIGMA.items()},
-        ("vd_v", "vq_v", "torque_shaft_nm"),
-        projection(theta, starts, WINDOW, ()),
-        {"ambient_k": 0.0},
+        capture="drive",
+        test="drive",
+        kind="dq",
+        ts_s=TS,
+        recorded=recorded,
+        channels=("vd_v", "vq_v", "torque_shaft_nm"),
+        weak=projection(theta, starts, WINDOW, ()),
+        instrument=Instrument("drive", "instant"),
+        sensors=Sensors({k: noise * s for k, s in SIGMA.items()}),
+        fixed={"ambient_k": 0.0},
     )
 
 
@@ -156,17 +155,16 @@ def test_a_run_begins_at_the_measured_speed_and_goes_on_at_the_models_rate():
     t = TS * np.arange(N)
     theta = 200.0 * t - 0.5 * rate * t**2
     segment = Segment(
-        "coast",
-        "spin_down",
-        "shaft",
-        "bench",
-        "instant",
-        TS,
-        {"theta_mech_rad": theta, "t_s": t},
-        {"theta_mech_rad": 1e-9},
-        ("omega_mech_rad_s",),
-        projection(theta, np.arange(0, N - WINDOW + 1, WINDOW // 2), WINDOW, ()),
-        {"ambient_k": 0.0},
+        capture="coast",
+        test="spin_down",
+        kind="shaft",
+        ts_s=TS,
+        recorded={"theta_mech_rad": theta, "t_s": t},
+        channels=("omega_mech_rad_s",),
+        weak=projection(theta, np.arange(0, N - WINDOW + 1, WINDOW // 2), WINDOW, ()),
+        instrument=Instrument("bench", "instant"),
+        sensors=Sensors({"theta_mech_rad": 1e-9}),
+        fixed={"ambient_k": 0.0},
     )
     values = {**BASE, "b_nm_s_rad": 0.0, "coulomb_friction.torque_nm": 3.0 * drag}
     run = free_run(segment, Model(machine(), (friction,)), values)
@@ -243,7 +241,7 @@ def test_held_voltages_are_held():
         channels=("vd_v", "vq_v"),
         weak=projection(zero, np.arange(0, N - WINDOW, step), WINDOW, ()),
     )
-    held = run_of(replace(segment, timing="held"))
+    held = run_of(replace(segment, instrument=Instrument("drive", "held")))
     instant = run_of(segment)
 
     def worst(run: Run) -> float:

@@ -84,7 +84,7 @@ def test_two_ammeters_may_disagree_by_what_they_state_and_the_better_one_counts(
     )
     found = machine_of(campaign, Constants())
     rows = segments(campaign, found)
-    assert [s.ammeter for s in rows] == ["gain_current_bench", "gain_current_bench_2"]
+    assert [s.instrument.ammeter for s in rows] == ["gain_current_bench", "gain_current_bench_2"]
     system = first_fit(rough_fit(rows, Model(found, ())))
     assert system.fit.values["r_ohm"] == pytest.approx(R_OHM, rel=3e-4)
     apart = system.fit.values["gain_current_bench_2"] - system.fit.values["gain_current_bench"]

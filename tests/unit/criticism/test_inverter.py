@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.effect import Supply
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.inverter import AXES, lost_shares
 from pipeline.criticism.machine.model import Model, evaluate
@@ -24,7 +25,7 @@ def point(i_d, i_q, speed, angles=12):
     x.omega_rad_s = np.full(angles, float(speed))
     x.eps_rad = np.linspace(0.0, 2.0 * np.pi, angles, endpoint=False)
     x.id_a, x.iq_a = np.full(angles, float(i_d)), np.full(angles, float(i_q))
-    x = replace(x, base={**BASE, "ld_h": L_H, "lq_h": L_H}, pwm_s=PWM_S, vdc_v=VDC_V)
+    x = replace(x, base={**BASE, "ld_h": L_H, "lq_h": L_H}, supply=Supply(PWM_S, VDC_V))
     evaluate(Model(machine(), ()), x, x.base)
     return x
 
@@ -89,7 +90,7 @@ def lost_by(x, width=1e-4):
 def test_what_is_lost_is_what_a_period_switched_through_loses(i_d, i_q, speed):
     x = point(i_d, i_q, speed)
     told, lost = settled(x)
-    found = lost_by(replace(x, volts_v=told))
+    found = lost_by(x.fed(volts_v=told))
     assert np.abs(found.mean() - lost.mean()) < 0.1 * TEXTBOOK_V
     assert np.sqrt((np.abs(found - lost) ** 2).mean()) < 0.15 * TEXTBOOK_V
 
@@ -106,14 +107,14 @@ def test_at_little_voltage_a_resting_current_loses_what_is_told():
     """A leg without current passes through the dead time: its voltage moves, nothing else."""
     x = point(0.0, 0.0, 0.0)
     shift = 0.3 * LOSS_V * np.exp(1j * (np.pi / 6.0 - x.eps_rad))
-    lost = lost_by(replace(x, volts_v=shift), width=1e-6)
+    lost = lost_by(x.fed(volts_v=shift), width=1e-6)
     assert lost == pytest.approx(shift, abs=0.05 * LOSS_V)
 
 
 def test_without_switching_the_current_alone_decides():
     x = point(1.0, 2.0, 50.0)
     plain = np.tanh(phases(x, x.i_a) / 0.3)
-    for unknown in (replace(x, pwm_s=0.0), replace(x, vdc_v=0.0)):
+    for unknown in (x.fed(pwm_s=0.0), x.fed(vdc_v=0.0)):
         assert lost_shares(unknown, x.eps_rad, phases(x, x.i_a), 0.2, 0.3) == pytest.approx(plain)
 
 

@@ -26,9 +26,9 @@ def slow(pwm_s: float | None, timing: str = "centred") -> Segment:
     fast = log()
     fixed = dict(fast.fixed) if pwm_s is None else {**fast.fixed, "pwm_s": pwm_s}
     recorded = {name: column[::EVERY] for name, column in fast.recorded.items()}
-    return replace(
-        fast, ts_s=EVERY * fast.ts_s, recorded=recorded, fixed=fixed, timing=timing, weak=None
-    )
+    instrument = replace(fast.instrument, timing=timing)
+    slower = replace(fast, ts_s=EVERY * fast.ts_s, recorded=recorded, weak=None)
+    return replace(slower, fixed=fixed, instrument=instrument)
 
 
 def left(segment: Segment, **changed: float) -> float:

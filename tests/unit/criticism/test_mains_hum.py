@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.criticism.data.segment import Instrument, Sensors
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linearise import absorb, linearise
 from pipeline.criticism.regression.mains_hum import Hum, hum_notes, hum_of, with_hum
@@ -153,8 +154,8 @@ def test_in_a_log_thinned_to_its_windows_it_goes_on_between_them():
 
 def test_sensors_of_current_have_it_too_in_multiples_of_their_noise():
     segment = log(seed=5, noise=1.0)
-    rms = 20.0 * segment.noise["iq_a"]
-    told = Hum("dq", "vq_v", 50.0, 20.0 * segment.noise["vq_v"])
+    rms = 20.0 * segment.sensors.noise["iq_a"]
+    told = Hum("dq", "vq_v", 50.0, 20.0 * segment.sensors.noise["vq_v"])
     humming = with_line(segment, "iq_a", rms, 50.0, 0.7)
     assert missed(humming, []) > 5.0
     assert missed(humming, [told]) < 1.5
@@ -174,10 +175,10 @@ def spin(seed, rms=0.0, freq=50.0, zero_rad=0.3, n=40_000, rad_s=43.7):
         log(n),
         capture=f"spin_{seed}.mcap",
         kind="open",
-        instrument="bench",
+        instrument=Instrument("bench", "instant"),
         test="open_circuit",
         recorded={**lines, "theta_mech_rad": theta},
-        noise={**dict.fromkeys(lines, 5e-3), "theta_mech_rad": 1e-6},
+        sensors=Sensors({**dict.fromkeys(lines, 5e-3), "theta_mech_rad": 1e-6}),
         channels=("vd_v", "vq_v"),
         weak=projection(theta, np.arange(40, n - 440, 200), 400, ()),
     )

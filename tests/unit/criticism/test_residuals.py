@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import projected, row_index, slow_orders
+from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
+from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.equations.free_shaft import _FINEST
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, mean_current, zero
@@ -206,8 +207,11 @@ def test_a_line_of_the_encoder_s_error_is_a_torque_by_the_square_of_its_pace(ome
     running = log()
     weak = projection(theta, running.weak.starts, running.weak.length, (14, 28, 42))
     running = replace(running, recorded={**running.recorded, "theta_mech_rad": theta}, weak=weak)
+    noise = running.sensors.noise
     exact, coarse = (
-        reading_error(replace(running, noise={**running.noise, "theta_mech_rad": u}), PLAIN, BASE)
+        reading_error(
+            replace(running, sensors=Sensors({**noise, "theta_mech_rad": u})), PLAIN, BASE
+        )
         for u in (0.0, step / np.sqrt(12.0))
     )
     torque = running.channels.index("torque_shaft_nm")
@@ -251,10 +255,10 @@ def test_a_wave_that_turns_many_times_a_sample_averages_out_of_a_coasting_shaft(
     turned = np.linspace(0.0, 60 * 2000.0 * 5e-3 / 32, 60)
     x = replace(operating(), theta_rad=turned, inverter=False)
     for finer, most in ((32, 0.08), (1, 1.0)):
-        cosine, sine = replace(x, finer=finer, kept={}).shaft_waves(84)
+        cosine, sine = replace(x, shaft=ShaftState(finer=finer), kept={}).shaft_waves(84)
         assert np.hypot(cosine, sine).max() <= most + 1e-12
     assert np.hypot(cosine, sine).min() == pytest.approx(1.0)
-    slow = replace(x, theta_rad=turned / 3e3, finer=32, kept={})
+    slow = replace(x, theta_rad=turned / 3e3, shaft=ShaftState(finer=32), kept={})
     assert np.hypot(*slow.shaft_waves(84)).min() > 0.999
 
 
@@ -266,7 +270,7 @@ def test_a_coasting_sample_is_averaged_over_parts_enough(turn_rad):
     segment = replace(coasting(), recorded={"theta_mech_rad": theta})
     finer = finer_of(segment, machine(), _FINEST)
     turned = np.arange(40 * finer) * turn_rad / order / finer
-    x = replace(operating(), theta_rad=turned, inverter=False, finer=finer)
+    x = replace(operating(), theta_rad=turned, inverter=False, shaft=ShaftState(finer=finer))
     mean = _averaged(x.shaft_waves(order)[0], finer)
     true = np.sinc(turn_rad / (2 * np.pi)) ** 2 * np.cos(order * theta)
     assert mean[2:-2] == pytest.approx(true[2:-2], abs=0.004)

@@ -83,7 +83,7 @@ def test_an_angle_that_turns_by_whole_steps_a_sample_is_as_coarse_as_the_drive_s
         campaign = Campaign("m", (drive, other))
         found = segments(campaign, machine_of(campaign, Constants()))
         log = next(s for s in found if s.test == "heat_run")
-        assert log.angle_step_rad == pytest.approx(told, rel=1e-6, abs=0.1 * step)
+        assert log.sensors.angle_step_rad == pytest.approx(told, rel=1e-6, abs=0.1 * step)
 
 
 def test_logs_that_disagree_on_the_encoder_tell_of_none():
@@ -172,4 +172,4 @@ def test_rounding_is_that_of_the_columns_a_segment_holds():
         channels=("torque_shaft_nm",),
         weak=None,
     )
-    assert made.steps == {"theta_mech_rad": 1e-3}
+    assert made.sensors.steps == {"theta_mech_rad": 1e-3}

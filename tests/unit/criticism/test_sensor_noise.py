@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.segment import row_index
+from pipeline.criticism.data.segment import Sensors, row_index
 from pipeline.criticism.data.sensor_noise import (
     coarse_step,
     is_rounded,
@@ -81,10 +81,11 @@ def test_the_floor_holds_what_coarse_rounding_really_does():
         told = replace(
             segment,
             recorded={**segment.recorded, "vd_v": coarse},
-            noise={**segment.noise, "vd_v": step / np.sqrt(12.0)},
-            steps={"vd_v": step},
+            sensors=Sensors(
+                {**segment.sensors.noise, "vd_v": step / np.sqrt(12.0)}, {"vd_v": step}
+            ),
         )
-        white = replace(told, steps={})
+        white = replace(told, sensors=replace(told.sensors, steps={}))
         errors.append(float(np.sqrt((error**2).mean())))
         told_floors.append([float(noise_floor(s, model, BASE, 1)[0]) for s in (told, white)])
     rounding, by_white = np.array(told_floors).T
@@ -95,8 +96,8 @@ def test_the_floor_holds_what_coarse_rounding_really_does():
 
 def test_noise_of_a_current_counts_by_the_constants_that_it_goes_through():
     """Halved R and L halve what a current's noise does to a voltage: that is no better fit."""
-    noise = {**log().noise, "vd_v": 1e-6, "vq_v": 1e-6, "id_a": 0.2, "iq_a": 0.2}
-    segments = (replace(log(), noise=noise), coasting())
+    noise = {**log().sensors.noise, "vd_v": 1e-6, "vq_v": 1e-6, "id_a": 0.2, "iq_a": 0.2}
+    segments = (replace(log(), sensors=Sensors(noise)), coasting())
     model = Model(machine(), ())
     halved = {**BASE, **{name: 0.5 * BASE[name] for name in ("r_ohm", "ld_h", "lq_h")}}
     fit = Fit(segments, model, halved, floors(segments, model, BASE), BASE)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.traces import PAD, even_angle, reversals, travel
+from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine import two_masses
 from tests.unit.criticism.machines import BASE, operating
@@ -29,8 +30,7 @@ def shaft(theta: np.ndarray):
         eps_rad=7 * theta,
         omega_rad_s=np.gradient(theta, TS),
         travel_rad=since,
-        run=run.astype(np.int64),
-        runs_rad=runs,
+        shaft=ShaftState(run=run.astype(np.int64), runs_rad=runs),
         ts_s=TS,
     )
 
@@ -41,7 +41,7 @@ def test_dahls_friction_in_loops_within_loops():
     theta = 0.02 * np.sin(20 * t) + 0.004 * np.sin(131 * t) + 0.001 * np.sin(640 * t)
     q = {"torque_nm": 0.01, "travel_rad": 0.004}
     x = shaft(theta)
-    assert x.runs_rad.size > 25
+    assert x.shaft.runs_rad.size > 25
     z, found = 1.0, []
     for step in np.diff(theta):
         for _ in range(10):

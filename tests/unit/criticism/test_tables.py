@@ -54,7 +54,7 @@ def test_cells_of_a_held_rotor_keep_the_sense_of_arrival_and_their_own_noise():
     mean = segment.recorded["iq_a"][forward].mean()
     assert mean == pytest.approx(0.05, abs=0.002)
     # six holds a cell
-    assert segment.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(6000 / 1024), rel=0.2)
+    assert segment.sensors.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(6000 / 1024), rel=0.2)
     assert set(segment.blocks.tolist()) == set(range(24))
 
 
@@ -68,7 +68,7 @@ def test_cells_of_a_row_or_two_have_the_noise_of_their_neighbours(every):
     current = np.concatenate([resting[0], current, resting[1]])
     segment = cut("standing", capture("holding_current", theta_mech_rad=theta, iq_a=current))
     a_cell = max(6000 / every / 1024, 1.0)
-    assert segment.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(a_cell), rel=0.35)
+    assert segment.sensors.noise["iq_a"] == pytest.approx(0.01 / np.sqrt(a_cell), rel=0.35)
 
 
 def test_orders_that_repeat_are_found_and_noise_adds_none():
@@ -124,7 +124,7 @@ def test_one_level_with_noise_is_one_level(set_a):
     assert set_levels(current).max() == 0
     volts = 0.05 * speed + random.normal(0.0, 1e-3, 30)
     table = capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts)
-    assert cut("steady", table).offsets.shape == (1, 30)
+    assert cut("steady", table).disturbances.offsets.shape == (1, 30)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3, 0.1])
@@ -145,8 +145,8 @@ def test_a_meter_is_known_no_better_than_its_last_digit(last_digit):
     rab = np.full(angle.size, 0.62)
     table = capture("lcr", theta_elec_deg=angle, lab_h=lab, rab_ohm=rab)
     (segment,) = segments(Campaign("m", (table,)), MACHINE)
-    assert segment.noise["rab_ohm"] == pytest.approx(0.62e-4)
-    assert segment.noise["lab_h"] > 0.99 * max(last_digit / np.sqrt(12.0), 7.1e-8)
+    assert segment.sensors.noise["rab_ohm"] == pytest.approx(0.62e-4)
+    assert segment.sensors.noise["lab_h"] > 0.99 * max(last_digit / np.sqrt(12.0), 7.1e-8)
 
 
 def test_a_sweep_of_one_axis_has_noise_on_the_other():
@@ -154,10 +154,10 @@ def test_a_sweep_of_one_axis_has_noise_on_the_other():
     sweep, still = np.linspace(-10.0, 10.0, 21), np.zeros(21)
     columns = {"id_a": sweep, "iq_a": still, "psi_d_wb": 0.02 + 3e-4 * sweep, "psi_q_wb": still}
     told = cut("flux_map", capture("flux_map", **columns))
-    assert told.noise["id_a"] == pytest.approx(0.02)
-    assert told.noise["psi_d_wb"] == pytest.approx(6e-6)
-    assert told.noise["iq_a"] == pytest.approx(0.1 * told.noise["id_a"])
-    assert told.noise["psi_q_wb"] == pytest.approx(0.1 * told.noise["psi_d_wb"])
+    assert told.sensors.noise["id_a"] == pytest.approx(0.02)
+    assert told.sensors.noise["psi_d_wb"] == pytest.approx(6e-6)
+    assert told.sensors.noise["iq_a"] == pytest.approx(0.1 * told.sensors.noise["id_a"])
+    assert told.sensors.noise["psi_q_wb"] == pytest.approx(0.1 * told.sensors.noise["psi_d_wb"])
     standing_still = {**columns, "psi_d_wb": np.full(21, 0.02)}
     assert cut("flux_map", capture("flux_map", **standing_still)) is None
 
@@ -168,7 +168,7 @@ def test_steady_voltages_have_an_offset_a_level_and_are_held_out_by_level():
     volts = 0.1 * (current == 0.0) + 5 * speed * (0.01 + 1e-4 * current)
     segment = cut("steady", capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts))
     assert segment.kind == "steady"
-    assert segment.offsets.shape == (4, 24)
+    assert segment.disturbances.offsets.shape == (4, 24)
     assert segment.blocks.tolist() == levels_of(current).tolist()
 
 

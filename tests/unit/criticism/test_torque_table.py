@@ -61,8 +61,8 @@ def test_its_noise_is_the_scatter_about_a_curve_of_each_angle():
         ),
     )
     (segment,) = segments(noisy, machine_of(noisy, Constants()))
-    assert segment.noise["torque_shaft_nm"] == pytest.approx(2e-3, rel=0.25)
-    assert segment.angle_step_rad == 0.0
+    assert segment.sensors.noise["torque_shaft_nm"] == pytest.approx(2e-3, rel=0.25)
+    assert segment.sensors.angle_step_rad == 0.0
 
 
 def test_state_and_transducer_are_in_the_prediction():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.criticism.data.machine_scale import base_scales
-from pipeline.criticism.data.segment import Segment
+from pipeline.criticism.data.segment import Instrument, Segment, Sensors, Unthinned
 from pipeline.criticism.effect import Discrimination, Operating, Parameter, Values
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, evaluate, zero
@@ -49,17 +49,16 @@ def spin(bench_angle_rad: float, share: float) -> Segment:
     fixed = {"ambient_k": 0.0}
     channels = ("vd_v", "vq_v")
     return Segment(
-        "spin",
-        "open_circuit",
-        "open",
-        "bench",
-        "instant",
-        TS,
-        signals,
-        noise,
-        channels,
-        weak,
-        fixed,
+        capture="spin",
+        test="open_circuit",
+        kind="open",
+        ts_s=TS,
+        recorded=signals,
+        channels=channels,
+        weak=weak,
+        instrument=Instrument("bench", "instant"),
+        sensors=Sensors(noise),
+        fixed=fixed,
     )
 
 
@@ -122,17 +121,16 @@ def test_a_finer_clock_keeps_reversals_in_their_place():
         "run": run,
         "travel_rad": np.where(run > 0, 12.0 * (at - 0.2), np.inf),
     }
-    coast = replace(
-        log(), kind="motion", ts_s=1e-3, recorded=signals, runs_rad=np.array([-2.4, 2.4])
-    )
+    sensors = Sensors({}, runs_rad=np.array([-2.4, 2.4]))
+    coast = replace(log(), kind="motion", ts_s=1e-3, recorded=signals, sensors=sensors)
     x = operate(coast, signals, Model(machine(), ()), BASE)
-    assert x.finer > 1 and x.run is not None
-    assert np.array_equal(x.run[:: x.finer], run)
-    late = x.theta_rad.size // 2 + 5 * x.finer
+    assert x.shaft.finer > 1 and x.shaft.run is not None
+    assert np.array_equal(x.shaft.run[:: x.shaft.finer], run)
+    late = x.theta_rad.size // 2 + 5 * x.shaft.finer
     assert x.travel_rad[late:] == pytest.approx(
         x.theta_rad[late:] - x.theta_rad[x.theta_rad.size // 2], abs=1e-9
     )
-    assert np.isinf(x.travel_rad[: late - 6 * x.finer]).all()
+    assert np.isinf(x.travel_rad[: late - 6 * x.shaft.finer]).all()
 
 
 def test_a_drop_may_ask_for_the_flux_whatever_the_ripple():
@@ -175,7 +173,9 @@ def test_a_closer_look_sees_the_torque_without_the_transducer_s_offset():
     whole = {**drive.recorded, "good": np.ones(drive.size)}
     model = Model(machine(), (offset, coupled))
     values = {**BASE, "torque_offset.offset_nm": 0.2, **zero(coupled, model)}
-    discriminate(Fit((replace(drive, whole=whole),), model, values, (), BASE), coupled)
+    discriminate(
+        Fit((replace(drive, unthinned=Unthinned(whole)),), model, values, (), BASE), coupled
+    )
     assert seen[0] == pytest.approx(drive.recorded["torque_shaft_nm"] - 0.2)
 
 

@@ -47,7 +47,7 @@ def load_error(damping_s: float) -> float:
     """Rms error [N·m] of the load that a soft coupling foresees, as means over a millisecond."""
     angle, _ = shaft(0.0, SOFTNESS)
     t = TS * np.arange(angle.size)
-    x = replace(operating(t.size), theta_rad=angle, torque_em_nm=driving(t), held=False)
+    x = replace(operating(t.size), theta_rad=angle, torque_em_nm=driving(t))
     torque = x.machine.scales["torque_nm"]
     values = {"share": SHARE, "twist_rad": SOFTNESS * torque, "between": 0.0}
     drag = effects()["compliance"].torque(x, values | {"damping_s": damping_s})
