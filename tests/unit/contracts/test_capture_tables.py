@@ -1,0 +1,83 @@
+"""Tables of a capture: slow streams, columns without values, faults, clocks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from pipeline.contracts.schemas import check_columns, check_tables
+from pipeline.contracts.validate import _slow_columns, _streams_apart, _without_blanks
+from pipeline.records.errors import CaptureError
+from tests.unit.contracts.signals import OPTIONS
+from tests.unit.contracts.test_gate_limits import GATES, capture
+
+
+def test_slow_streams_have_a_table_of_their_own() -> None:
+    """Half of the rows is dense; a value in every row of a part is no slow stream."""
+    size = 400
+    t_s = np.arange(size) * 1e-3
+    every = np.where(np.arange(size) % 3 == 0, 1.0 * t_s, np.nan)
+    early = np.where(np.arange(size) < 100, t_s, np.nan)
+    table = pl.DataFrame({"t_s": t_s, "iq_a": t_s, "temp_case_degc": every, "id_a": early})
+    assert _slow_columns(table, 0.5) == ["temp_case_degc"]
+    assert _slow_columns(table, 0.3) == []
+    assert _slow_columns(table.drop("iq_a"), 0.5) == []
+    made = replace(capture("drive", iq_a=t_s), tables=(table,))
+    parted = _streams_apart(made, 0.5)
+    assert [t.columns for t in parted.tables] == [
+        ["t_s", "iq_a", "id_a"],
+        ["t_s", "temp_case_degc"],
+    ]
+    assert parted.tables[1].height == 134
+    assert parted.tables[1]["t_s"][1] == pytest.approx(3e-3)
+    assert _streams_apart(made, 0.3) is made
+
+
+def test_columns_without_a_value_are_not_there() -> None:
+    made = capture("drive", iq_a=np.ones(9), id_a=np.full(9, np.nan))
+    kept, findings = _without_blanks(made)
+    assert [f.code for f in findings] == ["empty_column"]
+    assert kept.tables[0].columns == ["iq_a", "t_s"]
+    assert _without_blanks(capture("drive", iq_a=np.ones(9)))[1] == []
+    clock = replace(made, tables=(*made.tables, pl.DataFrame({"t_s": [0.0], "id_a": [np.nan]})))
+    assert len(_without_blanks(clock)[0].tables) == 1
+
+
+def test_a_fault_names_its_rows_and_a_few_values() -> None:
+    values = np.ones(20)
+    values[[3, 9, 11, 15]] = np.inf
+    with pytest.raises(CaptureError) as found:
+        check_tables(capture("drive", iq_a=values))
+    assert found.value.code == "infinite_value"
+    assert found.value.rows == (3, 15)
+    assert "in 4 of 20 rows (inf, inf, inf" in str(found.value)
+    t_s = np.array([0.0, 1.0, 1.0, 2.0, 1.5])
+    with pytest.raises(CaptureError) as found:
+        check_tables(capture("drive", t_s=t_s, iq_a=np.ones(5)))
+    assert (found.value.code, found.value.rows) == ("time_not_increasing", (2, 4))
+
+
+def test_every_table_with_rows_has_a_clock() -> None:
+    made = capture("drive", iq_a=np.ones(9), vq_v=1.0, theta_mech_rad=np.arange(9.0))
+    other = pl.DataFrame({"temp_case_degc": [1.0]})
+    check_columns(replace(made, tables=(*made.tables, other.clear())))
+    with pytest.raises(CaptureError, match="has no t_s"):
+        check_columns(replace(made, tables=(*made.tables, other)))
+    with pytest.raises(CaptureError, match="no sample"):
+        check_columns(replace(made, tables=(made.tables[0].clear(),)))
+
+
+def test_a_channel_with_values_in_half_of_the_rows_is_no_slow_one() -> None:
+    """Exactly half counts as dense: its blanks are set aside; one row less is a slow stream."""
+    for there, masks in ((200, 1), (199, 0)):
+        current = np.where(np.arange(400) < there, 1.0, np.nan)
+        made = capture("drive", iq_a=current, vq_v=1.0, theta_mech_rad=np.arange(400.0))
+        try:
+            passed = GATES["missing_values"].check(made, OPTIONS["missing_values"])
+        except CaptureError:
+            assert masks == 0
+            continue
+        assert len(passed.masks) == masks

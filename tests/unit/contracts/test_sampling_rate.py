@@ -1,0 +1,30 @@
+"""Every number of the gate of the sampling rate from both sides, a few per cent away."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.unit.contracts.signals import VOLTS, turned
+from tests.unit.contracts.test_gate_limits import TURN, capture, said
+
+
+@pytest.mark.parametrize(("per", "expected"), [(2.45, "refused"), (2.55, "warned"),
+                                               (4.9, "warned"), (5.1, "")])  # fmt: skip
+def test_samples_an_electrical_period_of_a_spin(per: float, expected: str) -> None:
+    """By the voltages themselves where there is an angle, else by the stated pole pairs."""
+    phase = np.arange(2000) * TURN / per
+    made = capture("open_circuit", theta_mech_rad=phase / 5.0, **turned(VOLTS, phase))
+    assert said("sampling_rate", made) == expected
+    speed = np.full(400, TURN / (5.0 * per * 1e-4))
+    stated = capture("open_circuit", omega_mech_rad_s=speed, vab_v=np.zeros(400),
+                     meta={"pole_pairs": 5})  # fmt: skip
+    assert said("sampling_rate", stated) == expected
+
+
+def test_a_line_without_a_value_leaves_the_step_to_the_others() -> None:
+    t = np.arange(-200, 2000)
+    current = np.where(t > 0, -np.expm1(-t / 5.0), 0.0)
+    blank = np.full(t.size, np.nan)
+    made = capture("current_step", ia_a=blank, ib_a=10.0 * current)
+    assert said("sampling_rate", made) == "warned"
