@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 from collections import Counter
@@ -12,13 +13,16 @@ from pathlib import Path
 
 from tests.mutants.operators import Mutant
 from tests.mutants.packages import PACKAGES
-from tests.mutants.run import Outcome, judged, run
+from tests.mutants.run import TESTS_S, Outcome, judged, run
 from tests.mutants.scratch import Scratch
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "mutants.md"
 CACHE = ROOT / "reports" / "mutants"
 WANTED = 0.85
+SURVIVORS = "## Survivors"
+ROW = re.compile(r"\| (\w+) \| (\d+) \| .*\|$")
+Rows = dict[tuple[str, int], list[str]]
 ABOUT = """# Do the tests see a wrong line?
 
 `make mutants` changes one point of the code (a constant by 15 % or by one, an operator, a boundary
@@ -37,7 +41,7 @@ worth the next seed shows, which they have not seen.
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs what was asked for and rebuilds the page from all results kept."""
+    """Runs what was asked for; the page keeps the rows of what this checkout has not measured."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants.table", description=__doc__)
     parser.add_argument("--seed", type=int, action="append", help="may be repeated; default 1, 2")
     parser.add_argument("--per-package", type=int, default=40)
@@ -49,9 +53,13 @@ def main(arguments: list[str] | None = None) -> int:
     if not chosen.page:
         with tempfile.TemporaryDirectory(prefix="mutants-") as place:
             _measure(chosen, Path(place))
-    results = {path: _kept(path) for path in sorted(CACHE.glob("result-*.json"))}
-    page = _page({path.stem: outcomes for path, outcomes in results.items()}, chosen.per_package)
-    PAGE.write_text(page, encoding="utf-8")
+    results = {}
+    for path in sorted(CACHE.glob("result-*.json")):
+        name, seed = path.stem.removeprefix("result-").rsplit("-", 1)
+        if outcomes := _kept(path):
+            results[name, int(seed)] = outcomes
+    before = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+    PAGE.write_text(_page(results, chosen.per_package, before), encoding="utf-8")
     return 0
 
 
@@ -100,28 +108,40 @@ def _row(name: str, seed: int, outcomes: list[Outcome]) -> str:
     return f"| {' | '.join(map(str, cells))} | {100 * rate:.0f} %{mark} |"
 
 
-def _page(results: dict[str, list[Outcome]], count: int) -> str:
-    from tests.mutants.run import TESTS_S
-
+def _page(results: dict[tuple[str, int], list[Outcome]], count: int, before: str) -> str:
+    """The page of these results, with the rows of `before` that they do not measure again."""
+    rates, survivors = _rows(before)
+    for (name, seed), outcomes in results.items():
+        rates[name, seed] = [_row(name, seed, outcomes)]
+        alive = [o for o in outcomes if o.verdict == "survived"]
+        survivors[name, seed] = [_survivor(name, seed, outcome) for outcome in alive]
+    order = {name: place for place, name in enumerate(PACKAGES)}
+    keys = sorted((k for k in rates if k[0] in order), key=lambda k: (order[k[0]], k[1]))
     lines = [ABOUT.format(count=count, limit=TESTS_S)]
     lines.append("| package | seed | drawn | killed | equivalent | survived | rate |\n")
     lines.append("| --- | --: | --: | --: | --: | --: | --: |\n")
-    survivors = []
-    for name in PACKAGES:
-        for stem, outcomes in results.items():
-            package, seed = stem.removeprefix("result-").rsplit("-", 1)
-            if package != name or not outcomes:
-                continue
-            lines.append(_row(name, int(seed), outcomes) + "\n")
-            survivors += [(name, seed, o) for o in outcomes if o.verdict == "survived"]
-    lines.append("\n## Survivors\n\n| package | seed | where | change | why |\n")
+    lines += [f"{line}\n" for key in keys for line in rates[key]]
+    lines.append(f"\n{SURVIVORS}\n\n| package | seed | where | change | why |\n")
     lines.append("| --- | --: | --- | --- | --- |\n")
-    for name, seed, outcome in survivors:
-        mutant = outcome.mutant
-        where = f"`{mutant.path.removeprefix('pipeline/')}` `{mutant.function}`"
-        change = f"`{_cell(mutant.before)}` to `{_cell(mutant.after)}`"
-        lines.append(f"| {name} | {seed} | {where} | {change} | {outcome.why} |\n")
+    lines += [f"{line}\n" for key in keys for line in survivors.get(key, [])]
     return "".join(lines)
+
+
+def _rows(page: str) -> tuple[Rows, Rows]:
+    """The rows of both tables of a page, by package and seed."""
+    tables: tuple[Rows, Rows] = ({}, {})
+    for rows, text in zip(tables, page.split(SURVIVORS), strict=False):
+        for line in text.splitlines():
+            if match := ROW.match(line):
+                rows.setdefault((match[1], int(match[2])), []).append(line)
+    return tables
+
+
+def _survivor(name: str, seed: int, outcome: Outcome) -> str:
+    mutant = outcome.mutant
+    where = f"`{mutant.path.removeprefix('pipeline/')}` `{mutant.function}`"
+    change = f"`{_cell(mutant.before)}` to `{_cell(mutant.after)}`"
+    return f"| {name} | {seed} | {where} | {change} | {outcome.why} |"
 
 
 def _cell(text: str) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from tests.mutants import coverage, run
+from tests.mutants import coverage, run, table
 from tests.mutants.operators import Mutant, draw, find
 from tests.mutants.packages import PACKAGES, Package
 from tests.mutants.scratch import Scratch
@@ -130,6 +132,41 @@ def test_judgements_have_a_verdict_and_a_reason() -> None:
         assert len(key) == 12
         assert judgement["verdict"] in {"equivalent", "survived"}
         assert len(judgement["why"]) > 5
+
+
+def test_a_page_keeps_the_rows_of_what_is_not_measured_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row goes with its package and seed: only a new result of both takes its place."""
+    monkeypatch.setattr(table, "PAGE", tmp_path / "page.md")
+    monkeypatch.setattr(table, "CACHE", tmp_path)
+    (alive, *_, dead) = (
+        asdict(m) for m in find("def f(a, b):\n    return a < b or a | b\n", "f.py")
+    )
+
+    def call(name: str, verdicts: tuple[str, str]) -> str:
+        """The page after a checkout that holds this result alone."""
+        kept = zip((alive, dead), verdicts, strict=True)
+        text = json.dumps([{"mutant": m, "verdict": v, "why": "seen"} for m, v in kept])
+        (tmp_path / f"result-{name}.json").write_text(text)
+        table.main(["--page"])
+        (tmp_path / f"result-{name}.json").unlink()
+        return (tmp_path / "page.md").read_text()
+
+    call("lots-3", ("survived", "killed"))
+    call("fit-4", ("survived", "survived"))
+    assert call("fit-5", ("killed", "killed")) == call("fit-5", ("killed", "killed"))
+    page = call("fit-4", ("killed", "survived"))
+    rates, survivors = page.split("## Survivors")
+    assert [line for line in rates.splitlines() if line[2:5] in ("fit", "lot")] == [
+        "| fit | 4 | 2 | 1 | 0 | 1 | 50 % (short) |",
+        "| fit | 5 | 2 | 2 | 0 | 0 | 100 % |",
+        "| lots | 3 | 2 | 1 | 0 | 1 | 50 % (short) |",
+    ]
+    assert [line for line in survivors.splitlines() if line[2:5] in ("fit", "lot")] == [
+        "| fit | 4 | `f.py` `f` | `a \\| b` to `a & b` | seen |",
+        "| lots | 3 | `f.py` `f` | `a < b or a \\| b` to `a < b and a \\| b` | seen |",
+    ]
 
 
 @pytest.fixture(scope="module")
