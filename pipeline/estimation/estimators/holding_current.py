@@ -12,6 +12,11 @@ from pipeline.estimation.mechanical.torque_constant import USES, torque_constant
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.uncertainty.instruments import (
+    current_source,
+    instrument_uncertainties,
+    unstated_note,
+)
 from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import linear_fit
@@ -34,7 +39,7 @@ from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
-from pipeline.records.uncertainty import propagate
+from pipeline.records.uncertainty import Contribution, propagate
 
 Array = NDArray[np.float64]
 
@@ -86,9 +91,19 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     else:
         before = float(np.std(np.concatenate([turn.value for turn in turns])))
         note = f"{before:.3g} A before any order is taken off; half of the turn's sectors held out"
-        scatter = METHOD.scatter(RESIDUAL.name, _u_rms(left))
-        residual = METHOD.measured(RESIDUAL.name, rms_a, [scatter], captures, notes=note)
+        parts = [METHOD.scatter(RESIDUAL.name, _u_rms(left)), *_gains(captures, rms_a)]
+        notes = (note, unstated_note(captures, ("current",)))
+        residual = METHOD.measured(RESIDUAL.name, rms_a, parts, captures, notes=notes)
     return Fit((*estimates, residual), _evidence(turns, spec, lines))
+
+
+def _gains(captures: Sequence[Capture], amps: float) -> tuple[Contribution, ...]:
+    """What the gains of the current readings make of a current [A]: each its captures' share."""
+    sources = [current_source(capture.meta) for capture in captures]
+    return tuple(
+        Contribution(source, amps * u * sources.count(source) / len(sources), "B")
+        for source, u in instrument_uncertainties(captures, ("current",)).items()
+    )
 
 
 def _u_rms(residual: Array) -> float:
@@ -164,11 +179,11 @@ def _cogging(
         return (order, *(METHOD.missing(n, why) for n in TORQUES))
     peak, u_peak = half_peak_to_peak(lines)
     sizes = {TORQUES[0]: (lines[0].amplitude, lines[0].u), TORQUES[1]: (peak, u_peak)}
-    torques = []
+    torques, notes = [], (note, unstated_note(captures, ("current",)))
     for name, (amps, u) in sizes.items():
-        scatter = METHOD.scatter(name, u, lines[0].dof)
-        parts = propagate([(amps, kt.budget), (kt.number, (scatter,))])
-        torques.append(METHOD.measured(name, amps * kt.number, parts, captures, notes=note))
+        read = (METHOD.scatter(name, u, lines[0].dof), *_gains(captures, amps))
+        parts = propagate([(amps, kt.budget), (kt.number, read)])
+        torques.append(METHOD.measured(name, amps * kt.number, parts, captures, notes=notes))
     return (order, *torques)
 
 
