@@ -139,6 +139,12 @@ def factor_of(unit: str) -> float:
     return float(VOLTS**volts * AMPS**amps)
 
 
+def of_condition(name: str) -> float:
+    """The factor of a condition, whose unit ends its name."""
+    units = {"a": "A", "v": "V", "h": "H", "nm": "N·m", "ohm": "ohm"}
+    return factor_of(units.get(name.rsplit("_", 1)[-1], "1"))
+
+
 @pytest.mark.parametrize("name", PLANS)
 def test_no_result_depends_on_the_size_of_the_machine(name: str) -> None:
     """Volts times four, amperes times two: every number goes with its dimension, and so does its u.
@@ -163,6 +169,8 @@ def test_no_result_depends_on_the_size_of_the_machine(name: str) -> None:
         assert by_source(other) == pytest.approx(expected, rel=1e-4, abs=size), one.name
         assert other.dof == pytest.approx(one.dof, rel=1e-4), one.name
         assert other.captures == one.captures
+        held = {k: v * of_condition(k) for k, v in one.at.items()}
+        assert other.at == pytest.approx(held, rel=1e-4)
     for one, other in zip(plain.evidence, larger.evidence, strict=True):
         terms = COLUMNS | CONSTANTS
         x, y = (
@@ -198,6 +206,32 @@ def test_a_budget_says_what_a_gain_does(name: str) -> None:
             # second order of U, and what a choice of rows may move within the scatter
             room = 0.03 * abs(said) + 3.0 * U * U * abs(one.number)
             assert shift == pytest.approx(said, abs=room), (one.name, gain)
+
+
+WARM = ("resistance", "open_circuit", "torque_map", "heat_run", "inertia", "hand_turn")
+
+
+@pytest.mark.parametrize("name", WARM)
+def test_a_budget_says_what_a_thermometer_does(name: str) -> None:
+    """All temperatures higher by a standard uncertainty of 0.2 K."""
+    offset, made = 0.2, campaign(name)
+    made = Campaign(
+        made.motor_id,
+        tuple(replace(c, meta=replace(c.meta, u_temp_degc=offset)) for c in made.captures),
+    )
+
+    def warmer(table: pl.DataFrame) -> pl.DataFrame:
+        return table.with_columns(pl.col("^temp_.*_degc$") + offset)
+
+    hot = Campaign(
+        made.motor_id,
+        tuple(replace(c, tables=tuple(warmer(t) for t in c.tables)) for c in made.captures),
+    )
+    for one, other in zip(fitted(name, made).estimates, fitted(name, hot).estimates, strict=True):
+        if one.known:
+            said = sum(u for s, u in by_source(one).items() if s.startswith("temperature"))
+            room = 0.05 * abs(said) + 1e-5 * abs(one.number)
+            assert other.number - one.number == pytest.approx(said, abs=room), one.name
 
 
 @pytest.mark.parametrize("name", PLANS)
