@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of
 from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out
 from pipeline.criticism.regression.identifiability import (
@@ -48,7 +49,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
     An error marked `held_out` is of a capture predicted from all the others; `fit` marks a
     capture that alone carries a constant.
     """
-    machine = machine_of(campaign, start)
+    machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:
         return _nothing(campaign, model, model.effects, PAIRLESS)
     found = segments(campaign, machine)

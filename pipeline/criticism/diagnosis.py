@@ -76,7 +76,7 @@ def diagnose(campaign: Campaign, model: ModelSpec, start: Constants) -> Diagnosi
 
 def base_fit(campaign: Campaign, model: ModelSpec, start: Constants) -> BaseFit | str:
     """The model fitted to a motor's captures, or why it cannot be."""
-    machine = machine_of(campaign, start)
+    machine = machine_of(campaign, start, policy_of(model.policy))
     if machine is None:
         return PAIRLESS
     found = segments(campaign, machine)

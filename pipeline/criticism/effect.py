@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.criticism.policy.policy import DEFAULT, Policy
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -82,7 +84,8 @@ class Machine:
     `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none;
     `travel_turns` how far the shaft goes in any one capture: a wave of the angle shows where it is
     gone through once at least. `stated`: what somebody states of the motor's constants, value and
-    standard uncertainty by the name of the parameter, in its unit.
+    standard uncertainty by the name of the parameter, in its unit. `policy`: the constants of
+    judgement by which its captures are cut, and models of it fitted and judged.
     """
 
     pole_pairs: int
@@ -94,6 +97,7 @@ class Machine:
     load_orders: tuple[float, ...] = ()
     travel_turns: float = math.inf
     stated: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    policy: Policy = DEFAULT
 
     @property
     def cogging_order(self) -> int | None:

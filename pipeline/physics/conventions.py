@@ -25,6 +25,10 @@ COPPER_ZERO_K = 234.5
 COPPER_COEFFICIENT_25_1_K = 1.0 / (COPPER_ZERO_K + 25.0)
 POLE_PAIRS_TOLERANCE = 0.02
 SALIENT_FROM = 1.1
+UNLOGGED_U_K = 20.0
+"""Standard uncertainty of a temperature that nobody logged [K], of estimates and of models."""
+UNLOGGED_D_SHARE = 0.02
+"""Reluctance torque of a d current that nobody logged, over the magnet's torque [1]."""
 
 CouplingName = Literal[
     "ke_phase_peak_v_s_rad",

@@ -12,7 +12,16 @@ from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.policy import entries
 
 CRITICISM = Path(__file__).resolve().parents[2] / "pipeline" / "criticism"
-IN_POLICY = ("selection", "regression", "discovery", "validation", "design")
+IN_POLICY = (
+    "selection",
+    "regression",
+    "discovery",
+    "validation",
+    "design",
+    "equations",
+    "signals",
+    "residuals",
+)
 ARITHMETIC = {
     "discovery/bases.py": {"TURN_RAD", "_EDGE"},  # a turn; beside zero and not at it
     "discovery/description.py": {"_POINTS", "_TURN_POINTS", "_DENSE"},  # points of a picture
@@ -32,6 +41,11 @@ ARITHMETIC = {
     "validation/signature.py": {"_CELLS", "_FEWEST", "_TURN", "_MANY_WAVES", "_FINE"},
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
     "design/experiments.py": {"_SEED"},
+    "equations/holding.py": {"_CRAWL"},  # beside zero and not at it
+    "equations/lcr.py": {"_PROBE"},  # differences
+    "equations/load.py": {"EQUATION"},  # an order of equations
+    "equations/motion.py": {"EQUATION", "_PAD"},  # an order of equations; samples kept
+    "equations/torque_table.py": {"_TERMS"},  # a formula
 }
 """Numbers that are no judgement: rounding, seeds, formulas, pictures, how work is run."""
 

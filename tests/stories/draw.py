@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
+from pipeline.criticism.policy.policy import DEFAULT
 from tests.stories.fits import REAL, campaign, fit
 from tests.stories.svg import COLOURS, INK, Panel, page
 
@@ -31,10 +32,12 @@ def holding() -> str:
         left.add("line", theta[mine], told[0, mine], colour)
     right = Panel("Error against the number of orders", "orders in the model", "rms [A]", log=True)
     captures = found.of("holding_current")
-    strongest = (72, 18, 12, 144, 24, 36, 48, 216)
-    chosen = [k for k in strongest if k in holding_orders(captures, (12, 18))]
-    steps = [(n, *sector_errors(captures, chosen[:n])) for n in range(len(chosen) + 1)]
-    steps += [(n, *sector_errors(captures, range(1, n + 1))) for n in (19, 39, 79, 119, 159)]
+    tables, strongest = DEFAULT.tables, (72, 18, 12, 144, 24, 36, 48, 216)
+    chosen = [k for k in strongest if k in holding_orders(captures, (12, 18), tables)]
+    steps = [(n, *sector_errors(captures, chosen[:n], tables)) for n in range(len(chosen) + 1)]
+    steps += [
+        (n, *sector_errors(captures, range(1, n + 1), tables)) for n in (19, 39, 79, 119, 159)
+    ]
     count = [n for n, _, _ in steps]
     for place, (colour, name) in enumerate(((BLUE, "fitted"), (RED, "held out")), start=1):
         error = [step[place] for step in steps]

@@ -10,19 +10,9 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.captures import Tables
 from pipeline.numerics.orders import TURN_RAD, passes
 from pipeline.records.capture import Capture
-
-_CELLS = 1024
-"""Cells a turn: twelve a wave of the highest cogging orders of small machines (84), and still a few
-rows each of a log of some thousand holds."""
-_SECTORS = 24
-"""Parts of a turn that are held out one by one, and the fewest cells that a table may have."""
-_FEW = 4
-"""Rows that a cell must have for their scatter about a line to be reported."""
-_ENOUGH = 0.5
-"""Share of the cells that must have them: the few where a pass turns round, and the rotor stays,
-scatter otherwise than the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,18 +28,20 @@ class Cells:
     noise_a: float
 
 
-def holding_cells(capture: Capture) -> Cells | None:
+def holding_cells(capture: Capture, policy: Tables) -> Cells | None:
     """A holding current averaged in cells of angle and sense.
 
     Parameters
     ----------
     capture
         With shaft angle and q current.
+    policy
+        Constants of judgement.
 
     Returns
     -------
     Cells or None
-        None where there are fewer cells than `_SECTORS`.
+        None where there are fewer cells than `policy.sectors`.
 
     Notes
     -----
@@ -65,25 +57,26 @@ def holding_cells(capture: Capture) -> Cells | None:
     theta, current = found["theta_mech_rad"][fine], found["iq_a"][fine]
     rows, spread = [], []
     for part, sense in passes(theta):
-        cells, left = _cells(theta[part], current[part])
+        cells, left = _cells(theta[part], current[part], policy)
         rows.append(np.column_stack([cells, np.full(cells.shape[0], float(sense))]))
         spread += left
-    if not rows or sum(len(r) for r in rows) < _SECTORS:
+    if not rows or sum(len(r) for r in rows) < policy.sectors:
         return None
     table = np.concatenate(rows)
-    noise = _noise(spread, [cells[:, 1] for cells in rows])
-    return Cells(table[:, 0], table[:, 1], table[:, 2], sectors_of(table[:, 0]), noise)
+    noise = _noise(spread, [cells[:, 1] for cells in rows], policy)
+    sector = _sectors_of(table[:, 0], policy.sectors)
+    return Cells(table[:, 0], table[:, 1], table[:, 2], sector, noise)
 
 
-def _cells(theta: Array, current: Array) -> tuple[Array, list[Array]]:
+def _cells(theta: Array, current: Array, policy: Tables) -> tuple[Array, list[Array]]:
     """Mean angle and current [K, 2] of the cells of one pass, and the scatter in each."""
-    number = np.floor(theta / TURN_RAD * _CELLS).astype(np.int64)
+    number = np.floor(theta / TURN_RAD * policy.cells).astype(np.int64)
     order = np.argsort(number, kind="stable")
     edges = np.flatnonzero(np.diff(number[order])) + 1
     means, left = [], []
     for rows in np.split(order, edges):
         means.append((theta[rows].mean(), current[rows].mean()))
-        if rows.size >= _FEW:
+        if rows.size >= policy.cell_rows:
             left.append(_about_a_line(theta[rows], current[rows]))
     return np.array(means), left
 
@@ -96,12 +89,12 @@ def _about_a_line(theta: Array, current: Array) -> Array:
     return rest
 
 
-def _noise(spread: list[Array], means: list[Array]) -> float:
+def _noise(spread: list[Array], means: list[Array], policy: Tables) -> float:
     """Standard deviation [A] of a cell's mean, of cells' `means` pass by pass and of their rows'
     scatter; never below a ten-thousandth of the largest.
     """
-    least = max(1e-4 * max(float(np.abs(one).max()) for one in means), 1e-12)
-    if len(spread) < _ENOUGH * sum(one.size for one in means):
+    least = max(policy.reading * max(float(np.abs(one).max()) for one in means), 1e-12)
+    if len(spread) < policy.cell_share * sum(one.size for one in means):
         return max(*(sensor_noise(one) for one in means), least)
     power = sum(float(s @ s) for s in spread)
     n = sum(s.size for s in spread)
@@ -113,7 +106,7 @@ def _noise(spread: list[Array], means: list[Array]) -> float:
     return max(scatter / math.sqrt(free), least)
 
 
-def sectors_of(theta: Array) -> NDArray[np.int64]:
+def _sectors_of(theta: Array, sectors: int) -> NDArray[np.int64]:
     """Number of the sector of the turn that each angle [n] is in."""
     turn = np.mod(theta, TURN_RAD) / TURN_RAD
-    return np.minimum((turn * _SECTORS).astype(np.int64), _SECTORS - 1)
+    return np.minimum((turn * sectors).astype(np.int64), sectors - 1)

@@ -10,19 +10,12 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.holding_cells import holding_cells
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.captures import Tables
 from pipeline.records.capture import Capture
-
-_MOST = 12
-"""Orders at the most: a bound of the cost."""
-_CLEAR = 3.0
-"""Standard errors of the sectors' mean gain that an order must gain by. By judgement: at 2, chance
-brings in one of some dozens that are offered."""
-_FEWEST_SECTORS = 6
-"""Sectors whose scatter is known well enough; by judgement."""
 
 
 def holding_orders(
-    captures: Iterable[Capture], bases: tuple[int, ...], highest: int = 400
+    captures: Iterable[Capture], bases: tuple[int, ...], policy: Tables, highest: int = 400
 ) -> tuple[int, ...]:
     """Orders that a holding current repeats in parts of the turn they were not fitted to.
 
@@ -32,6 +25,8 @@ def holding_orders(
         Holding currents of one motor.
     bases
         Pole pairs and slots; only multiples of these are looked for.
+    policy
+        Constants of judgement.
     highest
         Highest order [1/turn].
 
@@ -43,9 +38,9 @@ def holding_orders(
     Notes
     -----
     Forward selection: the order that takes most of the square of what is left joins, as long as the
-    sectors of the turn, each predicted from all others, gain on average by more than `_CLEAR`
-    standard errors. An order too many makes held-out sectors worse at once, however well the rest
-    is fitted.
+    sectors of the turn, each predicted from all others, gain on average by more than
+    `policy.order_u` standard errors. An order too many makes held-out sectors worse at once,
+    however well the rest is fitted.
 
     References
     ----------
@@ -54,31 +49,33 @@ def holding_orders(
     7.10, doi:10.1007/978-0-387-84858-7.
 
     """
-    joined = _joined(captures)
+    joined = _joined(captures, policy)
     if joined is None or not bases:
         return ()
     theta, current, design, sector = joined
-    if np.unique(sector).size < _FEWEST_SECTORS:
+    if np.unique(sector).size < policy.order_sectors:
         return ()
     cells = 2.0 * math.pi / float(np.median(np.abs(np.diff(np.unique(np.mod(theta, 2 * math.pi))))))
     top = min(highest, int(cells / 8))
     offered = [k for k in range(1, top + 1) if any(k % base == 0 for base in bases)]
     chosen: list[int] = []
     error = _held_out(design, current, sector)
-    while offered and len(chosen) < _MOST:
+    while offered and len(chosen) < policy.orders:
         best = _strongest(design, current, theta, offered)
         offered.remove(best)
         tried = np.column_stack([design, np.cos(best * theta), np.sin(best * theta)])
         now = _held_out(tried, current, sector)
         gain = error - now
-        if gain.mean() <= _CLEAR * float(gain.std(ddof=1)) / math.sqrt(gain.size):
+        if gain.mean() <= policy.order_u * float(gain.std(ddof=1)) / math.sqrt(gain.size):
             break
         design, error = tried, now
         chosen.append(best)
     return tuple(sorted(chosen))
 
 
-def sector_errors(captures: Iterable[Capture], orders: Sequence[int]) -> tuple[float, float]:
+def sector_errors(
+    captures: Iterable[Capture], orders: Sequence[int], policy: Tables
+) -> tuple[float, float]:
     """What orders, and an offset a sense, leave of a holding current.
 
     Parameters
@@ -87,6 +84,8 @@ def sector_errors(captures: Iterable[Capture], orders: Sequence[int]) -> tuple[f
         Holding currents of one motor.
     orders
         [1/turn]
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -99,7 +98,7 @@ def sector_errors(captures: Iterable[Capture], orders: Sequence[int]) -> tuple[f
         There is no holding current.
 
     """
-    joined = _joined(captures)
+    joined = _joined(captures, policy)
     if joined is None:
         raise ValueError("no capture holds a rotor at many angles")
     theta, current, side, sector = joined
@@ -119,10 +118,11 @@ def _strongest(design: Array, current: Array, theta: Array, offered: Sequence[in
 
 
 def _joined(
-    captures: Iterable[Capture],
+    captures: Iterable[Capture], policy: Tables
 ) -> tuple[Array, Array, Array, NDArray[np.int64]] | None:
     """Angle, current, an offset a capture and sense, and the sector, of all cells."""
-    tables = [cells for cells in map(holding_cells, captures) if cells is not None]
+    each = (holding_cells(capture, policy) for capture in captures)
+    tables = [cells for cells in each if cells is not None]
     if not tables:
         return None
     theta = np.concatenate([t.theta_mech_rad for t in tables])

@@ -14,6 +14,7 @@ from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.stated import stated_parameters
 from pipeline.criticism.data.traces import LINES_V, tellable
 from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.policy.policy import DEFAULT, Policy
 from pipeline.numerics.orders import TURN_RAD
 from pipeline.physics.frames import vector_of_lines
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
@@ -41,7 +42,7 @@ PAIRLESS = (
 )
 
 
-def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
+def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -> Machine | None:
     """How large the machine is: pole pairs, slots, scales and orders, before any fit.
 
     Parameters
@@ -50,6 +51,8 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
         All captures of one motor.
     start
         Constants known from elsewhere.
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -97,7 +100,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
     bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
     highest = _HARMONICS * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
     orders = torque_orders(campaign.of("cogging"), max(highest, _HIGHEST)) or holding_orders(
-        campaign.of("holding_current"), bases
+        campaign.of("holding_current"), bases, policy.tables
     )
     return Machine(
         pole_pairs,
@@ -108,6 +111,7 @@ def machine_of(campaign: Campaign, start: Constants) -> Machine | None:
         encoder_step(campaign),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
         stated=known,
+        policy=policy,
     )
 
 

@@ -14,6 +14,7 @@ from pipeline.criticism.data.clocks import counted, sampled_unevenly
 from pipeline.criticism.data.segment import UNSMOOTHED, Sensors
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.effect import Array, Machine
+from pipeline.criticism.policy.captures import Cutting
 from pipeline.numerics.projection import window_starts
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture
@@ -23,28 +24,12 @@ if TYPE_CHECKING:
 
 ANGLES = frozenset({"theta_mech_rad", "theta_elec_rad"})
 LINES_V = ("vab_v", "vbc_v", "vca_v")
-_WINDOW_S = 0.02
-_WINDOW_SAMPLES = 40
-"""Length of a weak window [s], and its fewest samples: 5 ms bias J, 80 ms and more blur what moves,
-and a bump of fewer samples is none."""
-_SMOOTHING_S = 0.05
-"""Half of the time [s] that a temperature is averaged over: windings warm in seconds."""
 SMOOTHED = ("temp_winding_degc", "temp_magnet_degc")
-_TURNING_S = 0.002
-"""Length of the mean of an angle that says how far the rotor turns during a delay [s]: shorter, and
-its rounding is in the current's angle; longer, and a step of the speed is blurred."""
 PAD = 24
 """Samples kept on either side of a window that is cut out: what differences and smoothing of a
 speed reach over."""
 _SHORTEST = 24
 """Fewest rows of a capture with a clock: three windows of eight, by judgement."""
-_SLACK = 6.0
-"""Standard deviations of the angle's noise that a shaft must turn back for a reversal."""
-_MOVING = 2.0
-"""Scatter of an angle about its parabola within one width, over its noise, from which on the shaft
-itself moves: a rounding error is √3 of its standard deviation at the most."""
-_NARROWEST = 5
-"""Samples of the shortest parabola that leaves less noise than there is."""
 
 
 def tellable(capture: Capture) -> Capture | None:
@@ -289,17 +274,17 @@ def thinned(
     return cut, pad + (length + 2 * pad) * np.arange(starts.size)
 
 
-def whole_log(found: Mapping[str, Array], period: float) -> dict[str, Array]:
+def whole_log(found: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:
     """Currents and torque of all samples, which may be late by many, and the angle, smoothed."""
     names = ("id_a", "iq_a", "torque_shaft_nm")
-    turned = smoothed(found["theta_mech_rad"], 2 * round(_TURNING_S / period / 2) + 1)
+    turned = smoothed(found["theta_mech_rad"], 2 * round(policy.speed_s / period / 2) + 1)
     return {"theta_mech_rad": turned, **{name: found[name] for name in names if name in found}}
 
 
-def window_of(period: float, size: int) -> int:
+def window_of(period: float, size: int, policy: Cutting) -> int:
     """Samples a window: 20 ms, but 40 samples at least and four windows in the capture."""
-    wanted = max(round(_WINDOW_S / period), _WINDOW_SAMPLES)
-    return max(min(wanted, size // 4), 8)
+    wanted = max(round(policy.window_s / period), policy.window_samples)
+    return max(min(wanted, size // 4), policy.least_window)
 
 
 def with_angle(capture: Capture, names: list[str]) -> list[str]:
@@ -325,20 +310,20 @@ def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> Non
         found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
 
 
-def prepared(found: dict[str, Array], period: float) -> Sensors:
+def prepared(found: dict[str, Array], period: float, policy: Cutting) -> Sensors:
     """Noise, coarse steps and runs of columns; smooths the temperatures and adds the travel since a
     reversal.
     """
     noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
     steps = coarse_steps(found, noise)
-    width = max(2 * round(_SMOOTHING_S / period) + 1, 51)
+    width = max(2 * round(policy.temperature_s / period) + 1, 51)
     for name in SMOOTHED:
         if name in found:
             found[name] = smoothed(found[name], width)
             noise[name] /= math.sqrt(width)
     runs = np.array([math.inf])
     if "theta_mech_rad" in found:
-        runs = with_travel(found, noise)
+        runs = with_travel(found, noise, policy)
     return Sensors(noise, steps, runs)
 
 
@@ -348,7 +333,9 @@ def coarse_steps(found: Mapping[str, Array], noise: Mapping[str, float]) -> dict
     return {name: step for name, step in steps.items() if step > 0.0}
 
 
-def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) -> None:
+def even_angle(
+    found: dict[str, Array], noise: dict[str, float], window: int, policy: Cutting
+) -> None:
     """Takes an angle as its local parabola, as long a one as the motion of the shaft allows.
 
     Parameters
@@ -359,6 +346,8 @@ def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) ->
         Of each column; that of the angle is lowered to what the parabola leaves [rad].
     window
         Samples of a weak window; a parabola has as many.
+    policy
+        Constants of judgement.
 
     Notes
     -----
@@ -377,10 +366,10 @@ def even_angle(found: dict[str, Array], noise: dict[str, float], window: int) ->
     theta, half = found["theta_mech_rad"], window // 2
     if theta.size < 3 * (2 * half + 1) or noise["theta_mech_rad"] <= 0.0:
         return
-    while (width := 2 * half + 1) >= _NARROWEST:
+    while (width := 2 * half + 1) >= policy.narrowest:
         run = _parabolas(theta, width)
         power = np.convolve((theta - run) ** 2, np.full(width, 1.0 / width), mode="valid")
-        if float(power.max()) <= (_MOVING * noise["theta_mech_rad"]) ** 2:
+        if float(power.max()) <= (policy.motion_u * noise["theta_mech_rad"]) ** 2:
             found |= {"theta_mech_rad": run, UNSMOOTHED: theta}
             # variance of a parabola's middle by least squares
             noise["theta_mech_rad"] *= math.sqrt(2.25 / width)
@@ -399,7 +388,7 @@ def evened(
         return sensors
     noise = dict(sensors.noise)
     noise["theta_mech_rad"] = max(noise["theta_mech_rad"], machine.encoder_rad / math.sqrt(12))
-    even_angle(found, noise, window)
+    even_angle(found, noise, window, machine.policy.cutting)
     return replace(sensors, noise=noise)
 
 
@@ -419,8 +408,8 @@ def _parabolas(signal: Array, width: int) -> Array:
     return fit
 
 
-def with_travel(found: dict[str, Array], noise: Mapping[str, float]) -> Array:
+def with_travel(found: dict[str, Array], noise: Mapping[str, float], policy: Cutting) -> Array:
     """Adds travel and run to the columns; returns the runs [runs, rad]."""
-    slack = _SLACK * noise["theta_mech_rad"]
+    slack = policy.reversal_u * noise["theta_mech_rad"]
     found["travel_rad"], found["run"], runs = travel(found["theta_mech_rad"], slack)
     return runs

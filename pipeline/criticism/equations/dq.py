@@ -24,6 +24,7 @@ from pipeline.criticism.data.traces import (
 from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, ripple
+from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.shaft import TORQUE_RIPPLES, net_torque, sensed_torque, true_load
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
@@ -44,11 +45,6 @@ from pipeline.records.capture import Capture
 
 VOLTS = ("vd_v", "vq_v")
 TORQUE = "torque_shaft_nm"
-_SLOWER = 0.75
-"""A log is slower than the PWM where a PWM period is below this part of its own."""
-_WINDOWS_MAP, _WINDOWS_LOG = 48, 32
-"""Windows of a map, and of a drive's log, at the most. By judgement: cost goes with them, and a
-programme has several logs."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -59,21 +55,22 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     angle = not ANGLES.isdisjoint(names)
     torque = capture.has("torque_shaft_nm") and turning and angle
     names += ["torque_shaft_nm"] if torque else []
+    policy = machine.policy.cutting
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)
     turned = float(np.ptp(found["theta_mech_rad"]))
     channels: tuple[str, ...] = ("vd_v", "vq_v")
-    if torque and turned > 0.1:
+    if torque and turned > policy.turning_rad:
         channels += ("torque_shaft_nm",)
     size = found["vd_v"].size
-    window = window_of(period, size)
-    orders = electrical_orders(machine) if angle and turned > 0.1 else ()
-    sensors = evened(capture, found, prepared(found, period), machine, window)
-    most = _WINDOWS_MAP if capture.meta.test == "torque_map" else _WINDOWS_LOG
+    window = window_of(period, size, policy)
+    orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
+    sensors = evened(capture, found, prepared(found, period, policy), machine, window)
+    most = policy.windows if capture.meta.test == "torque_map" else policy.windows_drive
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2
     whole = {**found, "good": keep.astype(float)} if logged else None
-    log = whole_log(found, period)
+    log = whole_log(found, period, policy)
     found, starts = thinned(found, keep, window, most)
     weak = projection(found["theta_mech_rad"], starts, window, orders)
     made = segment_of(
@@ -158,17 +155,17 @@ def _shortened(lost: Array) -> Array:
     return left
 
 
-def _hold_s(segment: Segment) -> float:
+def _hold_s(segment: Segment, policy: Cutting) -> float:
     """Time [s] for which a voltage vector is held: a PWM period, or that of a log as fast."""
     pwm_s = segment.fixed.get("pwm_s", math.inf)
-    return pwm_s if pwm_s < _SLOWER * segment.ts_s else segment.ts_s
+    return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
 
 
 def _pace(
     segment: Segment, x: Operating, difference: Callable[[Array, float], Array]
 ) -> tuple[Array, Array]:
     """Electrical speed [n, rad/s], and what it turns [n, rad] while a voltage vector is held."""
-    turn = x.machine.pole_pairs * x.omega_rad_s * _hold_s(segment)
+    turn = x.machine.pole_pairs * x.omega_rad_s * _hold_s(segment, x.machine.policy.cutting)
     return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn
 
 

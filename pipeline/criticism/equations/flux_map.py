@@ -11,30 +11,25 @@ from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.true_state import at_rest, operating, table_current
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.records.capture import Capture
 
 LINKAGES = ("psi_d_wb", "psi_q_wb")
-_FLUX_NOISE = 1e-3
-"""Noise of a table's column, as a share of its range: a table does not tell its own, and 0.1 % is
-what such tables are good to, by judgement."""
-_OTHER_AXIS = 0.1
-"""Share of the other axis's range that an axis has at the least: one that stands still has none."""
-_FEW_LEVELS = 4
-"""Levels of d current from which on they can be held out one by one: the others tell a curve."""
 
 
-def cut(capture: Capture, _: Machine) -> Segment | None:
+def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Flux linkages of both axes, or of a sweep along one, whose other axis stands still."""
     names = ("id_a", "iq_a", *LINKAGES)
     found = capture.arrays(*names)
-    noise = _axes_noise(found, names[:2]) | _axes_noise(found, names[2:])
+    policy = machine.policy.tables
+    noise = _axes_noise(found, names[:2], policy) | _axes_noise(found, names[2:], policy)
     if not all(noise.values()):
         return None
     levels = levels_of(found["id_a"])
     # rows of one d current are held out together: a map is often its own mirror image in i_q
-    blocks = levels if levels.max(initial=0) + 1 >= _FEW_LEVELS else None
+    blocks = levels if levels.max(initial=0) + 1 >= policy.levels else None
     return segment_of(
         capture,
         "flux_map",
@@ -48,11 +43,13 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     )
 
 
-def _axes_noise(found: Mapping[str, Array], names: tuple[str, ...]) -> dict[str, float]:
+def _axes_noise(
+    found: Mapping[str, Array], names: tuple[str, ...], policy: Tables
+) -> dict[str, float]:
     """A share of an axis's range, or a tenth of the other's at least: one instrument reads both."""
     ranges = {name: float(np.ptp(found[name])) for name in names}
-    least = _OTHER_AXIS * max(ranges.values())
-    return {name: _FLUX_NOISE * max(own, least) for name, own in ranges.items()}
+    least = policy.other_axis * max(ranges.values())
+    return {name: policy.flux_share * max(own, least) for name, own in ranges.items()}
 
 
 def state(

@@ -37,15 +37,6 @@ from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
 
 SPEED, TORQUE, RECORDER = "omega_mech_rad_s", "torque_shaft_nm", "shaft"
-_LEAST_WINDOW = 8
-"""Samples of a window at the least: its test function vanishes at both ends."""
-_WINDOWS = 48
-"""Windows of a coast at the most; by judgement: cost goes with them."""
-_LEAD = 0.05
-"""Share of a coast from which on the time before it counts as driven. By judgement: the moment of
-letting go is shorter."""
-_FINEST = 48
-"""Parts of a coasting shaft's sample at the most: a bound of the cost, by judgement."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -62,11 +53,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     channel = TORQUE if TORQUE in found else SPEED
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, found, keep, channel)
-    window = window_of(period, keep.size)
-    keep = keep & _coasts(found["theta_mech_rad"], window)
-    sensors = prepared(found, period)
+    policy = machine.policy.cutting
+    window = window_of(period, keep.size, policy)
+    keep = keep & _coasts(found["theta_mech_rad"], window, policy.driven_share)
+    sensors = prepared(found, period, policy)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    found, starts = thinned(found, keep, window, _WINDOWS)
+    found, starts = thinned(found, keep, window, policy.windows)
     weak = projection(found["theta_mech_rad"], starts, window, ())
     return segment_of(
         capture,
@@ -80,17 +72,18 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def _coasts(theta: Array, window: int) -> NDArray[np.bool_]:
+def _coasts(theta: Array, window: int, driven_share: float) -> NDArray[np.bool_]:
     """Samples [n] in which a shaft coasts.
 
     These are all samples, unless the shaft is driven or held at its speed before some coast, for
-    more than a twentieth of that coast. Then they are those of the coasts alone.
+    more than a share of that coast. Then they are those of the coasts alone.
     """
     speed = smoothed(np.gradient(theta), 2 * (window // 2) + 1)
     runs = sorted(((rows.start, rows.stop) for rows, _ in coasting_rows(speed)))
     ends = [0, *(stop for _, stop in runs)]
     driven = any(
-        start - end > _LEAD * (stop - start) for (start, stop), end in zip(runs, ends, strict=False)
+        start - end > driven_share * (stop - start)
+        for (start, stop), end in zip(runs, ends, strict=False)
     )
     free = np.full(theta.size, not driven)
     for start, stop in runs:
@@ -106,23 +99,23 @@ def _slow_turn(
     keep: NDArray[np.bool_],
     channel: str,
 ) -> Segment | None:
-    orders = slow_orders(machine)
+    orders, policy = slow_orders(machine), machine.policy.cutting
     theta = found["theta_mech_rad"]
     turns = float(np.ptp(theta)) / (2 * math.pi)
     if turns <= 0.0:
         return None
-    factor = max(int(theta.size / turns / (24 * max(orders))), 1)
-    if theta.size // factor < _LEAST_WINDOW + 2:
+    factor = max(int(theta.size / turns / (policy.slow_samples * max(orders))), 1)
+    if theta.size // factor < policy.least_window + 2:
         return None
     noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
     steps = coarse_steps(found, noise)
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
     found = {name: decimated(column, factor) for name, column in found.items()}
-    sensors = Sensors(noise, steps, with_travel(found, noise))
+    sensors = Sensors(noise, steps, with_travel(found, noise, policy))
     keep = decimated(keep.astype(float), factor) > 0.999
     keep[:1] = keep[-1:] = False
     size = keep.size
-    window = max(int(size / round(turns)), _LEAST_WINDOW) if turns > 1.2 else size - 2
+    window = max(int(size / round(turns)), policy.least_window) if turns > 1.2 else size - 2
     window = min(window, size - 2)
     # the first and the last sample have no neighbours
     starts = 1 + window_starts(keep[1:-1], window)
@@ -144,7 +137,7 @@ def state(
 ) -> Operating:
     """True angle and speed [n·m] of a shaft without current, m points a sample of a coast."""
     slow = segment.test == "cogging"
-    finer = 1 if slow else finer_of(segment, model.machine, _FINEST)
+    finer = 1 if slow else finer_of(segment, model.machine, model.policy.cutting.coast_parts)
     motion = motion_of(segment, signals, model.machine, finer)
     none = np.zeros(motion.theta_rad.size, dtype=complex)
     x = operating(segment, signals, model, values, none, motion)

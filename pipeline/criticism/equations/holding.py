@@ -25,9 +25,9 @@ _CRAWL = 1e-9
 """Speed [rad/s] of a held rotor that creeps: it has a sense and nothing else."""
 
 
-def cut(capture: Capture, _: Machine) -> Segment | None:
+def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Mean angle, current and sense of arrival of every cell; sectors are held out one by one."""
-    cells = holding_cells(capture)
+    cells = holding_cells(capture, machine.policy.tables)
     if cells is None:
         return None
     return segment_of(

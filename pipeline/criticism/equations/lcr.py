@@ -16,14 +16,11 @@ from pipeline.criticism.machine.model import Model, Pieces, evaluate
 from pipeline.criticism.signals.true_state import Motion, operating
 from pipeline.records.capture import Capture
 
-_LEAST_METER_NOISE = 1e-4
-"""Share of its largest reading that a meter is known no better than, by judgement: with the
-scatter alone, a meter that reads the same at every angle had a noise of 1e-16."""
 _PROBE = 1e-3
 """Current of the meter, as a share of the machine's: small against what saturates."""
 
 
-def cut(capture: Capture, _: Machine) -> Segment | None:
+def cut(capture: Capture, machine: Machine) -> Segment | None:
     """A table over the angle.
 
     Notes
@@ -42,7 +39,7 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     for name in names[1:]:
         fit = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
         scatter = math.sqrt(float(((found[name] - fit) ** 2).sum()) / (angle.size - 3))
-        least = _LEAST_METER_NOISE * float(np.abs(found[name]).max())
+        least = machine.policy.tables.reading * float(np.abs(found[name]).max())
         noise[name] = max(scatter, resolution(found[name]) / math.sqrt(12), least)
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
     return segment_of(

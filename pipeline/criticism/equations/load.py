@@ -34,8 +34,6 @@ from pipeline.records.capture import Capture
 
 TORQUE, SHARE = "torque_shaft_nm", "unlogged_d_share"
 _BOTH_AXES = ("vd_v", "vq_v", "id_a", "iq_a")
-_WINDOWS = 48
-"""Windows at the most; by judgement: cost goes with them."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -50,11 +48,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     others = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
     period, found, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle))
     shaft_angle(found, period, machine)
-    window, size = window_of(period, keep.size), keep.size
-    sensors = evened(capture, found, prepared(found, period), machine, window)
+    policy, size = machine.policy.cutting, keep.size
+    window = window_of(period, size, policy)
+    sensors = evened(capture, found, prepared(found, period, policy), machine, window)
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     found["row"] = np.arange(size, dtype=np.float64)
-    cut_out, starts = thinned(found, keep, window, _WINDOWS)
+    cut_out, starts = thinned(found, keep, window, policy.windows)
     by_angle = "omega_mech_rad_s" not in angle
     orders = electrical_orders(machine) if by_angle else ()
     weak = projection(cut_out["theta_mech_rad"], starts, window, orders)

@@ -26,11 +26,8 @@ from pipeline.records.capture import Capture
 
 TORQUE, RECORDER = "torque_shaft_nm", "log"
 _USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run")
-_MOTION_WINDOWS, _PAD = 160, 8
-"""Windows of the motion at the most, and samples kept at either side. By judgement: cost goes with
-both, and the angle's second difference needs a few beyond a window."""
-_FINEST = 6
-"""Parts of a log's sample at the most: a bound of the cost, by judgement."""
+_PAD = 8
+"""Samples kept at either side: the angle's second difference needs a few beyond a window."""
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -45,8 +42,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     warm = log.columns.get("temp_magnet_degc")
     fixed = {} if warm is None else {"ambient_k": float(np.mean(warm)) - 25.0}
     shaft["row"] = np.arange(log.keep.size, dtype=float)
-    window = window_of(log.period_s, log.keep.size)
-    shaft, starts = thinned(shaft, log.keep, window, _MOTION_WINDOWS, _PAD)
+    policy = machine.policy.cutting
+    window = window_of(log.period_s, log.keep.size, policy)
+    shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, _PAD)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     blocks = in_time(shaft.pop("row")[starts + window // 2], log.keep.size)
     made = segment_of(
@@ -67,7 +65,7 @@ def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
     """True current, angle and speed [n·m], m points a sample where the shaft turns fast."""
-    finer = finer_of(segment, model.machine, _FINEST)
+    finer = finer_of(segment, model.machine, model.policy.cutting.log_parts)
     motion = motion_of(segment, signals, model.machine, finer)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)

@@ -23,14 +23,13 @@ from pipeline.criticism.data.traces import (
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.true_state import at_true_angle, motion_of, operating
 from pipeline.criticism.signals.voltage import central, recorded_voltage, rotor_voltage
 from pipeline.numerics.projection import Projection, projection
 from pipeline.physics.frames import vector_of_lines
 from pipeline.records.capture import Capture
 
-_WINDOWS = 48
-"""Windows at the most; by judgement: cost goes with them."""
 _LINE_RAD = {f"v{pair}_v": angle for pair, angle in PAIR_RAD.items()}
 """Where each line voltage stands [rad, electrical]."""
 
@@ -47,12 +46,13 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         return None
     period, found, keep = even_clock(capture, tuple(names))
     shaft_angle(found, period, machine)
-    window = window_of(period, keep.size)
-    sensors = prepared(found, period)
+    policy = machine.policy.cutting
+    window = window_of(period, keep.size, policy)
+    sensors = prepared(found, period, policy)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
-    found, starts = thinned(found, keep, window, _WINDOWS)
+    found, starts = thinned(found, keep, window, policy.windows)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
-    weak = weak.only(_steady(weak, found["theta_mech_rad"]))
+    weak = weak.only(_steady(weak, found["theta_mech_rad"], policy))
     return segment_of(
         capture,
         "open",
@@ -65,7 +65,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     )
 
 
-def _steady(weak: Projection, theta: Array) -> NDArray[np.bool_]:
+def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_]:
     """The windows [W] of constant speed, which an open-circuit test is made of; all if too few.
 
     An instantaneous voltage sample at a kink of the speed belongs to neither side of it.
@@ -73,8 +73,8 @@ def _steady(weak: Projection, theta: Array) -> NDArray[np.bool_]:
     half = weak.length // 2
     first = theta[weak.starts + half] - theta[weak.starts]
     second = theta[weak.starts + 2 * half - 1] - theta[weak.starts + half - 1]
-    calm = np.abs(second - first) < 2e-3 * np.abs(first + second)
-    return calm if calm.sum() >= 8 else np.ones(calm.size, dtype=bool)
+    calm = np.abs(second - first) < policy.steady_share * np.abs(first + second)
+    return calm if calm.sum() >= policy.steady_windows else np.ones(calm.size, dtype=bool)
 
 
 def state(

@@ -36,7 +36,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     log = q_log(capture, machine)
     if log is None:
         return None
-    window = window_of(log.period_s, log.keep.size)
+    window = window_of(log.period_s, log.keep.size, machine.policy.cutting)
     starts = window_starts(log.keep, window)
     weak = projection(log.columns["theta_mech_rad"], starts, window, ())
     return segment_of(

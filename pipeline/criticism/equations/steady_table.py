@@ -16,11 +16,8 @@ from pipeline.criticism.signals.true_state import Motion, operating, table_curre
 from pipeline.criticism.signals.voltage import recorded_voltage
 from pipeline.records.capture import Capture
 
-_LEAST_NOISE = 1e-5
-"""Share of the largest voltage that the noise is never below: straight lines may fit exactly."""
 
-
-def cut(capture: Capture, _: Machine) -> Segment | None:
+def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Levels of d current, each run at several speeds: v_q, the drop of i_q taken off.
 
     Each level has a free offset of its own, since what the inverter drops along q depends on the
@@ -38,7 +35,7 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     power = sum(
         _scatter(found["omega_mech_rad_s"][levels == k], volts[levels == k]) for k in range(count)
     )
-    least = _LEAST_NOISE * float(np.abs(volts).max())
+    least = machine.policy.tables.steady_reading * float(np.abs(volts).max())
     noise = {"vq_v": max(math.sqrt(power / freedom), least)}
     offsets = np.abs(volts).max() * (levels[None, :] == np.arange(count)[:, None])
     return segment_of(

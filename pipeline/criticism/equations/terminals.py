@@ -18,13 +18,8 @@ from pipeline.criticism.signals.voltage import central, recorded_voltage
 from pipeline.numerics.projection import Projection, projection, window_starts
 from pipeline.records.capture import Capture
 
-_STEP_WINDOW_S = 0.002
-"""Window of a current step [s]: short, since all that it tells is over after a few L/R."""
-_LEAST_WINDOW = 8
-"""Samples of a window at the least: its test function vanishes at both ends."""
 
-
-def cut(capture: Capture, _: Machine) -> Segment | None:
+def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Voltage and current of one pair; the windows at rest, or those clear of the steps."""
     pair = capture.meta.pair
     if pair is None or not capture.has(f"v{pair}_v"):
@@ -37,21 +32,22 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra))
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    sensors = prepared(found, period)
+    policy = machine.policy.cutting
+    sensors = prepared(found, period, policy)
     fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:
             return None
         fixed["theta_elec_rad"] = math.radians(capture.meta.theta_elec_deg)
-        edges = np.abs(np.diff(volts)) > 8 * sensors.noise["v_pair_v"]
+        edges = np.abs(np.diff(volts)) > policy.change_u * sensors.noise["v_pair_v"]
         keep[:-1] &= ~edges
         keep[1:] &= ~edges
-        window = max(min(round(_STEP_WINDOW_S / period), keep.size // 4), _LEAST_WINDOW)
+        window = max(min(round(policy.step_window_s / period), keep.size // 4), policy.least_window)
     else:
-        window = window_of(period, keep.size)
+        window = window_of(period, keep.size, policy)
     weak = projection(np.zeros(keep.size), window_starts(keep, window), window, ())
     if capture.meta.test == "resistance":
-        weak = _settled(weak, amps, sensors.noise["i_pair_a"])
+        weak = _settled(weak, amps, policy.change_u * sensors.noise["i_pair_a"])
     return segment_of(
         capture,
         "terminal",
@@ -67,10 +63,10 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     )
 
 
-def _settled(weak: Projection, amps: Array, noise: float) -> Projection:
+def _settled(weak: Projection, amps: Array, change_a: float) -> Projection:
     """The windows in which the current does not move: there the inductance does not matter."""
     spread = np.array([np.ptp(amps[s : s + weak.length]) for s in weak.starts])
-    calm = spread < 8.0 * max(noise, 1e-12)
+    calm = spread < max(change_a, 1e-11)
     return weak.only(calm)
 
 

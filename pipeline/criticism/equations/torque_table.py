@@ -14,6 +14,7 @@ from pipeline.criticism.data.segment import Segment, Sensors, segment_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
 from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.policy.captures import Tables
 from pipeline.criticism.signals.shaft import as_sensed, net_torque
 from pipeline.criticism.signals.true_state import Motion, operating, table_current
 from pipeline.records.capture import Capture
@@ -21,19 +22,11 @@ from pipeline.records.capture import Capture
 TORQUE = "torque_shaft_nm"
 _BESIDE = ("id_a", "theta_mech_rad", "temp_magnet_degc")
 """Columns that are used where they are there."""
-_LEAST_NOISE = 1e-4
-"""Share of the largest torque that the noise is never below, by judgement: a few rows may lie on
-their curve exactly."""
-_FEW_LEVELS = 4
-"""Levels of current from which on there is a slope and a scatter, and they can be held out."""
-_PARTS = 12
-"""Parts that a sweep is held out in: by judgement. Fewer leave little to fit, more are like their
-neighbours."""
 _TERMS = 3
 """Terms of the curve of torque over current that noise is the scatter about: offset, slope, sag."""
 
 
-def cut(capture: Capture, _: Machine) -> Segment | None:
+def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Rows of the table; levels of current, or parts of a sweep, are held out one by one.
 
     The noise is the scatter about T0 + k i + s i³, with a curve of its own for every rotor angle:
@@ -44,8 +37,9 @@ def cut(capture: Capture, _: Machine) -> Segment | None:
     found = capture.arrays(*names)
     fine = np.all([np.isfinite(column) for column in found.values()], axis=0)
     found = {name: column[fine] for name, column in found.items()}
-    torque, parts = found[TORQUE], _parts(found["iq_a"])
-    noise = None if parts is None else _noise(found)
+    policy = machine.policy.tables
+    torque, parts = found[TORQUE], _parts(found["iq_a"], policy)
+    noise = None if parts is None else _noise(found, policy.reading)
     if noise is None:
         return None
     made = segment_of(
@@ -96,20 +90,20 @@ def predicted(_: Segment, x: Operating, pieces: Pieces, model: Model, values: Va
     return as_sensed(net_torque(x, pieces), model, values)[None]
 
 
-def _parts(current: Array) -> NDArray[np.int64] | None:
+def _parts(current: Array, policy: Tables) -> NDArray[np.int64] | None:
     """Number of the level [n], of a sweep without levels that of its part; None of too few."""
     levels = levels_of(current)
-    if levels.max(initial=0) + 1 >= _FEW_LEVELS:
+    if levels.max(initial=0) + 1 >= policy.levels:
         return levels
     reach = float(np.ptp(current)) if current.size else 0.0
     if levels.max(initial=0) > 0 or reach == 0.0:
         return None
-    place = (current - current.min()) / reach * _PARTS
-    parts: NDArray[np.int64] = np.minimum(place.astype(np.int64), _PARTS - 1)
+    place = (current - current.min()) / reach * policy.parts
+    parts: NDArray[np.int64] = np.minimum(place.astype(np.int64), policy.parts - 1)
     return parts
 
 
-def _noise(found: Mapping[str, Array]) -> float | None:
+def _noise(found: Mapping[str, Array], reading: float) -> float | None:
     """Standard deviation [N·m] of the torques about their curves; None with too few rows."""
     torque, current = found[TORQUE], found["iq_a"] / float(np.abs(found["iq_a"]).max())
     angles = found.get("theta_mech_rad")
@@ -120,7 +114,7 @@ def _noise(found: Mapping[str, Array]) -> float | None:
     if free < 1:
         return None
     power = sum(_about_its_curve(current[place == k], torque[place == k]) for k in np.unique(place))
-    least = max(_LEAST_NOISE * float(np.abs(torque).max()), 1e-12)
+    least = max(reading * float(np.abs(torque).max()), 1e-12)
     return max(math.sqrt(power / free), least)
 
 

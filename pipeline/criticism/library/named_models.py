@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.library.registry import chosen
 from pipeline.criticism.machine.model import Model
@@ -23,4 +25,4 @@ def model_of(spec: ModelSpec, machine: Machine) -> Model:
     more = [name for name in spec.effects if not name.startswith("-")]
     names = [name for name in dict.fromkeys([*MODELS[spec.name], *more]) if name not in less]
     found = tuple(chosen(tuple(names), spec.effects_path).values())
-    return Model(machine, found, policy_of(spec.policy))
+    return Model(replace(machine, policy=policy_of(spec.policy)), found)

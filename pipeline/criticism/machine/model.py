@@ -29,24 +29,21 @@ from pipeline.criticism.effect import (
     Parameter,
     Values,
 )
-from pipeline.criticism.policy.policy import DEFAULT, Policy
+from pipeline.criticism.policy.policy import Policy
 
 _STEP = 1e-30
 """Complex step [A, rad]: its square is below the rounding of anything."""
-_FREE = float("inf")
-"""Standard uncertainty of a prior that says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A parameter of the base model: unit, and the prior of a nuisance (infinite: none), in
-    multiples of a scale of the machine.
+    """A parameter of the base model: unit, and the centre of a nuisance's prior; its standard
+    uncertainty (`policy.priors`) is in multiples of a scale of the machine.
     """
 
     name: str
     unit: str
     words: str
-    prior: float = _FREE
     center: float = 0.0
     hook: str = "drop"
     scale: str = "1"
@@ -59,36 +56,28 @@ BASE: tuple[Constant, ...] = (
     Constant("psi_wb", "Wb", "magnet flux at 25 °C", hook="flux"),
     Constant("j_kgm2", "kg·m²", "inertia that the shaft torque does not see", hook="motion"),
     Constant("b_nm_s_rad", "N·m·s/rad", "viscous friction", hook="torque"),
-    Constant("ripple_slope", "1", "T_s, mean current before the sample", 0.3, hook="hold"),
-    # between -1/24 and 1/12, as the log samples between two changes of the voltage or at them
-    Constant("ripple_mean", "1", "(ω_e T_s)² ψ/L, ripple of the current", 0.04, 0.02, hook="hold"),
-    Constant(
-        "ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", 0.08, hook="hold"
-    ),
-    Constant("ripple_shift", "1", "T_s dω_e/dt ψ, angle against voltage", 0.15, hook="hold"),
-    Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", 0.3, hook="hold"),
-    Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", 0.08, hook="hold"),
+    Constant("ripple_slope", "1", "T_s, mean current before the sample", hook="hold"),
+    Constant("ripple_mean", "1", "(ω_e T_s)² ψ/L, ripple of the current", 0.02, hook="hold"),
+    Constant("ripple_edge", "1", "(ω_e T_s)² of the voltage, what a mean misses", hook="hold"),
+    Constant("ripple_shift", "1", "T_s dω_e/dt ψ, angle against voltage", hook="hold"),
+    Constant("ripple_torque", "1", "T_s di/dt of the current in the torque", hook="hold"),
+    Constant("ripple_held", "1", "(ω_e T_s)², ripple in a held shaft's torque", hook="hold"),
     Constant("bench_angle_rad", "rad", "electrical zero of the bench's encoder", hook="bench"),
-    # a few milliohm of switches and leads beside a winding of one ohm
-    Constant("lead_share", "1", "resistance of inverter and leads over the phase's", 5e-3),
-    # half a step of a 12-bit converter of twice the current, and a milliradian: what is beyond is
-    # an effect's to name, whose negligible sizes these are
-    Constant("zero_alpha_a", "A", "α offset of the shunts", 5e-4, hook="state", scale="current_a"),
-    Constant("zero_beta_a", "A", "β offset of the shunts", 5e-4, hook="state", scale="current_a"),
-    Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", 1e-3, hook="state"),
-    Constant("gain_current", "1", "gain of the drive's current sensors", 0.01, hook="gain"),
-    Constant("gain_current_bench", "1", "gain of the bench's ammeter", 0.01, hook="gain"),
-    Constant("gain_voltage", "1", "gain of the bench's voltmeters", 0.01, hook="gain"),
-    Constant("gain_commanded", "1", "gain of a drive's own voltage", 0.01, hook="gain"),
-    Constant("gain_torque", "1", "gain of the torque transducer", 0.01, hook="gain"),
-    Constant("gain_lcr", "1", "gain of the LCR meter", 0.01, hook="gain"),
-    Constant("gain_clock", "1", "recorded time over true time, less one", 1e-4, hook="gain"),
-    Constant("offset_temp_k", "K", "offset of the thermometers", 2.0, hook="gain"),
-    # most motors on a bench lie within twice that of their surroundings
-    # of a third of the current along d, of a field a fifth of the magnet's, of axes a third apart
-    Constant("unlogged_d_share", "1", "reluctance torque of an unlogged i_d", 0.02, hook="gain"),
-    Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", 20.0, hook="gain"),
-    Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", 20.0, hook="gain"),
+    Constant("lead_share", "1", "resistance of inverter and leads over the phase's"),
+    Constant("zero_alpha_a", "A", "α offset of the shunts", hook="state", scale="current_a"),
+    Constant("zero_beta_a", "A", "β offset of the shunts", hook="state", scale="current_a"),
+    Constant("zero_angle_rad", "rad", "electrical zero of the drive's encoder", hook="state"),
+    Constant("gain_current", "1", "gain of the drive's current sensors", hook="gain"),
+    Constant("gain_current_bench", "1", "gain of the bench's ammeter", hook="gain"),
+    Constant("gain_voltage", "1", "gain of the bench's voltmeters", hook="gain"),
+    Constant("gain_commanded", "1", "gain of a drive's own voltage", hook="gain"),
+    Constant("gain_torque", "1", "gain of the torque transducer", hook="gain"),
+    Constant("gain_lcr", "1", "gain of the LCR meter", hook="gain"),
+    Constant("gain_clock", "1", "recorded time over true time, less one", hook="gain"),
+    Constant("offset_temp_k", "K", "offset of the thermometers", hook="gain"),
+    Constant("unlogged_d_share", "1", "reluctance torque of an unlogged i_d", hook="gain"),
+    Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", hook="gain"),
+    Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", hook="gain"),
 )
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
@@ -103,19 +92,20 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
     known = {constant.name for constant in BASE}
     further = sorted(set(machine.stated_u) - known)
     words = "gain of a further instrument"
-    return (*BASE, *(Constant(name, "1", words, 0.01, hook="gain") for name in further))
+    return (*BASE, *(Constant(name, "1", words, hook="gain") for name in further))
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A machine, its base constants and effects; parameters are addressed `effect.parameter`.
-
-    `policy` is what a fit of the model, and what is concluded from it, goes by.
-    """
+    """A machine, its base constants and effects; parameters are addressed `effect.parameter`."""
 
     machine: Machine
     effects: tuple[Effect, ...]
-    policy: Policy = DEFAULT
+
+    @property
+    def policy(self) -> Policy:
+        """What a fit of the model, and what is concluded from it, goes by."""
+        return self.machine.policy
 
     def parameters(self) -> dict[str, tuple[Effect, Parameter]]:
         """Every effect parameter by its full name, in order."""
@@ -131,9 +121,13 @@ class Model:
         somebody states of this motor.
         """
         stated = self.machine.stated_u
-        base = [c for c in base_of(self.machine) if c.prior != _FREE]
-        sizes = {"1": 1.0, **self.machine.scales}
-        own = {c.name: (c.center, stated.get(c.name, c.prior * sizes[c.scale])) for c in base}
+        sizes, known = {"1": 1.0, **self.machine.scales}, self.policy.priors
+        base = [(c, known.of(c.name)) for c in base_of(self.machine)]
+        own = {
+            c.name: (c.center, stated.get(c.name, u * sizes[c.scale]))
+            for c, u in base
+            if u is not None
+        }
         own |= {n: p.usual for n, (_, p) in self.parameters().items() if p.usual is not None}
         return own | self.stated()
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.criticism.policy.captures import Cutting, Priors, Tables
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.policy.regression import GaussNewton, Goodness, MainsHum, NoiseFloors
@@ -27,6 +28,9 @@ class Policy:
     discovery: Discovery = section(Discovery)
     validation: Validation = section(Validation)
     design: Design = section(Design)
+    cutting: Cutting = section(Cutting)
+    tables: Tables = section(Tables)
+    priors: Priors = section(Priors)
 
 
 DEFAULT = Policy()

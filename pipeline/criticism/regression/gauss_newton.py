@@ -153,7 +153,7 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
 
     """
     values = {**start_values(model, model.machine), **(known or {})}
-    few = tuple(sparse(segment) for segment in segments)
+    few = tuple(sparse(s, model.policy.cutting.rough_windows) for s in segments)
     rough = tuple(rough_floor(segment, model, values) for segment in few)
     near = gauss_newton(Fit(few, _pinned(model), values, rough, values)).fit
     return replace(near, model=model, segments=tuple(segments))

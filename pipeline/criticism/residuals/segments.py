@@ -17,9 +17,6 @@ from pipeline.criticism.library.equations import equations
 from pipeline.criticism.machine.model import UNLOGGED
 from pipeline.records.capture import Campaign, Capture
 
-_FEW = 12
-"""Windows of a segment in a rough fit: enough to meet a sound J to a tenth."""
-
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     """Every usable capture as a segment, in path order; a capture that lacks what its test's
@@ -84,17 +81,17 @@ def _by_encoder(segment: Segment, step: float) -> Segment:
     return replace(segment, sensors=replace(segment.sensors, angle_step_rad=step))
 
 
-def sparse(segment: Segment) -> Segment:
+def sparse(segment: Segment, windows: int) -> Segment:
     """The same segment with a few of its windows only, for a first, rough fit."""
     weak = segment.weak
-    if weak is None or weak.starts.size <= _FEW:
+    if weak is None or weak.starts.size <= windows:
         return segment
-    chosen = np.linspace(0, weak.starts.size - 1, _FEW).round().astype(np.int64)
+    chosen = np.linspace(0, weak.starts.size - 1, windows).round().astype(np.int64)
     starts = weak.starts[chosen]
     rows = starts[:, None] - PAD + np.arange(weak.length + 2 * PAD)[None, :]
     rows = np.clip(rows, 0, segment.size - 1).ravel()
     cut = {name: column[rows] for name, column in segment.recorded.items()}
-    moved = PAD + (weak.length + 2 * PAD) * np.arange(_FEW)
+    moved = PAD + (weak.length + 2 * PAD) * np.arange(windows)
     few = replace(weak, starts=moved, functions=weak.functions[chosen], valid=weak.valid[chosen])
     blocks = None if segment.blocks is None else segment.blocks[chosen]
     short = replace(segment, recorded=cut, weak=few, blocks=blocks)

@@ -23,17 +23,7 @@ from pipeline.criticism.effect import (
     between,
 )
 from pipeline.criticism.machine.model import UNLOGGED, Model, clock_gain, values_of
-
-_SPEED_S = 0.002
-"""Length of the mean that makes a speed of differenced angles [s]. By judgement: shorter, and the
-encoder's rounding is in drags of the speed; longer, and a reversal is blurred."""
-_SAME_RAD, _PARTS, _PART_RAD = 0.2, 8, 3.0
-"""What the highest order turns in a coasting sample that is as good as an instant; how many parts a
-longer one is averaged over at least, and what that wave may turn in one: the steps that stand for
-the triangle are wrong by a third of a percent of the wave at most."""
-_ANGLE_ROUNDS = 2
-"""Times that an angle error is looked up at the angle it gives: each round leaves of the error its
-own size times its order a turn."""
+from pipeline.criticism.policy.captures import Cutting
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +57,17 @@ def motion_of(
     if finer > 1:
         at = np.arange(theta.size * finer) / finer
         theta = np.interp(at, np.arange(theta.size), theta)
-    omega = _speed(theta, segment.ts_s, finer)
+    omega = _speed(theta, segment.ts_s, finer, machine.policy.cutting)
     return Motion(theta, omega, np.abs(omega) * machine.pole_pairs / (2 * math.pi))
 
 
 def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
     """How many points a sample the torque of a free shaft is averaged over."""
-    highest = max(*slow_orders(machine), 1)
+    highest, policy = max(*slow_orders(machine), 1), machine.policy.cutting
     turn = highest * float(np.abs(np.diff(segment.recorded["theta_mech_rad"])).max())
-    if turn < _SAME_RAD:
+    if turn < policy.instant_rad:
         return 1
-    return min(max(int(np.ceil(turn / _PART_RAD)), _PARTS), finest)
+    return min(max(int(np.ceil(turn / policy.part_rad)), policy.least_parts), finest)
 
 
 def operating(
@@ -121,11 +111,11 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
     if not zero and not any(effect.angle is not None for effect in model.effects):
         return x
     theta, current = x.theta_rad, x.id_a + 1j * x.iq_a
-    error = np.full(theta.size, zero)
-    for _ in range(_ANGLE_ROUNDS):
+    error, policy = np.full(theta.size, zero), model.policy.cutting
+    for _ in range(policy.angle_rounds):
         nearer = replace(x, theta_rad=theta - error / model.machine.pole_pairs)
         error = zero + angle_error(nearer, model, values)
-    turned = error / model.machine.pole_pairs
+    turned, finer = error / model.machine.pole_pairs, theta.size // segment.size
     ahead = np.exp(1j * error)
     current, volts = current * ahead, x.supply.volts_v
     return replace(
@@ -135,7 +125,7 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
         supply=x.supply if volts is None else replace(x.supply, volts_v=volts * ahead),
         eps_rad=x.eps_rad - error,
         theta_rad=theta - turned,
-        omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, theta.size // segment.size),
+        omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, finer, policy),
     )
 
 
@@ -170,8 +160,8 @@ def table_current(
     return true_current(recorded, segment.instrument.ammeter, model, values)
 
 
-def _speed(theta: Array, period: float, finer: int) -> Array:
-    width = max(2 * round(_SPEED_S / period / 2) + 1, 5) * finer
+def _speed(theta: Array, period: float, finer: int, policy: Cutting) -> Array:
+    width = max(2 * round(policy.speed_s / period / 2) + 1, 5) * finer
     return smoothed(np.gradient(theta, period / finer), width)
 
 

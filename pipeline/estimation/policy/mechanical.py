@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline.physics.conventions import UNLOGGED_D_SHARE
 from pipeline.records.policy import calibrated, chosen, derived
 
 TRIED = "the number halved and doubled"
@@ -116,8 +117,8 @@ class TorqueMap:
         why="Stribeck's, iron's or windage, where no speed is left over to test it",
     )  # fmt: skip
     unlogged_d_share: float = chosen(
-        0.02, unit="1", meaning="relative standard uncertainty of Kt where the d current was not "
-        "logged",
+        UNLOGGED_D_SHARE, unit="1", meaning="relative standard uncertainty of Kt where the d "
+        "current was not logged",
         why="a third of the current along d, where its field is a fifth of the magnet's and the "
         "axes' inductances differ by a third",
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline.physics.conventions import UNLOGGED_U_K
 from pipeline.records.policy import chosen, derived
 
 
@@ -150,7 +151,7 @@ class Magnet:
         source="SmCo loses less than half of what NdFeB does, ferrite 0.2 %",
     )  # fmt: skip
     unlogged_k: float = chosen(
-        20.0, unit="K", meaning="standard uncertainty of a temperature that was not logged",
+        UNLOGGED_U_K, unit="K", meaning="standard uncertainty of a temperature that was not logged",
         why="most motors on a bench lie within twice that of their surroundings",
     )  # fmt: skip
     elsewhere_k: float = chosen(

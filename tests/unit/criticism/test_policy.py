@@ -35,7 +35,9 @@ def test_a_fit_goes_by_it():
     near = fitted(segments)
     start = replace(near, values={**near.values, "psi_wb": 0.5 * near.values["psi_wb"]})
     plain = gauss_newton(start).fit
-    once = replace(start, model=replace(start.model, policy=policy_of(CHANGES)))
+    once = replace(
+        start, model=replace(start.model, machine=replace(machine(), policy=policy_of(CHANGES)))
+    )
     system = gauss_newton(once)
     stayed = system.fit
     assert stayed.values == start.values != plain.values

@@ -7,10 +7,13 @@ import pytest
 
 from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
 from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.goodness import signal_errors
 from pipeline.execution.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from tests.stories.fits import REAL, campaign, fit
+
+TABLES = DEFAULT.tables
 
 pytestmark = pytest.mark.skipif(not REAL.is_dir(), reason="shared real recordings are not here")
 IDEAL = ModelSpec("ideal")
@@ -102,15 +105,15 @@ def test_cross_saturation_is_named_after_saturation():
 
 def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
     captures = campaign("laas_solo").of("holding_current")
-    orders = holding_orders(captures, (12, 18))
+    orders = holding_orders(captures, (12, 18), TABLES)
     assert {12, 18, 24, 72} <= set(orders)
     assert len(orders) <= 10
-    assert sector_errors(captures, ())[0] == pytest.approx(0.138, abs=0.001)
-    assert sector_errors(captures, (72,)) == pytest.approx((0.048, 0.0486), abs=0.001)
-    fitted, held = sector_errors(captures, orders)
+    assert sector_errors(captures, (), TABLES)[0] == pytest.approx(0.138, abs=0.001)
+    assert sector_errors(captures, (72,), TABLES) == pytest.approx((0.048, 0.0486), abs=0.001)
+    fitted, held = sector_errors(captures, orders, TABLES)
     assert fitted < 0.0225
     assert held < 0.0235
-    fitted, held = sector_errors(captures, range(1, 160))
+    fitted, held = sector_errors(captures, range(1, 160), TABLES)
     assert fitted < 0.0185
     assert held > 0.14
 

@@ -10,9 +10,9 @@ import pytest
 from pipeline.criticism.data.segment import Sensors, projected, row_index, slow_orders
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.effect import ShaftState
-from pipeline.criticism.equations.free_shaft import _FINEST
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model, mean_current, zero
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linearise import effect_columns, linearise
 from pipeline.criticism.regression.noise_floors import Floor, noise_floor, reading_error
 from pipeline.criticism.residuals.residual import residual
@@ -268,7 +268,7 @@ def test_a_coasting_sample_is_averaged_over_parts_enough(turn_rad):
     order = max(slow_orders(machine()))
     theta = np.arange(40) * turn_rad / order
     segment = replace(coasting(), recorded={"theta_mech_rad": theta})
-    finer = finer_of(segment, machine(), _FINEST)
+    finer = finer_of(segment, machine(), DEFAULT.cutting.coast_parts)
     turned = np.arange(40 * finer) * turn_rad / order / finer
     x = replace(operating(), theta_rad=turned, inverter=False, shaft=ShaftState(finer=finer))
     mean = _averaged(x.shaft_waves(order)[0], finer)

@@ -13,6 +13,7 @@ from pipeline.criticism.data.traces import PAD, even_angle, reversals, travel
 from pipeline.criticism.effect import ShaftState
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine import two_masses
+from pipeline.criticism.policy.policy import DEFAULT
 from tests.unit.criticism.machines import BASE, operating
 
 LIBRARY = effects()
@@ -119,7 +120,7 @@ def smoothed(true):
     """What is taken for an angle that an encoder of 17 bits rounds, and its noise [rad]."""
     found = {"theta_mech_rad": np.round(true / STEP_RAD) * STEP_RAD}
     noise = {"theta_mech_rad": STEP_RAD / 12**0.5}
-    even_angle(found, noise, 400)
+    even_angle(found, noise, 400, DEFAULT.cutting)
     return found["theta_mech_rad"], noise["theta_mech_rad"]
 
 
