@@ -71,7 +71,7 @@ def _command(word: str) -> Command:
 def _run(command: Command, flags: Flags, words: Sequence[str]) -> Outcome:
     """One run of a command: its settings made, and its stage performed."""
     from pipeline.cli.configuration import load_settings, origin_text, settings_text
-    from pipeline.report.waiting import waiting
+    from pipeline.report.text.waiting import waiting
 
     settings = load_settings(command, words, flags.config_dir)
     if flags.cfg is not None:

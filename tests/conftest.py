@@ -29,7 +29,7 @@ def _in_this_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     """
     if request.node.get_closest_marker("workers") is not None:
         return
-    from pipeline.execution import pools
+    from pipeline.execution.workers import pools
 
     @contextmanager
     def threads(workers: int) -> Iterator[pools.Pool]:

@@ -14,9 +14,9 @@ from pipeline.api.fits import Fits, MotorFit
 from pipeline.api.models import model_spec
 from pipeline.api.options import check_options
 from pipeline.api.recordings import Options
-from pipeline.execution import work
+from pipeline.execution.caches.stamp import configuration_digest, stamp_of
 from pipeline.execution.jobs import MotorJob
-from pipeline.execution.stamp import configuration_digest, stamp_of
+from pipeline.execution.tasks import work
 from pipeline.io.storage.datasheets import read_datasheets
 from pipeline.io.storage.diagnoses import read_diagnoses
 from pipeline.io.storage.limits import limits_file, release_conditions

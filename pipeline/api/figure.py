@@ -8,7 +8,7 @@ from functools import cache
 from html import escape
 from pathlib import Path
 
-from pipeline.report.page import TEMPLATES
+from pipeline.report.pages.page import TEMPLATES
 
 
 @dataclass(frozen=True, slots=True, repr=False)

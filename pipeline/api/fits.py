@@ -121,7 +121,7 @@ class Fits(ByMotor[MotorFit]):
             If the estimator has no plot of this motor.
 
         """
-        from pipeline.report.chart import chart
+        from pipeline.report.charts.chart import chart
 
         motor_id = self.motor_or_first(motor)
         drawn = [e for e in self.motors[motor_id].evidence if e.estimator == estimator]

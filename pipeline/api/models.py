@@ -14,7 +14,7 @@ from pipeline.api.by_motor import ByMotor
 from pipeline.api.figure import Figure, figure
 from pipeline.api.options import check_constants
 from pipeline.api.recordings import Recordings, read
-from pipeline.execution.start import start_constants
+from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import Comparison, ModelSpec
 from pipeline.records.diagnosis import Diagnosis
@@ -140,7 +140,7 @@ class Comparisons(ByMotor[Comparison]):
             If the comparison has no such trace.
 
         """
-        from pipeline.report.chart import chart
+        from pipeline.report.charts.chart import chart
 
         motor_id = self.motor_or_first(motor)
         for one in self.motors[motor_id].traces:
@@ -216,7 +216,7 @@ class Diagnoses(ByMotor[Diagnosis]):
             One line a signal; 1 is the noise floor.
 
         """
-        from pipeline.report.rung_chart import rung_chart
+        from pipeline.report.charts.rung_chart import rung_chart
 
         motor_id = self.motor_or_first(motor)
         ladder = self.ladder.filter(pl.col("motor_id") == motor_id)

@@ -10,7 +10,7 @@ from typing import Any
 import polars as pl
 
 from pipeline.api import frames
-from pipeline.execution.captures import ReadTask, usable_captures
+from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry, survey

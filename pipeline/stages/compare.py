@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from pipeline.execution.page_links import links_of, relink
+from pipeline.execution.outputs.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.comparison import Comparison
 from pipeline.records.comparison_history import Earlier, document_of, history_of, with_latest
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
-from pipeline.report.comparison_text import comparison_text
+from pipeline.report.text.comparison_text import comparison_text
 from pipeline.settings import CompareSettings
-from pipeline.stages.criticism import Judged, Task, each_motor
+from pipeline.stages.steps.criticism import Judged, Task, each_motor
 
 
 def main(settings: CompareSettings) -> Outcome:
@@ -45,7 +45,7 @@ def _judge(task: Task) -> Judged:
 
 
 def _write_page(output: Path, result: Comparison) -> None:
-    from pipeline.report.comparison_page import render_comparison
+    from pipeline.report.pages.comparison_page import render_comparison
 
     stem = file_stem(result.motor_id)
     kept = output / "comparison" / "history" / f"{stem}.json"

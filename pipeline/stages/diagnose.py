@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.execution.page_links import links_of, relink
+from pipeline.execution.outputs.page_links import links_of, relink
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
-from pipeline.report.ladder_text import ladder_text
+from pipeline.report.text.ladder_text import ladder_text
 from pipeline.settings import DiagnoseSettings
-from pipeline.stages.criticism import Judged, Task, each_motor
+from pipeline.stages.steps.criticism import Judged, Task, each_motor
 
 
 def main(settings: DiagnoseSettings) -> Outcome:
@@ -37,7 +37,7 @@ def _judge(task: Task) -> Judged:
 
         with task.watch.stage("recording"):
             write_ladder_recording(result, output / "recordings" / f"ladder-{stem}.rrd")
-    from pipeline.report.ladder_page import render_ladder
+    from pipeline.report.pages.ladder_page import render_ladder
 
     with task.watch.stage("page"):
         links = links_of(output, "diagnosis/{}.html", result.motor_id)

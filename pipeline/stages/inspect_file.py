@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.execution.inspect_tasks import InspectTask, in_workers, look_into
+from pipeline.execution.tasks.inspect_tasks import InspectTask, in_workers, look_into
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.physics.glossary import TESTS
 from pipeline.records.errors import CaptureError, UsageError

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from pipeline.execution.inspect_tasks import InspectTask, Looked, in_workers, look_into
+from pipeline.execution.tasks.inspect_tasks import InspectTask, Looked, in_workers, look_into
 from pipeline.io.ingest.files import list_files, size_bytes
 from pipeline.io.ingest.guard import ReadLimits, died, reading
 from pipeline.io.ingest.metadata import MANIFEST, SIDECAR_SUFFIX
@@ -205,7 +205,7 @@ def _check(
     settings: InspectSettings, root: str, text: str, only: tuple[str, ...] | None
 ) -> Outcome:
     """Every capture read and validated through the map, and what it determines."""
-    from pipeline.stages.campaigns import campaigns
+    from pipeline.stages.steps.campaigns import campaigns
 
     with TemporaryDirectory() as place:
         source = settings.map or "auto"

@@ -16,7 +16,7 @@ from pipeline.records.datasheet import Datasheet
 from pipeline.records.errors import UsageError, meant
 from pipeline.records.outcome import Outcome
 from pipeline.settings import PlanSettings
-from pipeline.stages.campaigns import campaigns, outcome_of
+from pipeline.stages.steps.campaigns import campaigns, outcome_of
 
 # Relative standard uncertainties that a bench of calibrated instruments reaches.
 U_REL = 0.02

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime, time
 from typing import Literal
 
-from pipeline.execution.statuses import show_decision
+from pipeline.execution.outputs.statuses import show_decision
 from pipeline.io.registry.store import Registry, one_of
 from pipeline.lots.selector import OF_CONTENT, known, parse_selector
 from pipeline.records.current_status import status_of
@@ -16,7 +16,7 @@ from pipeline.records.errors import PipelineError, UsageError
 from pipeline.records.ledger import Selection, Version, histories, in_force, newest, select
 from pipeline.records.naming import counted
 from pipeline.records.outcome import Outcome
-from pipeline.report.registry_text import (
+from pipeline.report.text.registry_text import (
     datasheet_text,
     difference_text,
     in_force_table,

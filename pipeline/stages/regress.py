@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.estimation.registry import estimators
-from pipeline.execution.page_links import LOTS, links_of, relink_index
+from pipeline.execution.outputs.page_links import LOTS, links_of, relink_index
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.diagnoses import read_diagnoses
 from pipeline.io.storage.limits import limits_file, read_limits
@@ -19,11 +19,11 @@ from pipeline.records.errors import UsageError
 from pipeline.records.limits import Limits
 from pipeline.records.lot_regression import LotRegression
 from pipeline.records.outcome import Outcome
-from pipeline.report.junit import junit_xml
-from pipeline.report.lot_page import render_regression
-from pipeline.report.lot_text import regression_text
+from pipeline.report.pages.lot_page import render_regression
+from pipeline.report.text.junit import junit_xml
+from pipeline.report.text.lot_text import regression_text
 from pipeline.settings import RegressSettings
-from pipeline.stages.selection import Chosen, choose
+from pipeline.stages.steps.selection import Chosen, choose
 
 MODES = ("auto", "lots", "code")
 EXIT_CODES = {"pass": 0, "marginal": 0, "fail": 1}

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.execution.statuses import histories_of, status_now
+from pipeline.execution.outputs.statuses import histories_of, status_now
 from pipeline.io.recordings.readback import recording_property
 from pipeline.io.recordings.seal import verify
 from pipeline.io.recordings.viewer import (

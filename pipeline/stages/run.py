@@ -13,22 +13,22 @@ from typing import Any
 
 from pipeline.api.options import check_options
 from pipeline.criticism.policy.policy import policy_changes
+from pipeline.execution.caches.keys import batch_parts, key_of, motor_parts
+from pipeline.execution.caches.run_cache import Batch, RunCache
+from pipeline.execution.caches.stamp import configuration_digest
+from pipeline.execution.caches.versions import RUN, tools
 from pipeline.execution.jobs import MotorJob, MotorResult
-from pipeline.execution.keys import batch_parts, key_of, motor_parts
-from pipeline.execution.pools import Cluster, core_count, open_pool
-from pipeline.execution.publishing import (
+from pipeline.execution.outputs.publishing import (
     fleet_of,
     outcome_of,
     publish,
     removed_note,
     with_folder_names,
 )
-from pipeline.execution.run_cache import Batch, RunCache
-from pipeline.execution.stamp import configuration_digest
-from pipeline.execution.statuses import histories_of, with_current_statuses
-from pipeline.execution.survey_tasks import survey_with
-from pipeline.execution.versions import RUN, tools
-from pipeline.execution.worker_pool import WorkerPool
+from pipeline.execution.outputs.statuses import histories_of, with_current_statuses
+from pipeline.execution.tasks.survey_tasks import survey_with
+from pipeline.execution.workers.pools import Cluster, core_count, open_pool
+from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
@@ -45,8 +45,8 @@ from pipeline.records.finding import Finding
 from pipeline.records.ledger import Event, Revocation
 from pipeline.records.naming import printable
 from pipeline.records.outcome import Outcome, Stopwatch, first_that_applies
-from pipeline.report.progress import progress
-from pipeline.report.waiting import waiting
+from pipeline.report.text.progress import progress
+from pipeline.report.text.waiting import waiting
 from pipeline.settings import RunSettings
 
 PROGRESS = ".work"
@@ -89,7 +89,7 @@ def main(settings: RunSettings) -> Outcome:
         workers = WorkerPool(pool, settings.workers or core_count(), output / PROGRESS)
         stack.enter_context(workers)
         if settings.watch:
-            from pipeline.stages.watch import Watch
+            from pipeline.stages.steps.watch import Watch
 
             perform = partial(_run, settings, registry, workers)
             return Watch(settings, perform, stack.pop_all()).begin()
@@ -101,7 +101,7 @@ def main(settings: RunSettings) -> Outcome:
 
 def process_motor(job: MotorJob) -> MotorResult:
     """One motor, in a worker: what it needs is imported there and not in the driver."""
-    from pipeline.stages import motor
+    from pipeline.stages.steps import motor
 
     return motor.process_motor(job)
 

@@ -13,7 +13,7 @@ from pipeline.io.maps.keys import SCHEMA_ID, keys_page, map_schema
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import UsageError
 from pipeline.records.outcome import Outcome
-from pipeline.report.policy_page import policy_page
+from pipeline.report.pages.policy_page import policy_page
 from pipeline.settings import Settings
 
 SCHEMA_FOLDER = "pipeline/contracts/json"

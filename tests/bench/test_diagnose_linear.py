@@ -14,7 +14,7 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.stages.campaigns import campaigns
+from pipeline.stages.steps.campaigns import campaigns
 
 RIG = Path(__file__).parents[3] / "shared" / "data" / "rig"
 pytestmark = pytest.mark.skipif(not RIG.is_dir(), reason="shared rig captures are not here")

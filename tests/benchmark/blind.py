@@ -22,7 +22,7 @@ Diagnose = Callable[[Campaign, str], dict[str, Any]]
 def product(campaign: Campaign, model: str, policy: Overrides = ()) -> dict[str, Any]:
     """What `python -m pipeline diagnose` writes for a campaign; `policy` overrides some numbers."""
     from pipeline.criticism.diagnosis import diagnose
-    from pipeline.execution.start import start_constants
+    from pipeline.execution.tasks.start import start_constants
     from pipeline.records.comparison import ModelSpec
 
     document: dict[str, Any] = diagnose(

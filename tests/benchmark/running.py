@@ -18,7 +18,7 @@ from tests.benchmark.cases import Case, case_from
 from tests.benchmark.sealing import blind_campaign
 
 HERE = Path(__file__).parent
-JUDGED = ("pipeline.criticism.diagnosis", "pipeline.execution.start")
+JUDGED = ("pipeline.criticism.diagnosis", "pipeline.execution.tasks.start")
 SIMULATED = ("pipeline.simulator.bench", "pipeline.simulator.outside")
 RECORDED = ("bench.py", "corruption.py", "sealing.py")
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.execution.worker_pool import WorkerPool
+from pipeline.execution.workers.worker_pool import WorkerPool
 
 HEAD = "# contract: 1\n# motor_id: J/1\n# test: resistance\n# pair: ab\n# station: hall\n# lot: 7\n"
 LEVELS = [-2.0, -1.0, 1.0, 2.0]

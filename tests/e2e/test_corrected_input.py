@@ -15,10 +15,10 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.estimation import registry as fit_registry
-from pipeline.execution import keys
+from pipeline.execution.caches import keys
 from pipeline.io.registry.store import Registry
 from pipeline.settings import configuration_folder
-from pipeline.stages import motor
+from pipeline.stages.steps import motor
 from tests.registered import NOON
 
 KT_NM_A = 0.748

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.execution import fits
-from pipeline.execution.worker_pool import WorkerPool
+from pipeline.execution.caches import fits
+from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.stages import run
 
 WORDS = ("report=true", "recordings=false", "diagnose=false")

@@ -20,7 +20,7 @@ from pipeline.records.constants import Constants
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.design import Bench
 from pipeline.simulator.truth import truth
-from pipeline.stages.campaigns import campaigns
+from pipeline.stages.steps.campaigns import campaigns
 from tests.simulated import campaign_of, design
 
 P0 = Path(__file__).parents[3] / "shared" / "data" / "rig" / "P0"

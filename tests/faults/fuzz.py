@@ -23,7 +23,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.contracts.motor import agree
-from pipeline.execution.captures import ReadTask, usable_captures
+from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.capture_reader import read_capture, survey
 from pipeline.io.ingest.guard import READER_FAILED, ReadLimits
 from pipeline.io.maps.source_map import SourceMap, load_source_maps

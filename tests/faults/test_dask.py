@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.__main__ import main
-from pipeline.execution.pools import Cluster, open_pool
+from pipeline.execution.workers.pools import Cluster, open_pool
 from pipeline.records.errors import UsageError
 from tests.faults.fleet import ROOT, command, family, make_fleet, simulated
 from tests.faults.kills import results

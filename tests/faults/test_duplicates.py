@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.contracts.duplicates import CODE, once
 from pipeline.estimation.registry import fit_all
-from pipeline.execution.captures import ReadTask, usable_captures
+from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import survey
 from pipeline.records.capture import Campaign, Capture, CaptureMeta

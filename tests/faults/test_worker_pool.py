@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.execution.pools import Pool, local_pool
-from pipeline.execution.worker_pool import WorkerPool
+from pipeline.execution.workers.pools import Pool, local_pool
+from pipeline.execution.workers.worker_pool import WorkerPool
 from pipeline.io.ingest.guard import ReadLimits, reading
 from pipeline.records.errors import CaptureError, MachineError
 

@@ -73,7 +73,7 @@ def test_other_seeds_are_another_block():
         ("pipeline.simulator.sensors", set(CASES)),
         ("pipeline.records.estimate", set(CASES)),
         ("tests.recovery.harness", set(CASES)),
-        ("pipeline.report.chart", set()),
+        ("pipeline.report.charts.chart", set()),
     ],
 )
 def test_a_change_reaches_the_cases_that_run_through_it(

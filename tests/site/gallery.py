@@ -19,7 +19,7 @@ from pipeline.api.figure import Figure, figure
 from pipeline.api.simulated import single
 from pipeline.criticism.effect import Effect
 from pipeline.records.evidence import Evidence, Series
-from pipeline.report.chart import chart
+from pipeline.report.charts.chart import chart
 from pipeline.settings import SimulateSettings
 from pipeline.simulator.bench import CAMPAIGN, campaign
 from pipeline.simulator.catalogue import with_effects

@@ -18,10 +18,10 @@ from pipeline.criticism.residuals.residual import measured, residual
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.execution.start import start_constants
+from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
-from pipeline.stages.campaigns import campaigns
+from pipeline.stages.steps.campaigns import campaigns
 
 REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
 

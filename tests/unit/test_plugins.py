@@ -160,5 +160,5 @@ def test_what_is_kept_hangs_on_the_sources_of_outside_plug_ins(tmp_path: Path) -
     after = python(tmp_path, "-c", code).stdout
     assert after != before
     assert python(ROOT, "-c", code).stdout == "\n"
-    whole = "from pipeline.execution.versions import datasheet_libraries as v; print(v())"
+    whole = "from pipeline.execution.caches.versions import datasheet_libraries as v; print(v())"
     assert after.strip() in python(tmp_path, "-c", whole).stdout

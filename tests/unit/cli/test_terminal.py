@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.report.waiting import AFTER_S, waiting
+from pipeline.report.text.waiting import AFTER_S, waiting
 
 pty = pytest.importorskip("pty", reason="there are no pseudo terminals here")
 ROOT = Path(__file__).parents[3]

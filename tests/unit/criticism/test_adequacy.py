@@ -18,7 +18,7 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.diagnosis import Unexcited
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
-from pipeline.stages.campaigns import campaigns
+from pipeline.stages.steps.campaigns import campaigns
 
 DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
 STANDARD, COGGING = ModelSpec("standard"), ModelSpec("standard", ("cogging",))

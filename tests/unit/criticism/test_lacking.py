@@ -13,11 +13,11 @@ from pipeline.criticism.comparison import compare
 from pipeline.criticism.data.machine_scale import PAIRLESS, machine_of, pole_pairs_of
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.residuals.segments import segments
-from pipeline.execution.start import start_constants
+from pipeline.execution.tasks.start import start_constants
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.stages.campaigns import campaigns
+from pipeline.stages.steps.campaigns import campaigns
 
 DEMO = Path(__file__).parents[3] / "data" / "demo" / "G52-0601"
 STANDARD = ModelSpec("standard")

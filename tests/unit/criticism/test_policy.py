@@ -11,13 +11,13 @@ from pipeline.criticism.library.named_models import model_of
 from pipeline.criticism.policy.policy import DEFAULT, policy_changes, policy_of
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import linear_system
-from pipeline.execution.keys import key_of, model_parts
+from pipeline.execution.caches.keys import key_of, model_parts
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
 from pipeline.records.policy import policy_digest
 from pipeline.settings import DiagnoseSettings, ModelSettings
-from pipeline.stages.criticism import Judged, each_motor
+from pipeline.stages.steps.criticism import Judged, each_motor
 from tests.unit.criticism.machines import fitted, log, machine
 
 CHANGES = policy_changes({"selection": {"tie": 9.0}, "fit": {"settled": 0.1, "converged": 1e12}})

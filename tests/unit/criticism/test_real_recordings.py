@@ -9,7 +9,7 @@ from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.goodness import signal_errors
-from pipeline.execution.start import start_constants
+from pipeline.execution.tasks.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from tests.stories.fits import REAL, campaign, fit
 

@@ -11,7 +11,7 @@ from pipeline.criticism.comparison import compare
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.stages.campaigns import campaigns
+from pipeline.stages.steps.campaigns import campaigns
 
 RIG = Path(__file__).parents[4] / "shared" / "data" / "rig"
 pytestmark = pytest.mark.skipif(not RIG.is_dir(), reason="shared rig captures are not here")

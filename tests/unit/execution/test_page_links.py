@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.execution.page_links import INDEX, LOTS, links_of, relink, relink_index
-from pipeline.report.fleet_page import render_fleet
-from pipeline.report.ladder_page import render_ladder
-from pipeline.report.motor_page import render_motor
+from pipeline.execution.outputs.page_links import INDEX, LOTS, links_of, relink, relink_index
+from pipeline.report.pages.fleet_page import render_fleet
+from pipeline.report.pages.ladder_page import render_ladder
+from pipeline.report.pages.motor_page import render_motor
 from tests.unit.ladders import make_diagnosis
 from tests.unit.report.conftest import make_datasheet
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import pipeline
-from pipeline.execution.versions import RUN, SURVEY, WORK
+from pipeline.execution.caches.versions import RUN, SURVEY, WORK
 from pipeline.io.storage import code_version
 from pipeline.io.storage.code_version import DISTRIBUTIONS, Code, installed, own_code
 from pipeline.io.storage.syntax import syntax_of
@@ -330,11 +330,11 @@ def test_of_the_package_what_a_datasheet_hangs_on_changes_its_version(tmp_path: 
     edit("simulator/plant.py", "\n\n", "\n\nMORE = 1\n")
     edit("lots/capability.py", "\n\n", "\n\nMORE = 1\n")
     assert versions() == (work, everything), "a run simulates nothing and judges no lot"
-    edit("report/templates/style.css", "{", "{ ")
+    edit("report/pages/templates/style.css", "{", "{ ")
     assert versions()[0] == work
     assert versions()[1] != everything
     everything = versions()[1]
-    edit("report/axis.py", "\n\n\n", "\n\nMORE = 1\n\n\n")
+    edit("report/charts/axis.py", "\n\n\n", "\n\nMORE = 1\n\n\n")
     assert (versions()[0] == work, versions()[1] == everything) == (True, False)
     edit("records/estimate.py", "MOST = 1e150", "MOST = 1e151")
     assert versions()[0] != work

@@ -14,7 +14,7 @@ from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.records.capture import Campaign, Capture, CaptureMeta, Mask
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.finding import Finding
-from pipeline.stages.replay import replay
+from pipeline.stages.steps.replay import replay
 from tests.unit.stages.test_replay import make_sheet
 
 NAN = float("nan")

@@ -13,9 +13,9 @@ from pipeline.lots.regression import compare_lots
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.limits import Amount, ConstantLimits, Limits
 from pipeline.records.lot_regression import regression_of
-from pipeline.report.junit import junit_xml
-from pipeline.report.lot_page import render_regression
-from pipeline.report.lot_text import regression_text
+from pipeline.report.pages.lot_page import render_regression
+from pipeline.report.text.junit import junit_xml
+from pipeline.report.text.lot_text import regression_text
 from tests.unit.lots import production as line
 
 NAMES = ("psi_pm_wb", "pole_pairs", "resistance_imbalance")

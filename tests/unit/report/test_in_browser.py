@@ -18,12 +18,12 @@ from pipeline.performance.derive import performance_of
 from pipeline.records.comparison_history import Earlier
 from pipeline.records.diagnosis import Diagnosis
 from pipeline.records.performance import Operation, Performance
-from pipeline.report.comparison_page import render_comparison
-from pipeline.report.fleet_page import render_fleet
-from pipeline.report.ladder_page import render_ladder
-from pipeline.report.lot_page import render_regression
-from pipeline.report.motor_page import render_motor
-from pipeline.report.sheet_page import render_sheet
+from pipeline.report.pages.comparison_page import render_comparison
+from pipeline.report.pages.fleet_page import render_fleet
+from pipeline.report.pages.ladder_page import render_ladder
+from pipeline.report.pages.lot_page import render_regression
+from pipeline.report.pages.motor_page import render_motor
+from pipeline.report.pages.sheet_page import render_sheet
 from tests.unit.ladders import make_diagnosis, make_rung
 from tests.unit.performance.constants import salient
 from tests.unit.performance.sheets import sheet_of

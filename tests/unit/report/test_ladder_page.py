@@ -12,11 +12,11 @@ import pytest
 
 from pipeline.records.comparison import Comparison, Dependence, Move, SignalError
 from pipeline.records.diagnosis import LadderRung, Remainder, Unexcited
-from pipeline.report.comparison_text import comparison_text
-from pipeline.report.curve_chart import curve_chart
-from pipeline.report.heatmap import angle_bars, colour, heatmap
-from pipeline.report.ladder_page import render_ladder
-from pipeline.report.rung_chart import rung_chart
+from pipeline.report.charts.curve_chart import curve_chart
+from pipeline.report.charts.heatmap import angle_bars, colour, heatmap
+from pipeline.report.charts.rung_chart import rung_chart
+from pipeline.report.pages.ladder_page import render_ladder
+from pipeline.report.text.comparison_text import comparison_text
 from pipeline.views.notes import shown_and_folded
 from tests.unit.ladders import make_diagnosis, make_map, make_turn
 

@@ -11,10 +11,10 @@ from pipeline.records.current_status import current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.ledger import histories
 from pipeline.records.model_verdict import Excess, ModelVerdict
-from pipeline.report.console import summary
-from pipeline.report.fleet_page import render_fleet
-from pipeline.report.motor_page import render_motor
-from pipeline.report.status_block import END, with_status
+from pipeline.report.pages.fleet_page import render_fleet
+from pipeline.report.pages.motor_page import render_motor
+from pipeline.report.pages.status_block import END, with_status
+from pipeline.report.text.console import summary
 from tests.unit.records.test_current_status import event, events
 
 WORST = Excess("drive_0.mcap", "vd_v", 0, 76.3, 0.9, "V")

@@ -16,8 +16,8 @@ from pipeline.records.estimate import Estimate, not_identifiable
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
-from pipeline.report.fleet_page import page_of, render_fleet
-from pipeline.report.motor_page import render_motor
+from pipeline.report.pages.fleet_page import page_of, render_fleet
+from pipeline.report.pages.motor_page import render_motor
 from pipeline.views.conditions import conditions
 from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
 from pipeline.views.motor import kind_of, parts_of

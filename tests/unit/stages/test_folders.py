@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import pipeline.stages.criticism as criticism_stage
+import pipeline.stages.steps.criticism as criticism_stage
 from pipeline.__main__ import main
 
 NOBODYS = "# contract: 1\n# test: spin_down\nt_s,omega_mech_rad_s\n0,1\n1,2\n"

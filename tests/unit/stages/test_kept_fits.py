@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 
 from pipeline.estimation.protocol import Fit
-from pipeline.execution.fits import _decoded, _encoded
+from pipeline.execution.caches.fits import _decoded, _encoded
 from pipeline.records.estimate import Estimate, Order
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.uncertainty import type_b

@@ -30,7 +30,7 @@ from pipeline.physics.glossary import COLUMNS, METADATA
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.content import content_digest
 from pipeline.records.errors import CaptureError, UsageError
-from pipeline.stages import motor
+from pipeline.stages.steps import motor
 from tests.changes import changes
 from tests.unit.io.recordings import json_messages, mcap_file
 

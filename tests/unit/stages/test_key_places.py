@@ -12,9 +12,9 @@ from pipeline.contracts.registry import gates
 from pipeline.crosscheck.registry import rules
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.registry import estimators
-from pipeline.execution import fits, keys, run_cache
+from pipeline.execution.caches import fits, keys, run_cache
 from pipeline.execution.jobs import MotorJob
-from pipeline.execution.work import Stamp
+from pipeline.execution.tasks.work import Stamp
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Question, Survey, look, survey
 from pipeline.io.maps.source_map import FieldMap, SourceMap

@@ -15,7 +15,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.execution import keys
+from pipeline.execution.caches import keys
 from pipeline.execution.jobs import MotorJob
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Entry, Question, Survey

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from pipeline.criticism import adequacy
+from pipeline.execution.caches.model_memory import ModelMemory
 from pipeline.execution.jobs import MotorJob
-from pipeline.execution.model_memory import ModelMemory
-from pipeline.execution.model_tests import judged_model
-from pipeline.execution.work import Stamp
+from pipeline.execution.tasks.model_tests import judged_model
+from pipeline.execution.tasks.work import Stamp
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants

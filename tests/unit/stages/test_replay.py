@@ -12,7 +12,7 @@ from pipeline.physics.machine import DqMeans, air_gap_torque, dq_voltages
 from pipeline.records.capture import Capture, CaptureMeta
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
-from pipeline.stages.replay import replay
+from pipeline.stages.steps.replay import replay
 
 CONSTANTS = {
     "pole_pairs": (4.0, "1"),

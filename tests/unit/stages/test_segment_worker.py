@@ -17,8 +17,8 @@ from pipeline.criticism.machine.model import Model, zero
 from pipeline.criticism.regression.noise_floors import form_tolerance, noise_floor
 from pipeline.criticism.regression.parallel import by_threads, on_each
 from pipeline.criticism.residuals.segments import segments
-from pipeline.execution.pools import core_count
-from pipeline.execution.segment_worker import halves, segment_worker
+from pipeline.execution.workers.pools import core_count
+from pipeline.execution.workers.segment_worker import halves, segment_worker
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from tests.unit.criticism.machines import BASE, machine
 

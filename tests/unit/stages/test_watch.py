@@ -13,8 +13,9 @@ from pipeline.io.ingest.arrivals import Arrivals, snapshot
 from pipeline.records.errors import MachineError, UsageError
 from pipeline.records.outcome import Outcome
 from pipeline.settings import RunSettings
-from pipeline.stages import run, watch
-from pipeline.stages.watch import Watch
+from pipeline.stages import run
+from pipeline.stages.steps import watch
+from pipeline.stages.steps.watch import Watch
 
 
 def test_a_folder_is_due_once_it_rests_and_not_again() -> None:

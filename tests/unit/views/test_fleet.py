@@ -11,8 +11,8 @@ import pytest
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import not_identifiable
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
-from pipeline.report.console import summary
-from pipeline.report.fleet_page import render_fleet
+from pipeline.report.pages.fleet_page import render_fleet
+from pipeline.report.text.console import summary
 from pipeline.views.fleet import fleet_view, floors_of
 from pipeline.views.table_text import blocks, table
 from pipeline.views.tables import constants_frame, fleet_files

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Separation
-from pipeline.report.ladder_text import ladder_text
+from pipeline.report.text.ladder_text import ladder_text
 from pipeline.views.ladder import headline, ladder_view, mapped_signals, shown_signals
 from tests.unit.ladders import make_diagnosis, make_rung
 

@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.io.recordings.lots_page import verdict_markdown
 from pipeline.records.lot_constant import ConstantResult
-from pipeline.report.lot_page import render_regression
-from pipeline.report.lot_text import regression_text
+from pipeline.report.pages.lot_page import render_regression
+from pipeline.report.text.lot_text import regression_text
 from pipeline.views.lots import change_text, compared, lot_view
 from tests.unit.regressions import make_constant, make_regression
 

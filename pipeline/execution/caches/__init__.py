@@ -1,0 +1,1 @@
+"""What is kept between runs, and the keys and versions that it is kept by."""

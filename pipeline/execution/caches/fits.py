@@ -1,0 +1,179 @@
+"""A cache of the fits of one motor.
+
+A fit depends on the code of the estimator's file and of everything that it imports, on its options,
+on the captures as read and validated (every number, name, mask and entry of metadata), and on the
+constants that the estimator declares to use. A changed estimator is fitted again. Estimators that
+use its constants follow only if these have changed. Whatever changes what is read (a unit in a
+source map, a sidecar, a gate's limit) changes the captures, and so the fits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.estimation.registry import homes
+from pipeline.execution.caches.keys import fit_parts, key_of
+from pipeline.execution.caches.run_cache import FOLDER
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.tasks.work import Stamp
+from pipeline.io.storage.code_version import closure_digest, libraries_version
+from pipeline.io.storage.publish import write_whole
+from pipeline.records.constants import Constants
+from pipeline.records.errors import PipelineError
+from pipeline.records.estimate import Estimate, Order
+from pipeline.records.evidence import Evidence, Series
+from pipeline.records.naming import file_stem
+from pipeline.records.uncertainty import Contribution
+
+_MAX_BYTES = 2**30
+
+
+class FitMemory:
+    """The cached fits of one motor, in one file."""
+
+    def __init__(self, job: MotorJob, stamp: Stamp) -> None:
+        """`stamp` is of the new datasheet; fits of a revoked version are not used."""
+        self._path = Path(job.output) / FOLDER / "fits" / f"{file_stem(job.motor_id)}.fits"
+        self._kept = _load(self._path)
+        self._homes = homes()
+        self._used: dict[str, tuple[str, bytes, bytes]] = {}
+        self._campaign = stamp.campaign
+        self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
+
+    def __call__(
+        self,
+        estimator: Estimator,
+        known: Constants,
+        options: Mapping[str, float],
+        fit: Callable[[], Fit],
+    ) -> Fit:
+        """The cached fit, or a new one."""
+        home = self._homes.get(estimator.name, estimator.fit.__module__)
+        key = key_of(
+            fit_parts(
+                closure_digest(home),
+                libraries_version(home),
+                self._campaign,
+                options,
+                known.estimates,
+                self._revoked,
+            )
+        )
+        kept = self._kept.get(estimator.name)
+        if kept is not None and kept[0] == key:
+            self._used[estimator.name] = kept
+            return _decoded(kept[1], kept[2])
+        text, data = _encoded(fit())
+        self._used[estimator.name] = key, text, data
+        # decoded as from the cache, so that its users see the same numbers in the next run
+        return _decoded(text, data)
+
+    def save(self) -> None:
+        """Stores the fits of this campaign; a place that cannot be written is no failure."""
+        if self._used == self._kept:
+            return
+        with suppress(PipelineError):
+            write_whole(self._path, _checksummed(self._used))
+
+
+def _checksummed(fits: Mapping[str, tuple[str, bytes, bytes]]) -> bytes:
+    head = [[name, key, len(text), len(data)] for name, (key, text, data) in sorted(fits.items())]
+    parts = [json.dumps(head).encode() + b"\n"]
+    for _, (_, text, data) in sorted(fits.items()):
+        parts += [text, data]
+    body = b"".join(parts)
+    return hashlib.sha256(body).hexdigest().encode() + b"\n" + body
+
+
+def _load(path: Path) -> dict[str, tuple[str, bytes, bytes]]:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            return {}
+        digest, _, body = path.read_bytes().partition(b"\n")
+    except OSError:
+        return {}
+    if hashlib.sha256(body).hexdigest().encode() != digest:
+        return {}
+    head, _, rest = body.partition(b"\n")
+    found, at = {}, 0
+    for name, key, text, data in json.loads(head):
+        found[name] = (key, rest[at : at + text], rest[at + text : at + text + data])
+        at += text + data
+    return found
+
+
+def _encoded(fit: Fit) -> tuple[bytes, bytes]:
+    """A fit as JSON, and the bytes of its arrays, whose shapes are in the JSON."""
+    arrays: list[bytes] = []
+
+    def array(values: NDArray[Any]) -> list[Any]:
+        arrays.append(np.ascontiguousarray(values).tobytes())
+        return [values.dtype.str, list(values.shape)]
+
+    document = {
+        "estimates": [asdict(estimate) for estimate in fit.estimates],
+        "evidence": [
+            {f.name: getattr(e, f.name) for f in fields(e) if f.name != "series"}
+            | {
+                "series": [
+                    [s.label, array(s.x), array(s.measured), array(s.fitted)] for s in e.series
+                ]
+            }
+            for e in fit.evidence
+        ],
+    }
+    return json.dumps(document, default=_plain).encode(), b"".join(arrays)
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy as one of Python's; raises TypeError for anything else."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def _decoded(text: bytes, data: bytes) -> Fit:
+    document = json.loads(text)
+    at = 0
+
+    def array(form: Sequence[Any]) -> NDArray[Any]:
+        nonlocal at
+        dtype, shape = np.dtype(form[0]), tuple(form[1])
+        values = np.frombuffer(data, dtype, int(np.prod(shape)), at).reshape(shape).copy()
+        at += values.nbytes
+        return values
+
+    estimates = tuple(_estimate(stored) for stored in document["estimates"])
+    evidence = tuple(
+        Evidence(
+            **stored
+            | {
+                "series": tuple(
+                    Series(label, array(x), array(measured), array(fitted))
+                    for label, x, measured, fitted in stored["series"]
+                )
+            }
+        )
+        for stored in document["evidence"]
+    )
+    return Fit(estimates, evidence)
+
+
+def _estimate(stored: Mapping[str, Any]) -> Estimate:
+    bounds = stored["bounds"]
+    values: dict[str, Any] = dict(stored)
+    values["budget"] = tuple(Contribution(**part) for part in stored["budget"])
+    values["captures"] = tuple(stored["captures"])
+    values["orders"] = tuple(Order(**order) for order in stored["orders"])
+    values["bounds"] = None if bounds is None else (bounds[0], bounds[1])
+    return Estimate(**values)

@@ -1,0 +1,50 @@
+"""A cache of verdicts of the residual test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.execution.caches.keys import key_of, model_parts
+from pipeline.execution.caches.run_cache import FOLDER
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.tasks.work import Stamp
+from pipeline.io.storage.code_version import closure_digest, libraries_version
+from pipeline.io.storage.sealed import keep_sealed, read_sealed
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.model_verdict import ModelVerdict
+from pipeline.records.naming import file_stem
+
+TEST = "pipeline.execution.tasks.model_tests"
+"""The module that runs the test; its imports include the effects."""
+
+
+class ModelMemory:
+    """The cached verdict on one motor's model, in one file."""
+
+    def __init__(self, job: MotorJob, stamp: Stamp) -> None:
+        """`stamp` is of the new datasheet; a verdict of a revoked version is not used."""
+        self._path = Path(job.output) / FOLDER / "models" / f"{file_stem(job.motor_id)}.json"
+        self._campaign = stamp.campaign
+        self._search = job.diagnose != "false"
+        self._revoked = [revoked for revoked in job.revoked if revoked.version == stamp.version]
+
+    def key(self, model: ModelSpec, start: Constants) -> str:
+        """The key of everything that the verdict depends on."""
+        code, libraries = closure_digest(TEST), libraries_version(TEST)
+        known = start.estimates
+        search, revoked = self._search, self._revoked
+        return key_of(
+            model_parts(code, libraries, self._campaign, model, known, revoked, search=search)
+        )
+
+    def recall(self, key: str) -> ModelVerdict | None:
+        """The cached verdict of this key, else None."""
+        entry = read_sealed(self._path)
+        if entry is None or entry["key"] != key:
+            return None
+        return ModelVerdict.of(entry["model"])
+
+    def keep(self, key: str, found: ModelVerdict) -> None:
+        """Stores a verdict; a place that cannot be written is no failure."""
+        keep_sealed(self._path, {"key": key, "model": found.document()})

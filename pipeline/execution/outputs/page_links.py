@@ -1,0 +1,105 @@
+"""Links between the pages of an output folder: those to files that are there.
+
+Which pages there are depends on the commands that were given, in any order; each that writes a page
+brings the links of its motor's other pages up to date.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection
+from pathlib import Path
+from urllib.parse import quote
+
+from pipeline.execution.caches.run_cache import note_files
+from pipeline.io.storage.publish import write_whole
+from pipeline.records.naming import file_stem
+from pipeline.report.pages.link_block import Link, with_links
+
+INDEX, LOTS = "report/index.html", "regression/report.html"
+MOTOR = "report/{}.html"
+_DATASHEET = ("Datasheet", MOTOR)
+_DIAGNOSIS = ("Diagnosis", "diagnosis/{}.html")
+_COMPARISON = ("Comparison", "comparison/{}.html")
+_LOTS = ("Lots", LOTS)
+_OF_PAGE = {
+    MOTOR: (
+        _DIAGNOSIS,
+        _COMPARISON,
+        _LOTS,
+        ("Recording (review)", "recordings/motor-{}.rrd"),
+    ),
+    "diagnosis/{}.html": (
+        ("All motors", INDEX),
+        _DATASHEET,
+        _COMPARISON,
+        _LOTS,
+        ("Recording of the ladder (review)", "recordings/ladder-{}.rrd"),
+        ("JSON", "diagnosis/{}.json"),
+    ),
+    "comparison/{}.html": (
+        ("All motors", INDEX),
+        _DATASHEET,
+        _DIAGNOSIS,
+        _LOTS,
+        ("Recording (review)", "recordings/comparison-{}.rrd"),
+        ("JSON", "comparison/{}.json"),
+    ),
+    INDEX: (
+        _LOTS,
+        ("Constants as CSV", "fleet.csv"),
+        ("Parquet", "fleet.parquet"),
+        ("Findings", "findings.json"),
+    ),
+    LOTS: (("All motors", INDEX), ("JSON", "regression/report.json")),
+}
+"""What each kind of page leads to, relative to the output folder; `{}` is the motor's file name."""
+
+
+def links_of(
+    output: Path, page: str, motor_id: str = "", coming: Collection[str] = ()
+) -> tuple[Link, ...]:
+    """The links of a page of `output`: a key of the table above, of a motor where it has one.
+
+    `coming` are files that are not there yet and will be when the page is.
+    """
+    stem = file_stem(motor_id) if motor_id else ""
+    found = []
+    for text, target in _OF_PAGE[page]:
+        name = target.format(stem)
+        if name in coming or (output / name).is_file():
+            found.append(Link(text, f"../{quote(name, safe='/~')}"))
+    return tuple(found)
+
+
+def relink(output: Path, motor_id: str, but: Collection[str] = ()) -> dict[str, str]:
+    """Rewrites the pages of a motor whose links are out of date; names and digests of them.
+
+    What a run keeps of its work learns of its own pages: they are still what that work came to.
+    Pages of the kinds `but` are left alone.
+    """
+    changed: dict[str, str] = {}
+    for page in _OF_PAGE:
+        if "{}" in page and page not in but:
+            name = page.format(file_stem(motor_id))
+            changed |= _relinked(output, name, links_of(output, page, motor_id))
+    if changed:
+        note_files(output, motor_id, tuple(changed.items()))
+    return changed
+
+
+def relink_index(output: Path) -> None:
+    """Rewrites the page of all motors where its links are out of date."""
+    _relinked(output, INDEX, links_of(output, INDEX))
+
+
+def _relinked(output: Path, name: str, links: tuple[Link, ...]) -> dict[str, str]:
+    path = output / name
+    if not path.is_file():
+        return {}
+    before = path.read_bytes()
+    after = with_links(before.decode(), links).encode()
+    if after == before:
+        return {}
+    write_whole(path, after)
+    return {name: hashlib.sha256(after).hexdigest()}

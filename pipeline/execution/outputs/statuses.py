@@ -1,0 +1,126 @@
+"""The current statuses of an output's motors by the registry, on the pages that show them.
+
+A run updates the pages after it has registered its datasheets, `registry approve` and `revoke`
+after a decision. The datasheets themselves never change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.execution.jobs import Files, MotorResult
+from pipeline.execution.outputs.page_links import INDEX, MOTOR, links_of, relink
+from pipeline.execution.caches.run_cache import note_files
+from pipeline.io.registry.store import Registry
+from pipeline.io.storage.datasheets import read_datasheet
+from pipeline.io.storage.publish import write_whole
+from pipeline.records.current_status import CurrentStatus, current_status
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.errors import PipelineError
+from pipeline.records.finding import Finding
+from pipeline.records.ledger import Version, histories
+from pipeline.records.naming import file_stem
+
+Histories = Mapping[str, Sequence[Version]]
+Statuses = Mapping[str, CurrentStatus]
+
+
+def histories_of(registry: Registry | None) -> Histories:
+    """The versions of each motor; empty without a registry, or where it cannot be read."""
+    if registry is None:
+        return {}
+    try:
+        return histories(registry.events())
+    except PipelineError:
+        return {}
+
+
+def status_now(output: Path, sheet: Datasheet, versions: Histories) -> CurrentStatus:
+    """The current status of a datasheet of an output folder."""
+    name = output / "datasheets" / f"{file_stem(sheet.motor_id)}.json"
+    sha256 = hashlib.sha256(name.read_bytes()).hexdigest()
+    return current_status(sheet, versions.get(sheet.motor_id, ()), sha256)
+
+
+def with_current_statuses(
+    output: Path, results: Sequence[MotorResult], versions: Histories
+) -> tuple[list[MotorResult], Statuses]:
+    """Rewrites the pages whose status is out of date.
+
+    Returns the results with the new digests, and the current status of each motor.
+    """
+    updated, statuses = [], {}
+    for result in results:
+        files = dict(result.finished.files)
+        for name in [name for name in files if name.startswith("datasheets/")]:
+            sheet = read_datasheet(output / name)
+            current = current_status(sheet, versions.get(sheet.motor_id, ()), files[name])
+            statuses[sheet.motor_id] = current
+            files |= _rewritten(output, sheet, current)
+            relink(output, sheet.motor_id, but=(MOTOR,))
+        finished = replace(result.finished, files=tuple(files.items()))
+        updated.append(replace(result, finished=finished))
+    return updated, statuses
+
+
+def _rewritten(output: Path, sheet: Datasheet, current: CurrentStatus) -> dict[str, str]:
+    """Name and digest of a motor's page that showed an outdated status and was rewritten.
+
+    The run cache is updated too, as the page still belongs to the same work.
+    """
+    from pipeline.report.pages.link_block import with_links
+    from pipeline.report.pages.status_block import with_status
+
+    name = f"report/{file_stem(sheet.motor_id)}.html"
+    path = output / name
+    if not path.is_file():
+        return {}
+    before = path.read_bytes()
+    page = with_status(before.decode(), sheet, current)
+    after = with_links(page, links_of(output, MOTOR, sheet.motor_id)).encode()
+    if after == before:
+        return {}
+    write_whole(path, after)
+    files: Files = ((name, hashlib.sha256(after).hexdigest()),)
+    note_files(output, sheet.motor_id, files)
+    return dict(files)
+
+
+def show_decision(registry: Registry, motor_id: str) -> tuple[str, ...]:
+    """Rewrites the pages that show a motor in the output folder of a registry; returns their names.
+
+    Does nothing for a registry outside an output folder, or a motor that is not in the output.
+    Raises MachineError where a page cannot be written.
+    """
+    output = None if "://" in registry.place else Path(registry.place).parent
+    if output is None or not (output / "report").is_dir():
+        return ()
+    path = output / "datasheets" / f"{file_stem(motor_id)}.json"
+    if not path.is_file():
+        return ()
+    versions = histories_of(registry)
+    sheet = read_datasheet(path)
+    pages = list(_rewritten(output, sheet, status_now(output, sheet, versions)))
+    if (output / INDEX).is_file():
+        pages += _index(output, versions)
+    return tuple((output / page).as_posix() for page in pages)
+
+
+def _index(output: Path, versions: Histories) -> Iterable[str]:
+    from pipeline.report.pages.fleet_page import render_fleet
+
+    paths = sorted((output / "datasheets").glob("*.json"))
+    sheets = [replace(read_datasheet(path), alternatives=(), captures=()) for path in paths]
+    statuses = {sheet.motor_id: status_now(output, sheet, versions) for sheet in sheets}
+    documents = json.loads((output / "findings.json").read_bytes())["findings"]
+    findings = [Finding.of(document) for document in documents]
+    links = links_of(output, INDEX)
+    after = render_fleet(sheets, findings, statuses, links).encode()
+    if after == (output / INDEX).read_bytes():
+        return ()
+    write_whole(output / INDEX, after)
+    return (INDEX,)

@@ -1,0 +1,1 @@
+"""What a worker does: identify a file, read captures, make a datasheet."""

@@ -1,0 +1,106 @@
+"""Untrusted files inspected by workers, each file under its limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from pipeline.execution.workers.pools import Cluster, core_count, open_pool
+from pipeline.execution.workers.worker_pool import WorkerPool
+from pipeline.io.ingest.files import size_bytes
+from pipeline.io.ingest.guard import ReadLimits, died, reading
+from pipeline.records.errors import CaptureError, MachineError
+from pipeline.records.finding import Finding
+from pipeline.records.naming import printable
+
+if TYPE_CHECKING:
+    from pipeline.io.inspection.describe import InspectReport
+    from pipeline.io.maps.source_map import SourceMap
+
+
+@dataclass(frozen=True, slots=True)
+class InspectTask:
+    """An untrusted file of a folder to inspect; `refused` is why it must not be read."""
+
+    folder: str
+    file: str
+    limits: ReadLimits
+    answers: Mapping[str, str]
+    refused: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What the task works on."""
+        return f"file {printable(self.file)}"
+
+    @property
+    def place(self) -> Path:
+        """Where the file lies."""
+        return Path(self.folder) / self.file
+
+    def without(self, path: str, reason: str) -> InspectTask:  # noqa: ARG002 (it has one file)
+        """The task with its file refused for a reason."""
+        return replace(self, refused=reason)
+
+
+@dataclass(frozen=True, slots=True)
+class Looked:
+    """The report of one file, and the lines by which `run` would refuse it."""
+
+    file: str
+    report: InspectReport
+    refusals: tuple[str, ...]
+
+
+def in_workers(work: Callable[[Any], Any], tasks: Sequence[Any]) -> list[Any]:
+    """The results of tasks in workers, in their order; raises MachineError where one cannot be."""
+    pool = open_pool("local", Cluster())
+    count = min(core_count(), len(tasks)) or 1
+    with (
+        TemporaryDirectory() as progress,
+        WorkerPool(pool, count, Path(progress) / "work") as workers,
+    ):
+        results = list(workers.map_tasks(work, tasks))
+    for result in results:
+        if isinstance(result, MachineError):
+            raise result
+    return results
+
+
+def look_into(task: InspectTask) -> Looked:
+    """What a file holds, and the lines by which `run` would refuse it.
+
+    In a worker, under its limits.
+    """
+    from pipeline.io.inspection.describe import describe
+    from pipeline.io.maps.places import source_maps
+
+    if task.refused is not None:
+        raise died(task.refused)
+    sources = source_maps()
+    with reading(task.file, size_bytes(task.place), task.limits):
+        report = describe(task.place, sources, task.answers)
+        refusals = _refusals(task.place, sources)
+        if not report.faults:
+            faults = tuple(f"{one.message}; {one.remedy}" for one in refusals)
+            report = replace(report, faults=faults)
+    return Looked(task.file, report, tuple(finding.line() for finding in refusals))
+
+
+def _refusals(path: Path, sources: Mapping[str, SourceMap]) -> tuple[Finding, ...]:
+    """Why `run` would refuse a file by itself; nothing of one that it leaves alone."""
+    from pipeline.contracts.validate import validate
+    from pipeline.io.ingest.capture_reader import read_capture
+    from pipeline.io.ingest.survey import look, question_of
+
+    answer = look(path.parent, question_of(path), sources)
+    if answer.entry is None:
+        return tuple(one for one in answer.findings if one.severity == "refused")
+    try:
+        validate(read_capture(path.parent, answer.entry), {})
+    except CaptureError as fault:
+        return (Finding.refusal(path.name, fault),)
+    return ()

@@ -1,0 +1,162 @@
+"""From files to a datasheet: exactly the code that the bytes of a datasheet depend on.
+
+The code version of a datasheet covers this module and everything that it imports: readers, gates,
+estimators, checks, records. Code that shows, caches or registers datasheets is not part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pipeline.contracts.motor import agree
+from pipeline.crosscheck import agreement
+from pipeline.crosscheck.registry import check_all
+from pipeline.crosscheck.verdict import verdict
+from pipeline.estimation import alone
+from pipeline.estimation.registry import Recall, fit_all
+from pipeline.execution.jobs import MotorJob
+from pipeline.execution.tasks.captures import ReadTask, Usable, usable_captures
+from pipeline.execution.tasks.model_tests import Verdicts, judged_model
+from pipeline.io.storage.publish import canonical_json
+from pipeline.records.agreement import Disagreement
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.datasheet import CaptureReference, Check, Datasheet
+from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.evidence import Evidence
+from pipeline.records.finding import Finding
+from pipeline.records.model_verdict import ModelVerdict
+from pipeline.records.outcome import Stopwatch
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """The version of a datasheet and the parts of its digest.
+
+    `readings` are the digests of the motor's captures as they were read, in their order; `campaign`
+    is everything that estimators are given, for cache keys.
+    """
+
+    version: str
+    readings: tuple[str, ...]
+    config_sha256: str
+    code_version: str
+    libraries: str
+    campaign: Sequence[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Constants, evidence of the fits, checks, residual test and findings of one motor; its
+    diagnosis where one was asked for.
+    """
+
+    constants: Constants
+    evidence: tuple[Evidence, ...]
+    checks: tuple[Check, ...]
+    model: ModelVerdict
+    findings: tuple[Finding, ...]
+    diagnosis: Diagnosis | None = None
+
+
+def read(job: MotorJob, watch: Stopwatch) -> Usable:
+    """The motor's usable captures by path, and the findings on refused or doubtful files."""
+    task = ReadTask(job.motor_id, job.input, job.entries, job.limits, job.gates, job.refused)
+    return usable_captures(task, watch)
+
+
+def judge(
+    job: MotorJob,
+    campaign: Campaign,
+    recall: Recall | None,
+    verdicts: Verdicts | None,
+    watch: Stopwatch,
+) -> Judged:
+    """Fits every estimator, makes every check, and compares the model with the captures.
+
+    Results that `recall` and `verdicts` have cached are not computed again.
+    """
+    with watch.stage("fit"):
+        constants, evidence, failures = fit_all(campaign, job.fit, recall)
+    found = check(job, campaign, constants, verdicts, watch)
+    broken = (Finding(job.motor_id, "warning", *failure) for failure in failures)
+    findings = (*agree(campaign), *broken, *found.findings)
+    return replace(found, evidence=evidence, findings=findings)
+
+
+def check(
+    job: MotorJob,
+    campaign: Campaign,
+    constants: Constants,
+    verdicts: Verdicts | None,
+    watch: Stopwatch,
+) -> Judged:
+    """Makes every check of fitted constants, and compares the model with the captures."""
+    with watch.stage("crosscheck"):
+        apart = captures_apart(campaign, job.fit)
+        checks = check_all(constants, campaign, job.crosscheck, apart)
+    with watch.stage("residual test"):
+        tested = judged_model(campaign, job.model, constants, verdicts, job.diagnose)
+    findings = (*agreement.findings(apart), *tested.findings)
+    return Judged(constants, (), checks, tested.verdict, findings, tested.diagnosis)
+
+
+def captures_apart(
+    campaign: Campaign, options: Mapping[str, Mapping[str, float]]
+) -> tuple[Disagreement, ...]:
+    """Disagreements between captures that are not of one motor.
+
+    Constants that one capture alone determines show which motor the majority is of.
+    """
+    for captures in (alone.repeated(campaign), campaign.captures):
+        apart = agreement.disagreements(alone.readings(campaign.motor_id, captures, options))
+        if not apart:
+            return ()
+    return apart
+
+
+def assemble(job: MotorJob, campaign: Campaign, found: Judged, stamp: Stamp) -> Datasheet:
+    """The datasheet of one motor."""
+    references = references_of(campaign, stamp.readings)
+    chosen = found.constants.chosen()
+    status, why = verdict(
+        chosen,
+        found.checks,
+        references,
+        job.required,
+        job.release,
+        found.model.reason(campaign.motor_id) if job.model_gates else None,
+    )
+    return Datasheet(
+        motor_id=campaign.motor_id,
+        motor_type=campaign.text("motor_type"),
+        lot=campaign.text("lot"),
+        version=stamp.version,
+        status=status,
+        why=why,
+        captures=references,
+        config_sha256=stamp.config_sha256,
+        code_version=stamp.code_version,
+        constants=chosen,
+        alternatives=found.constants.rest(),
+        checks=found.checks,
+        libraries=stamp.libraries,
+        model=found.model,
+    )
+
+
+def references_of(campaign: Campaign, readings: Sequence[str]) -> tuple[CaptureReference, ...]:
+    """The captures as a datasheet names them."""
+    return tuple(
+        CaptureReference(
+            c.path, c.sha256, c.meta.test, c.integrity, c.meta.station, c.meta.started_at, reading
+        )
+        for c, reading in zip(campaign.captures, readings, strict=True)
+    )
+
+
+def content_of(sheet: Datasheet) -> bytes:
+    """The bytes of a datasheet's file."""
+    return canonical_json(sheet.document())

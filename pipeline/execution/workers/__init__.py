@@ -1,0 +1,1 @@
+"""How a task is run: processes or a cluster, with retries and limits."""

@@ -1,0 +1,1 @@
+"""Charts as SVG: axes, bands, curves, maps, bars."""

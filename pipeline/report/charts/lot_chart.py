@@ -1,0 +1,190 @@
+"""One constant over the lots in order of time: motors, means, limits, margin, moving average."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from pipeline.physics.notation import quantity
+from pipeline.records.lot_constant import ConstantResult, LotMean, MotorValue
+from pipeline.records.lot_regression import CoggingBand, OrderLevel
+from pipeline.report.charts.axis import Axis, axis_for, padded
+from pipeline.report.charts.ticks import x_ticks, y_ticks
+
+WIDTH, LEFT, RIGHT, TOP, HEIGHT, BOTTOM = 640.0, 66.0, 12.0, 14.0, 190.0, 40.0
+MOST_DOTS, MOST_NAMES = 60, 14
+NAME_CHARS = 11
+
+
+def lot_chart(one: ConstantResult) -> str:
+    """SVG of a constant's lots; an empty text where it has none."""
+    if not one.lots:
+        return ""
+    y = _range(one)
+    pitch = (WIDTH - LEFT - RIGHT) / len(one.lots)
+    body = [_grid(y), _margin(one, y), _limits(one, y)]
+    for index, lot in enumerate(one.lots):
+        middle = LEFT + pitch * (index + 0.5)
+        own = [m for m in one.motors if m.lot == lot.lot and m.side == lot.side]
+        body.append(_column(lot, own, one.unit, middle, min(pitch, 60.0), y))
+    body += [_average(one, y, pitch), _names(one.lots, pitch)]
+    label = escape(f"{one.name} by lot")
+    return (
+        f'<svg class="chart lots" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
+        f'aria-label="{label}">{"".join(body)}</svg>'
+    )
+
+
+def _range(one: ConstantResult) -> Axis:
+    values = [motor.value for motor in one.motors]
+    low, high = min(values), max(values)
+    bounds = one.bounds
+    centre = bounds.nominal if bounds is not None else None
+    if bounds is not None and bounds.margin is not None and centre is not None:
+        low, high = min(low, centre - bounds.margin), max(high, centre + bounds.margin)
+    reach = max(high - low, 1e-12 * abs(high))
+    for limit in () if bounds is None else (bounds.lower, bounds.upper):
+        # A limit far away would flatten everything; it is then told in words alone.
+        if limit is not None and low - reach <= limit <= high + reach:
+            low, high = min(low, limit), max(high, limit)
+    return axis_for(one.name, *padded(low, high, 0.06), TOP + HEIGHT, TOP, 4)
+
+
+def _grid(y: Axis) -> str:
+    title = f'<text class="title" x="2" y="10">{escape(y.title)}</text>'
+    return y_ticks(y, LEFT, WIDTH - RIGHT) + title
+
+
+def _margin(one: ConstantResult, y: Axis) -> str:
+    bounds = one.bounds
+    means = [lot.mean for lot in one.lots if lot.side == "baseline"]
+    if bounds is None or bounds.margin is None or not means:
+        return ""
+    centre = sum(means) / len(means)
+    top = max(y.pixel(centre + bounds.margin), TOP)
+    bottom = min(y.pixel(centre - bounds.margin), TOP + HEIGHT)
+    return (
+        f'<rect class="band" x="{LEFT:g}" y="{top:.1f}" width="{WIDTH - LEFT - RIGHT:g}" '
+        f'height="{max(bottom - top, 0.0):.1f}"><title>margin of sameness</title></rect>'
+    )
+
+
+def _limits(one: ConstantResult, y: Axis) -> str:
+    if one.bounds is None:
+        return ""
+    marks = []
+    for css, words, value in (
+        ("residual", "lower limit", one.bounds.lower),
+        ("residual", "upper limit", one.bounds.upper),
+        ("noise", "lower acceptance limit", one.bounds.accept_lower),
+        ("noise", "upper acceptance limit", one.bounds.accept_upper),
+    ):
+        if value is not None and y.low <= value <= y.high:
+            marks.append(
+                f'<path class="{css}" d="M{LEFT:g} {y.pixel(value):.1f}H{WIDTH - RIGHT:g}">'
+                f"<title>{words}</title></path>"
+            )
+    return "".join(marks)
+
+
+def _column(
+    lot: LotMean, motors: Sequence[MotorValue], unit: str, middle: float, width: float, y: Axis
+) -> str:
+    """One lot: its motors beside each other, its mean as a stroke with ± 2 u."""
+    css = "t-new" if lot.side == "candidate" else "t-old"
+    shown = sorted(motors, key=lambda m: (m.value, m.motor_id))
+    if len(shown) > MOST_DOTS:
+        picked = np.unique(np.linspace(0, len(shown) - 1, MOST_DOTS).round().astype(int))
+        shown = [m for k, m in enumerate(shown) if k in set(picked.tolist()) or m.outlier]
+    dots = []
+    for k, motor in enumerate(shown):
+        place = middle + 0.55 * width * ((k % 7) / 6.0 - 0.5)
+        words = escape(f"{motor.motor_id}: {quantity(motor.value, unit)}")
+        mark = " outlier" if motor.outlier else ""
+        dots.append(
+            f'<circle class="{css}{mark}" cx="{place:.1f}" cy="{y.pixel(motor.value):.1f}" r="2.6">'
+            f"<title>{words}</title></circle>"
+        )
+    mean, low, high = (y.pixel(lot.mean + k * lot.u) for k in (0.0, -2.0, 2.0))
+    half = 0.38 * width
+    return (
+        "".join(dots)
+        + f'<path class="mean {css}" d="M{middle - half:.1f} {mean:.1f}h{2 * half:.1f}'
+        f'M{middle:.1f} {low:.1f}V{high:.1f}"><title>{escape(lot.lot)}: mean '
+        f"{quantity(lot.mean, unit)} of {lot.motors}</title></path>"
+    )
+
+
+def _average(one: ConstantResult, y: Axis, pitch: float) -> str:
+    """The moving average with its limits, where it is charted."""
+    places = [LEFT + pitch * (k + 0.5) for k in range(len(one.lots))]
+    paths = []
+    for css, values in (
+        ("fitted", [lot.ewma for lot in one.lots]),
+        ("noise", [lot.ewma_low for lot in one.lots]),
+        ("noise", [lot.ewma_high for lot in one.lots]),
+    ):
+        points = [
+            f"{x:.1f} {y.pixel(min(max(v, y.low), y.high)):.1f}"
+            for x, v in zip(places, values, strict=True)
+            if v is not None
+        ]
+        if points:
+            paths.append(f'<path class="{css}" d="M{"L".join(points)}"/>')
+    return "".join(paths)
+
+
+def _names(lots: Sequence[LotMean], pitch: float) -> str:
+    step = math.ceil(len(lots) / MOST_NAMES)
+    marks = []
+    for index, lot in enumerate(lots):
+        if index % step and index != len(lots) - 1:
+            continue
+        short = lot.lot if len(lot.lot) <= NAME_CHARS else lot.lot[: NAME_CHARS - 1] + "…"
+        place = LEFT + pitch * (index + 0.5)
+        marks.append(
+            f'<text class="tick x" x="{place:.1f}" y="{TOP + HEIGHT + 15:.1f}">'
+            f"<title>{escape(lot.lot)}</title>{escape(short)}</text>"
+        )
+    return "".join(marks)
+
+
+def cogging_chart(bands: Sequence[CoggingBand], orders: Sequence[OrderLevel]) -> str:
+    """SVG of both sides' cogging torque over the common period of their orders, ± 1 sd."""
+    if not bands:
+        return ""
+    common = math.gcd(*(level.order for level in orders)) if orders else 1
+    window = 2.0 * math.pi / max(common, 1)
+    cut = [int(np.searchsorted(band.theta_mech_rad, window * 1.0001)) for band in bands]
+    low = min(min(band.low_nm[:n]) for band, n in zip(bands, cut, strict=True))
+    high = max(max(band.high_nm[:n]) for band, n in zip(bands, cut, strict=True))
+    x = axis_for("theta_mech_deg", 0.0, math.degrees(window), LEFT, WIDTH - RIGHT, 6)
+    y = axis_for("torque_shaft_nm", *padded(low, high), TOP + HEIGHT, TOP, 4)
+    body = [_grid(y), x_ticks(x, TOP + HEIGHT)]
+    for band, n in zip(bands, cut, strict=True):
+        css = "t-new" if band.side == "candidate" else "t-old"
+        px = x.pixels(np.degrees(np.array(band.theta_mech_rad[:n]))).tolist()
+        up, down, mean = (
+            y.pixels(np.array(values[:n])).tolist()
+            for values in (band.high_nm, band.low_nm, band.mean_nm)
+        )
+        outline = [*zip(px, up, strict=True), *zip(px[::-1], down[::-1], strict=True)]
+        body.append(f'<path class="area {css}" d="M{_points(outline)}Z"/>')
+        line = _points(list(zip(px, mean, strict=True)))
+        body.append(f'<path class="mean {css}" d="M{line}"/>')
+    middle = (LEFT + WIDTH - RIGHT) / 2.0
+    body.append(
+        f'<text class="title x" x="{middle:.1f}" y="{TOP + HEIGHT + 33:.1f}">'
+        "shaft angle [deg]</text>"
+    )
+    return (
+        f'<svg class="chart lots" viewBox="0 0 {WIDTH:g} {TOP + HEIGHT + BOTTOM:g}" role="img" '
+        f'aria-label="cogging torque of both sides">{"".join(body)}</svg>'
+    )
+
+
+def _points(points: Sequence[tuple[float, float]]) -> str:
+    return "L".join(f"{px:.1f} {py:.1f}" for px, py in points)

@@ -1,0 +1,1 @@
+"""HTML pages of motors, fleets, lots, comparisons and diagnoses."""

@@ -1,0 +1,93 @@
+"""The page of one comparison: errors before and after, where they live, earlier ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.records.comparison import Comparison, Trace
+from pipeline.records.comparison_history import Earlier
+from pipeline.records.error_map import ErrorMap
+from pipeline.records.evidence import Evidence, Series
+from pipeline.report.charts.chart import chart
+from pipeline.report.charts.heatmap import angle_bars, heatmap
+from pipeline.report.pages.link_block import Link, link_block
+from pipeline.report.pages.page import render
+from pipeline.views.comparison import KINDS, comparison_view, ratio_of, signal_title
+from pipeline.views.constants import sentence
+from pipeline.views.ladder import CURRENT, SPEED, angle_of
+from pipeline.views.names import quantity_words
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One drawing with its words; `path` names the capture."""
+
+    title: str
+    caption: str
+    path: str
+    svg: str
+
+
+def render_comparison(
+    result: Comparison, earlier: Sequence[Earlier] = (), links: Sequence[Link] = ()
+) -> str:
+    """The self-contained HTML page of one comparison; equal input gives equal text.
+
+    `earlier` are those of the same motor before it, `links` lead to the motor's other pages.
+    """
+    view = comparison_view(result)
+    return render(
+        "comparison.html.jinja",
+        result=result,
+        view=view,
+        headline=sentence(view.headline),
+        links=link_block(links),
+        title_of=signal_title,
+        maps=_maps(result),
+        traces=[_trace(one) for one in _worst_traces(result)],
+        earlier=earlier,
+    )
+
+
+def _maps(result: Comparison) -> list[Figure]:
+    """Each signal's error over speed and current, and over the angle of a turn."""
+    found = []
+    for signal in dict.fromkeys(one.signal for one in result.maps):
+        own = [one for one in result.maps if one.signal == signal]
+        flat = next((one for one in own if _axes(one) == (SPEED, CURRENT)), None)
+        turn = next((one for one in own if _axes(one) == (angle_of(signal),)), None)
+        svg = "" if flat is None else heatmap(flat, flat.reach)
+        svg += "" if turn is None else angle_bars(turn, turn.reach)
+        if svg:
+            found.append(Figure(quantity_words(signal), "mean error", "", svg))
+    return found
+
+
+def _axes(one: ErrorMap) -> tuple[str, ...]:
+    return (one.x.variable,) if one.y is None else (one.x.variable, one.y.variable)
+
+
+def _worst_traces(result: Comparison) -> list[Trace]:
+    """Of each signal and kind the trace of the capture that is farthest over its floor."""
+    ratios = {(e.signal, e.kind, e.capture): ratio_of(e) for e in result.errors}
+    worst: dict[tuple[str, str], Trace] = {}
+    for one in result.traces:
+        key = (one.signal, one.kind)
+        best = worst.get(key)
+        if best is None or _ratio(one, ratios) > _ratio(best, ratios):
+            worst[key] = one
+    return list(worst.values())
+
+
+def _ratio(one: Trace, ratios: Mapping[Any, float]) -> float:
+    return ratios.get((one.signal, one.kind, one.capture), 0.0)
+
+
+def _trace(one: Trace) -> Figure:
+    series = (Series("", one.t_s, one.measured, one.model),)
+    drawn = Evidence("", quantity_words(one.signal), "t_s", one.signal, "line", series, one.capture)
+    how = "held out" if one.split == "held_out" else "in the fit"
+    caption = f"model {KINDS[one.kind]}, {how}"
+    return Figure(quantity_words(one.signal), caption, one.capture, chart(drawn))

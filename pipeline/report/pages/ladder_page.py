@@ -1,0 +1,168 @@
+"""The page of one diagnosis: what is missing with sizes, what to do, and the error falling."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.physics.notation import MINUS, quantity, significant
+from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
+from pipeline.records.evidence import Evidence, Series
+from pipeline.report.charts.chart import chart
+from pipeline.report.charts.curve_chart import curve_chart
+from pipeline.report.charts.heatmap import angle_bars, heatmap
+from pipeline.report.charts.rung_chart import rung_chart
+from pipeline.report.pages.link_block import Link, link_block
+from pipeline.report.pages.page import render
+from pipeline.views.ladder import (
+    CURRENT,
+    SPEED,
+    LadderView,
+    RungView,
+    angle_of,
+    ladder_view,
+    over_floor,
+    reaches,
+)
+from pipeline.views.names import quantity_words, unit_of
+from pipeline.views.notes import shown_and_folded
+
+MOST_RANKED = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One signal of one rung: map over speed and current, bars over the angle."""
+
+    signal: str
+    flat: str
+    turn: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What gives away an effect that came with a rung: its words, its drawing, whose capture."""
+
+    rung: RungView
+    svg: str
+    caption: str
+
+
+def render_ladder(result: Diagnosis, folder: str = "FOLDER", links: Sequence[Link] = ()) -> str:
+    """The self-contained HTML page of one diagnosis; equal input gives equal text.
+
+    `folder` is where the captures lie, for the commands; `links` lead to the motor's other pages.
+    """
+    view = ladder_view(result, folder)
+    reach = reaches(result.ladder)
+    notes, folded = shown_and_folded(result)
+    ranked = [_ranked(one) for one in result.ranking]
+    return render(
+        "ladder.html.jinja",
+        result=result,
+        view=view,
+        links=link_block(links),
+        notes=notes,
+        folded=folded,
+        shown=[_shown(rung) for rung in view.rungs if rung.signature is not None],
+        chart=rung_chart([_short(one) for one in view.rungs], _over_floors(result.ladder, view)),
+        figures=[tuple(_figures(rung, view.signals, reach)) for rung in result.ladder],
+        signals=[quantity_words(name) for name in view.signals],
+        found=[one for one in ranked if one["effect"] in result.missing],
+        others=[one for one in ranked if one["effect"] not in result.missing][:MOST_RANKED],
+        sketch=_sketch(result),
+        remainder=[
+            (
+                one.capture,
+                quantity_words(one.signal),
+                str(one.order) if one.order else "mean",
+                significant(one.chi2_per_n, 3),
+                quantity(one.size, unit_of(one.signal), 3),
+                "yes" if one.matters else "too small",
+            )
+            for one in result.remainder
+        ],
+    )
+
+
+def _over_floors(ladder: Sequence[LadderRung], view: LadderView) -> dict[str, list[float]]:
+    """What the chart draws: each signal's error over its floor, else that of all together."""
+    drawn = [name for name in view.signals if all(name in rung.errors for rung in ladder)]
+    if not drawn:
+        return {"all signals": [rung.held_out for rung in ladder]} if ladder else {}
+    return {name: [over_floor(rung, name) for rung in ladder] for name in drawn}
+
+
+def _figures(
+    rung: LadderRung, signals: Sequence[str], reach: dict[tuple[str, str], float]
+) -> Iterator[Figure]:
+    mapped = [n for n in signals if rung.map_of(n, SPEED, CURRENT) is not None]
+    for name in [*mapped, *(n for n in signals if n not in mapped)]:
+        flat = rung.map_of(name, SPEED, CURRENT)
+        angle = angle_of(name)
+        turn = rung.map_of(name, angle)
+        if flat is None and turn is None:
+            continue
+        yield Figure(
+            quantity_words(name),
+            "" if flat is None else heatmap(flat, reach[name, SPEED]),
+            "" if turn is None else angle_bars(turn, reach[name, angle]),
+        )
+
+
+def _shown(rung: RungView) -> Shown:
+    """Points: what the model without the effect leaves; line: what it explains; below: the rest."""
+    assert rung.signature is not None
+    one: Signature = rung.signature
+    before, after = np.array(one.before), np.array(one.after)
+    series = (Series("", np.array(one.at), before, before - after),)
+    drawn = Evidence("", rung.title, one.x_name, one.signal, "scatter", series, one.capture)
+    words = f"{quantity_words(one.signal)} over {quantity_words(one.x_name)}"
+    where = one.capture or "all captures"
+    return Shown(rung, chart(drawn), f"{words}, {where}")
+
+
+def _short(view: RungView) -> str:
+    return f"{view.number}: {view.title}" if len(view.title) < 26 else f"rung {view.number}"
+
+
+def _ranked(one: RankedEffect) -> dict[str, str]:
+    return {
+        "effect": one.effect,
+        "score": f"{one.score:.4g}".replace("-", MINUS),
+        "drop": f"{100.0 * one.held_out_drop:.0f} %" if one.held_out_drop else "–",
+        "p_value": f"{one.p_value:.2g}",
+        "confused_with": ", ".join(one.confused_with),
+        "explanation": one.explanation,
+        "experiment": one.experiment,
+        "shortfall": one.shortfall,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """An unknown structure: its terms, and, where there is one, its curve, formula and rivals."""
+
+    terms: tuple[tuple[str, str], ...]
+    curve: str
+    expression: str
+    alternatives: tuple[str, ...]
+
+
+def _sketch(result: Diagnosis) -> Sketch | None:
+    if result.unknown is None:
+        return None
+    remainder = result.unknown.document()
+    points, sketch = remainder.get("curve", []), remainder["sketch"]
+    unit = sketch[0]["unit"] if sketch else "1"
+    return Sketch(
+        tuple((t["term"], quantity(t["coefficient"], t["unit"], 4)) for t in sketch),
+        curve_chart(remainder["variables"][0], unit, points) if len(points) > 1 else "",
+        remainder.get("expression", ""),
+        tuple(
+            f"{', '.join(one['variables'])} ({100 * one['share']:.0f} %)"
+            for one in remainder.get("alternatives", [])
+        ),
+    )

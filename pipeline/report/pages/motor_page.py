@@ -1,0 +1,108 @@
+"""The page of one motor: may I use it, what are its constants, and why should I believe them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from urllib.parse import quote
+
+from pipeline.physics.glossary import Term
+from pipeline.records.current_status import current_status
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.estimate import Estimate
+from pipeline.records.evidence import Evidence
+from pipeline.records.finding import Finding
+from pipeline.records.naming import file_stem
+from pipeline.records.performance import Performance
+from pipeline.report.charts.chart import chart
+from pipeline.report.charts.performance_chart import band_chart, efficiency_chart
+from pipeline.report.pages.link_block import Link, link_block
+from pipeline.report.pages.page import render
+from pipeline.report.pages.status_block import status_block
+from pipeline.views.constants import GROUPS, KEY_CONSTANTS, grouped
+from pipeline.views.model_words import model_words
+from pipeline.views.motor import CHECK_ORDER, LEAST_SHARE, check_number, motor_rows, ordered_checks
+from pipeline.views.performance import performance_view
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One evidence with its drawing."""
+
+    estimator: str
+    title: str
+    caption: str
+    capture: str | None
+    svg: str
+
+
+def render_motor(
+    datasheet: Datasheet,
+    evidence: tuple[Evidence, ...],
+    findings: tuple[Finding, ...],
+    own: Mapping[str, Term] | None = None,
+    links: Sequence[Link] = (),
+    performance: Performance | None = None,
+) -> str:
+    """The self-contained HTML page of one motor; equal input gives equal text.
+
+    Its status is what the datasheet says of itself, until `status_block.with_status`.
+    `own` are the terms of constants that the glossary does not know, by name; `links` lead to the
+    motor's other pages; without a `performance` the page has no such section.
+    """
+    rows = motor_rows(datasheet, own)
+    figures = _figures(datasheet.constants, evidence)
+    checks = ordered_checks(datasheet.checks)
+    counts: Counter[str] = Counter(check.status for check in checks)
+    return render(
+        "motor.html.jinja",
+        sheet=datasheet,
+        file=quote(file_stem(datasheet.motor_id), safe="~"),
+        status=status_block(datasheet, current_status(datasheet)),
+        links=link_block(links),
+        cards=[check for check in checks if check.status in ("fail", "marginal")],
+        key_rows=[rows[n] for n in KEY_CONSTANTS if n in rows and rows[n].reading],
+        groups=[(title, [rows[n] for n in names]) for title, names in grouped(rows)],
+        least_share=LEAST_SHARE,
+        checks=checks,
+        check_counts=[(status, counts[status]) for status in CHECK_ORDER if counts[status]],
+        check_number=check_number,
+        model=model_words(datasheet.model, datasheet.motor_id),
+        findings=sorted(findings),
+        figures=figures,
+        performance=None if performance is None else performance_view(performance),
+        charts=[] if performance is None else _charts(performance),
+        drawn={figure.estimator for figure in figures},
+    )
+
+
+def _charts(found: Performance) -> list[tuple[str, str]]:
+    """Titles and drawings of the performance."""
+    peak, steady = found.curve("torque_peak"), found.curve("torque_continuous")
+    torque, power, kt = ("torque_shaft_nm", "power_w", "kt_peak_nm_a")
+    of_one = [found.curve(name) for name in ("power_peak", "kt_peak")]
+    drawn = [
+        (
+            "Torque against speed",
+            band_chart([c for c in (peak, steady) if c], torque, found.regimes),
+        ),
+        ("Efficiency, with losses on hover", efficiency_chart(found.cells, peak)),
+        ("Shaft power at peak torque", band_chart([c for c in of_one[:1] if c], power)),
+        ("Air-gap torque per ampere", band_chart([c for c in of_one[1:] if c], kt)),
+    ]
+    return [(title, svg) for title, svg in drawn if svg]
+
+
+def _figures(constants: Mapping[str, Estimate], evidence: tuple[Evidence, ...]) -> list[Figure]:
+    """Figures, each estimator's together, in the order in which their constants stand."""
+    order = [name for names in GROUPS.values() for name in names]
+    first: dict[str, int] = {}
+    for place, name in enumerate(order):
+        if name in constants:
+            first.setdefault(constants[name].method, place)
+    place_of = {one.estimator: first.get(one.estimator, len(order)) for one in evidence}
+    ordered = sorted(evidence, key=lambda e: (place_of[e.estimator], e.estimator))
+    return [
+        Figure(one.estimator, one.title, one.caption, one.capture, chart(one)) for one in ordered
+    ]

@@ -1,0 +1,51 @@
+"""The printable sheet of one motor: one page, A4 or Letter, as a maker hands it out."""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.naming import file_stem
+from pipeline.records.performance import Performance
+from pipeline.report.charts.performance_chart import band_chart, efficiency_chart
+from pipeline.report.pages.page import render
+from pipeline.views.constants import constant_words
+from pipeline.views.motor import motor_rows
+from pipeline.views.performance import performance_view
+
+SHOWN = (
+    "r_phase_ohm",
+    "ld_h",
+    "lq_h",
+    "psi_pm_wb",
+    "pole_pairs",
+    "kt_peak_nm_a",
+    "kv_ll_peak_rpm_v",
+    "motor_constant_nm_sqrt_w",
+    "j_rotor_kgm2",
+    "torque_coulomb_nm",
+    "b_visc_nm_s_rad",
+    "cogging_amplitude_nm",
+    "tau_elec_s",
+    "tau_mech_s",
+    "rth_winding_k_w",
+)
+"""Constants of the sheet, where they are known."""
+
+
+def render_sheet(sheet: Datasheet, found: Performance) -> str:
+    """The self-contained HTML page of one motor's sheet; equal input gives equal text.
+
+    The status is what the datasheet says of itself; an approval is in the registry.
+    """
+    rows = motor_rows(sheet)
+    curves = [c for c in (found.curve("torque_peak"), found.curve("torque_continuous")) if c]
+    return render(
+        "sheet.html.jinja",
+        sheet=sheet,
+        file=quote(file_stem(sheet.motor_id), safe="~"),
+        rows=[(constant_words(n), rows[n]) for n in SHOWN if n in rows and rows[n].reading],
+        view=performance_view(found),
+        torque=band_chart(curves, "torque_shaft_nm", found.regimes),
+        efficiency=efficiency_chart(found.cells, found.curve("torque_peak")),
+    )

@@ -1,0 +1,35 @@
+"""The part of a motor's page that says its status: written with the page, and anew when it changes.
+
+All else on the page is of the datasheet, which never changes, and of its fits.
+"""
+
+from __future__ import annotations
+
+from pipeline.records.current_status import CurrentStatus
+from pipeline.records.datasheet import Datasheet
+from pipeline.report.pages.link_block import replaced
+from pipeline.report.pages.page import render
+from pipeline.views.status_text import status_lines, status_words
+
+BEGIN, END = "<!-- status -->", "<!-- end of status -->"
+
+
+def status_block(sheet: Datasheet, current: CurrentStatus) -> str:
+    """Heading, status, who decided what, and the reasons that stand, between two marks."""
+    text = render(
+        "status.html.jinja",
+        sheet=sheet,
+        current=current,
+        words=status_words(current),
+        lines=status_lines(current),
+        unverified=sum(c.integrity != "verified" for c in sheet.captures),
+    )
+    return f"{BEGIN}\n{text.strip()}\n{END}"
+
+
+def with_status(page: str, sheet: Datasheet, current: CurrentStatus) -> str:
+    """The page with its status as it is now; a page without the marks stays as it is.
+
+    No text of a capture can hold a mark: `<` is escaped in all of it.
+    """
+    return replaced(page, (BEGIN, END), status_block(sheet, current))

@@ -1,0 +1,1 @@
+"""What a terminal or another program reads: tables, progress, JUnit."""

@@ -1,0 +1,98 @@
+"""Captures of a folder as validated campaigns, one a motor; for compare, diagnose and plan.
+
+Strangers' files are parsed by workers under limits, as in a run, and never in the driver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from pipeline.execution.tasks.captures import ReadTask, usable_captures
+from pipeline.execution.tasks.survey_tasks import survey_with
+from pipeline.execution.workers.pools import Cluster, core_count, open_pool
+from pipeline.execution.workers.worker_pool import WorkerPool
+from pipeline.io.ingest.files import input_folder
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.ingest.survey import Entry, Survey, survey
+from pipeline.io.maps.places import source_maps
+from pipeline.records.capture import Campaign
+from pipeline.records.errors import MachineError, UsageError, meant
+from pipeline.records.finding import Finding, lines_of
+from pipeline.records.outcome import Outcome, first_that_applies
+from pipeline.report.text.console import nothing_usable
+
+
+class Gathered(NamedTuple):
+    """Campaigns by motor_id, findings on refused or doubtful files, and a line on other files."""
+
+    campaigns: tuple[Campaign, ...]
+    findings: tuple[Finding, ...]
+    note: str
+
+
+def campaigns(
+    folder: str,
+    source: str = "auto",
+    motor: str | None = None,
+    limits: ReadLimits | None = None,
+    config_dir: str | None = None,
+    only: Collection[str] | None = None,
+) -> Gathered:
+    """Every motor's usable captures, of the files `only` where that is given.
+
+    Raises UsageError where the folder is not there or holds no capture of `motor`.
+    """
+    input_folder(folder)
+    sources = source_maps(source, config_dir)
+    bounds = limits or ReadLimits()
+    with TemporaryDirectory() as progress:
+        pool = open_pool("local", Cluster())
+        with WorkerPool(pool, core_count(), Path(progress) / "work") as workers:
+            ask = partial(survey_with, workers, Path(folder), sources, bounds, recover=False)
+            found = _of_files(survey(Path(folder), sources, ask), only)
+            tasks = _tasks(folder, found, motor, bounds)
+            read = workers.map_tasks(usable_captures, tasks)
+    findings = list(found.findings)
+    made = []
+    for task, end in zip(tasks, read, strict=True):
+        if isinstance(end, MachineError):
+            raise end
+        captures, doubts = end
+        findings += doubts
+        if captures:
+            made.append(Campaign(task.motor_id, captures))
+    return Gathered(tuple(made), tuple(findings), found.note)
+
+
+def _of_files(found: Survey, only: Collection[str] | None) -> Survey:
+    if only is None:
+        return found
+    entries = tuple(entry for entry in found.entries if entry.path in only)
+    findings = tuple(finding for finding in found.findings if finding.file in only)
+    return Survey(entries, findings, ())
+
+
+def _tasks(folder: str, found: Survey, motor: str | None, limits: ReadLimits) -> list[ReadTask]:
+    motors: dict[str, list[Entry]] = {}
+    for entry in found.entries:
+        motors.setdefault(entry.stated["motor_id"], []).append(entry)
+    if motor is not None and motor not in motors:
+        raise UsageError(f"no capture of motor {motor} in {folder}", meant(motor, sorted(motors)))
+    wanted = sorted(motors) if motor is None else [motor]
+    return [ReadTask(name, folder, tuple(motors[name]), limits) for name in wanted]
+
+
+def outcome_of(folder: str, found: Gathered, texts: Sequence[str], *, undecided: bool) -> Outcome:
+    """The text of each motor, the refusals, and the remedy where nothing is usable."""
+    refused = any(finding.severity == "refused" for finding in found.findings)
+    lines = lines_of(found.findings)
+    if not texts:
+        lines.append(nothing_usable(folder, refused=refused))
+    if found.note:
+        lines.append(f"note: {found.note}")
+    code = first_that_applies(3 if refused else 0, 4 if undecided else 0)
+    return Outcome(code, "\n".join(texts), tuple(lines))

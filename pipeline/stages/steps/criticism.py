@@ -1,0 +1,98 @@
+"""Shared by `compare` and `diagnose`: judge every motor of a folder, and return one exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from pipeline.api.options import check_constants
+from pipeline.criticism.policy.policy import policy_changes
+from pipeline.execution.tasks.start import start_constants
+from pipeline.execution.workers.segment_worker import segment_worker
+from pipeline.io.ingest.files import input_folder
+from pipeline.io.ingest.guard import ReadLimits
+from pipeline.io.storage.publish import output_folder
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.records.naming import printable
+from pipeline.records.outcome import Outcome, Stopwatch
+from pipeline.report.text.waiting import waiting
+from pipeline.settings import CompareSettings
+from pipeline.stages.steps.campaigns import campaigns, outcome_of
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One motor's result: the text to print, whether the captures were too few to decide, the
+    document that was written.
+    """
+
+    text: str
+    undecided: bool
+    document: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One motor to judge: its captures of `folder`, the model, where to write, whose seconds."""
+
+    campaign: Campaign
+    spec: ModelSpec
+    start: Constants
+    folder: str
+    output: Path
+    watch: Stopwatch
+
+
+Judge = Callable[[Task], Judged]
+
+
+def each_motor(settings: CompareSettings, judge: Judge, needs: str, folder: str) -> Outcome:
+    """Runs `judge` on every motor of `input`; it writes under the folder that it is given.
+
+    While workers read the captures, the module that the judge `needs` is imported. `folder` is
+    where under the output it writes.
+    """
+    input_folder(settings.input)
+    if settings.model.effects or settings.effects_path is not None:
+        from pipeline.criticism.library.registry import known_effects
+
+        known_effects(settings.model.effects, settings.effects_path)
+    changes = policy_changes(settings.policy)
+    check_constants(settings.constants)
+    limits = ReadLimits(settings.read_seconds, settings.read_memory_mb)
+    watch, output = Stopwatch(), output_folder(settings.output)
+    with waiting("reading") as line, segment_worker(settings.effects_path) as worker:
+        with watch.stage("read"):
+            # a daemon, so that an interrupt need not wait for it
+            aside = Thread(target=import_module, args=(needs,), daemon=True)
+            aside.start()
+            found = campaigns(
+                settings.input, settings.source, settings.motor, limits, settings.config_dir
+            )
+            aside.join()
+        effects = tuple(settings.model.effects)
+        spec = ModelSpec(settings.model.name, effects, settings.effects_path, changes)
+        results = []
+        stated = [replace(one, stated=settings.constants) for one in found.campaigns]
+        for number, campaign in enumerate(stated, 1):
+            line.say(f"{printable(campaign.motor_id)}, motor {number} of {len(stated)}")
+            with worker.campaign():
+                start = start_constants(campaign)
+                task = Task(campaign, spec, start, settings.input, output, watch)
+                results.append(judge(task))
+    undecided = not results or any(result.undecided for result in results)
+    outcome = outcome_of(
+        settings.input, found, [result.text for result in results], undecided=undecided
+    )
+    return replace(
+        outcome,
+        timings=watch.table(),
+        result=[result.document for result in results],
+        wrote=f"{output}/{folder}" if results else "",
+    )

@@ -1,0 +1,184 @@
+"""One motor, from its files to its datasheet, report page and recordings."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.estimation.registry import BROKEN, estimators
+from pipeline.execution.caches.fits import FitMemory
+from pipeline.execution.caches.keys import key_of, superseding_parts
+from pipeline.execution.caches.model_memory import ModelMemory
+from pipeline.execution.caches.run_cache import note_motor
+from pipeline.execution.caches.stamp import stamp_of
+from pipeline.execution.jobs import Files, Finished, MotorJob, MotorResult
+from pipeline.execution.tasks import work
+from pipeline.io.storage.publish import canonical_json, together
+from pipeline.records.capture import Campaign
+from pipeline.records.datasheet import Datasheet, Superseded
+from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.evidence import Evidence
+from pipeline.records.finding import Finding
+from pipeline.records.ledger import Revocation
+from pipeline.records.naming import file_stem
+from pipeline.records.outcome import Stopwatch
+from pipeline.records.performance import Blank, Performance
+
+
+def process_motor(job: MotorJob) -> MotorResult:
+    """Reads, validates, fits, checks and writes one motor; refused captures become findings.
+
+    When all its files are on the disk, this is noted, so that a batch that was stopped goes on.
+    """
+    watch = Stopwatch()
+    finished = _finish(job, watch)
+    if job.key is not None and not job.refused:
+        note_motor(Path(job.output), job.motor_id, job.key, finished)
+    return MotorResult(job.motor_id, finished, watch.seconds, lasting=not job.refused)
+
+
+def _finish(job: MotorJob, watch: Stopwatch) -> Finished:
+    captures, findings = work.read(job, watch)
+    if not captures:
+        return Finished(findings, ())
+    campaign = Campaign(job.motor_id, captures, job.constants)
+    stamp = stamp_of(job, campaign)
+    recall = None if job.key is None else FitMemory(job, stamp)
+    verdicts = None if job.key is None else ModelMemory(job, stamp)
+    found = work.judge(job, campaign, recall, verdicts, watch)
+    if recall is not None:
+        recall.save()
+    findings = (*findings, *found.findings)
+    datasheet = superseding(work.assemble(job, campaign, found, stamp), job.revoked)
+    all_findings = (*job.findings, *findings)
+    files = _write(job, campaign, datasheet, found, all_findings, watch)
+    return Finished(findings, files)
+
+
+def superseding(sheet: Datasheet, revoked: Sequence[Revocation]) -> Datasheet:
+    """The datasheet, as another version where its own is revoked and has other content.
+
+    Where the revoked version holds these very bytes, it was not them that were doubted alone: they
+    stay that version, and stay revoked.
+    """
+    known = {revocation.version: revocation for revocation in revoked}
+    while (old := known.get(sheet.version)) is not None:
+        if hashlib.sha256(work.content_of(sheet)).hexdigest() == old.content_sha256:
+            return sheet
+        place = Superseded(old.version, old.by, old.why)
+        version = key_of(superseding_parts(sheet.version, place))
+        sheet = replace(sheet, version=version, supersedes=place)
+    return sheet
+
+
+def _write(
+    job: MotorJob,
+    campaign: Campaign,
+    datasheet: Datasheet,
+    found: work.Judged,
+    findings: tuple[Finding, ...],
+    watch: Stopwatch,
+) -> Files:
+    """Writes what the job asks for, all of it or nothing; returns the files, relative to output."""
+    stem = file_stem(job.motor_id)
+    files: list[tuple[str, str]] = []
+    with together(Path(job.output)) as write_one:
+
+        def write(name: str, content: bytes) -> str:
+            write_one(name, content)
+            files.append((name, hashlib.sha256(content).hexdigest()))
+            return files[-1][1]
+
+        with watch.stage("datasheet"):
+            write(f"datasheets/{stem}.json", work.content_of(datasheet))
+        with watch.stage("performance"):
+            performance = performance_at(campaign, datasheet, job.operate)
+        write(f"performance/{stem}.json", canonical_json(performance.document()))
+        if found.diagnosis is not None:
+            for name, content in _diagnosis_files(job, stem, found.diagnosis):
+                write(name, content)
+        if job.report:
+            from pipeline.execution.outputs.page_links import links_of
+            from pipeline.report.pages.motor_page import render_motor
+            from pipeline.report.pages.sheet_page import render_sheet
+
+            with watch.stage("report"):
+                terms = {term.name: term for estimator in estimators() for term in estimator.terms}
+                coming = [f"recordings/motor-{stem}.rrd"] if job.recordings else []
+                coming += [] if found.diagnosis is None else [f"diagnosis/{stem}.html"]
+                links = links_of(Path(job.output), "report/{}.html", job.motor_id, coming)
+                page = render_motor(datasheet, found.evidence, findings, terms, links, performance)
+                write(f"report/{stem}.html", page.encode())
+                write(f"sheet/{stem}.html", render_sheet(datasheet, performance).encode())
+        if job.recordings:
+            from pipeline.io.recordings.seal import SEAL, seal_line
+
+            with watch.stage("recordings"):
+                shown = _recordings(stem, campaign, datasheet, found.evidence, findings)
+                for name, content in shown:
+                    sha256 = write(name, content)
+                    write(name + SEAL, seal_line(name.rsplit("/", 1)[-1], sha256))
+    return tuple(files)
+
+
+def performance_at(
+    campaign: Campaign, sheet: Datasheet, stated: Mapping[str, float | None]
+) -> Performance:
+    """The performance of a motor at stated conditions, else at those of its captures.
+
+    Numbers that break on odd constants cost nothing but themselves.
+    """
+    from pipeline.performance.conditions import operation_of
+    from pipeline.performance.derive import performance_of
+
+    operation = operation_of(campaign, stated)
+    try:
+        return performance_of(sheet, operation)
+    except BROKEN as error:
+        why = f"the derivation broke on these constants: {type(error).__name__}: {error}"
+        blank = Blank("performance", "performance", why, "report the captures with this line")
+        return Performance(sheet.motor_id, sheet.version, operation, blanks=(blank,))
+
+
+def _diagnosis_files(job: MotorJob, stem: str, found: Diagnosis) -> Iterator[tuple[str, bytes]]:
+    """Name and content of what `diagnose` writes, less the ladder's recording."""
+    yield f"diagnosis/{stem}.json", canonical_json(found.document())
+    if found.unknown is not None and found.unknown.sketch:
+        yield f"diagnosis/effects/{found.unknown.effect}.py", found.unknown.source.encode()
+    if job.report:
+        from pipeline.execution.outputs.page_links import links_of
+        from pipeline.report.pages.ladder_page import render_ladder
+
+        coming = (f"report/{stem}.html", f"diagnosis/{stem}.json")
+        links = links_of(Path(job.output), "diagnosis/{}.html", job.motor_id, coming)
+        yield f"diagnosis/{stem}.html", render_ladder(found, links=links).encode()
+
+
+def _recordings(
+    stem: str,
+    campaign: Campaign,
+    datasheet: Datasheet,
+    evidence: tuple[Evidence, ...],
+    findings: tuple[Finding, ...],
+) -> Iterator[tuple[str, bytes]]:
+    """Name and content of the motor's recording and of one a capture; what the datasheet says of a
+    capture comes first in it.
+    """
+    from pipeline.io.recordings.capture import recording_bytes
+    from pipeline.io.recordings.motor import motor_bytes
+    from pipeline.stages.steps.replay import replay
+
+    shown = [*(one for capture in campaign.captures for one in replay(capture, datasheet))]
+    shown += evidence
+    yield f"recordings/motor-{stem}.rrd", motor_bytes(campaign, datasheet, shown, findings)
+    for capture in campaign.captures:
+        of_capture = tuple(f for f in findings if f.file == capture.path)
+        content = recording_bytes(capture, shown, datasheet, of_capture)
+        yield f"recordings/{stem}/{_place(capture.path)}.rrd", content
+
+
+def _place(path: str) -> str:
+    """A capture's path with each part made safe as a file name."""
+    return "/".join(file_stem(part) for part in path.split("/"))

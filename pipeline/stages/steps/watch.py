@@ -1,0 +1,133 @@
+"""`run watch=true`: the same run again whenever captures have arrived and are at rest.
+
+A pass is an ordinary run of the whole folder, in which everything that did not change is cached. So
+a stop at any moment loses nothing, and a start goes on where it was.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+
+from pipeline.io.ingest.arrivals import Arrivals, Snapshot, snapshot
+from pipeline.io.storage.datasheets import read_datasheets
+from pipeline.records.errors import MachineError
+from pipeline.records.naming import printable
+from pipeline.records.outcome import Outcome
+from pipeline.report.text.waiting import waiting
+from pipeline.settings import RunSettings
+
+LOOK_EVERY_S = 0.5
+"""Between two looks at the folder; ten times the time of a look where that is more."""
+RETRY_S = 30.0
+"""Until a pass is tried again that failed for the machine's sake, such as a full disk."""
+Pass = Callable[[Callable[[], None]], Outcome]
+
+
+class FolderChangedError(Exception):
+    """Files came or changed while the folder was surveyed: the pass begins again when it rests."""
+
+
+@dataclass
+class Watch:
+    """A folder that is watched; `perform` is one run of it, within the open `workers`.
+
+    `perform` calls what it is given once it has looked at every file, before anything is written.
+    """
+
+    settings: RunSettings
+    perform: Pass
+    workers: ExitStack
+    arrivals: Arrivals = field(init=False)
+    _inside: bool = False
+    _ended: bool = False
+    _shown: dict[str, str] = field(default_factory=dict)
+    _errors: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        """Nothing is taken up yet."""
+        self.arrivals = Arrivals(self.settings.settle_s)
+
+    def begin(self) -> Outcome:
+        """The first line; what follows are the passes, until Ctrl-C or a termination signal."""
+        end_at_once_or_next(self._signalled)
+        text = f"watching {self.settings.input}; Ctrl-C ends it, and the same command goes on"
+        return Outcome(text=text, then=self._next)
+
+    def _next(self) -> Outcome:
+        """Waits until a pass is due, and performs it; its outcome goes on with the next one."""
+        self._inside = True
+        try:
+            if self._ended:
+                raise KeyboardInterrupt
+            outcome = self._pass(self._wait())
+        except BaseException:
+            self._ended = True
+            self.workers.close()
+            raise
+        finally:
+            self._inside = False
+        return replace(outcome, exit_code=0, then=self._next)
+
+    def _signalled(self, *_: object) -> None:
+        """Ends a pass at once; between two passes, while a line is printed, the next one ends."""
+        ended, self._ended = self._ended, True
+        if self._inside and not ended:
+            raise KeyboardInterrupt
+
+    def _wait(self) -> Snapshot:
+        folder = Path(self.settings.input)
+        with waiting(f"watching {self.settings.input}"):
+            while True:
+                begun_s = time.monotonic()
+                now = snapshot(folder)
+                ended_s = time.monotonic()
+                if self.arrivals.due(now, ended_s):
+                    return now
+                time.sleep(max(LOOK_EVERY_S, 10.0 * (ended_s - begun_s)))
+
+    def _pass(self, now: Snapshot) -> Outcome:
+        def surveyed() -> None:
+            if snapshot(Path(self.settings.input)) != now:
+                raise FolderChangedError
+
+        try:
+            outcome = self.perform(surveyed)
+        except FolderChangedError:
+            return Outcome()
+        except MachineError as error:
+            time.sleep(RETRY_S)
+            return Outcome(errors=(f"error: {error}; trying again",))
+        self.arrivals.taken = now
+        return self._news(outcome)
+
+    def _news(self, outcome: Outcome) -> Outcome:
+        """What this pass changed: a line a motor, and the error lines that are new."""
+        output = Path(self.settings.output)
+        sheets = read_datasheets(output) if any((output / "datasheets").glob("*.json")) else ()
+        at = datetime.now().astimezone().strftime("%H:%M:%S")
+        lines = [
+            f"{at} {printable(sheet.motor_id)}: {sheet.status}, version {sheet.version[:12]}"
+            + (f"; {sheet.why[0]}" if sheet.why else "")
+            for sheet in sheets
+            if self._shown.get(sheet.motor_id) != sheet.version
+        ]
+        gone = sorted(set(self._shown) - {sheet.motor_id for sheet in sheets})
+        lines += [f"{at} {printable(motor)}: its captures are gone" for motor in gone]
+        errors = tuple(line for line in outcome.errors if line not in self._errors)
+        self._shown = {sheet.motor_id: sheet.version for sheet in sheets}
+        self._errors = frozenset(outcome.errors)
+        return Outcome(text="\n".join(lines), errors=errors)
+
+
+def end_at_once_or_next(signalled: Callable[..., None]) -> None:
+    """Ctrl-C, and SIGTERM as service managers send it, call `signalled`."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signalled)
+        signal.signal(signal.SIGTERM, signalled)
