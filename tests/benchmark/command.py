@@ -12,7 +12,7 @@ from pipeline.records.errors import UsageError
 from tests.benchmark.blind import product
 from tests.benchmark.cases import Case
 from tests.benchmark.drawing import cases, small
-from tests.benchmark.policy_sensitivity import measure, page, spread
+from tests.benchmark.policy_sensitivity import chosen_entries, measure, page, spread
 from tests.benchmark.running import Book, code_digest, run, share_of
 from tests.benchmark.table import by_effect, table
 
@@ -26,7 +26,7 @@ class Options:
     """The keys of the command.
 
     `action`: run, table (of what has been run), sensitivity (measure a* anew), or policy (halve and
-    double the chosen numbers `fields`, on `count` cases). `output`: folder
+    double the chosen numbers `fields`, or `all`, on `count` cases). `output`: folder
     of sealed truths and results. `subset`: small, of minutes, or full, of hours. `shard`: which
     part of the cases to work on, i/n with i from 1. `seed`: of every random draw. `docs`: Markdown
     page to put the table into, between its marks. `date`: date to write over the table. `world`:
@@ -117,6 +117,8 @@ def _world(chosen: Options, book: Book) -> str:
 def _policy(chosen: Options, some: list[Case], book: Book) -> str:
     """Halves and doubles the fields, and writes the table of all that has been run."""
     fields = [name for name in chosen.fields.split(",") if name]
+    if fields == ["all"]:
+        fields = [entry.name for entry in chosen_entries([])]
     done = measure(some, book, fields)
     text = page(some, book, fields, chosen.seed)
     if chosen.docs:

@@ -1,7 +1,8 @@
 """How names and silence move when a constant of judgement is halved and doubled.
 
 Every variant is a run of the same sealed cases under another policy, kept like any run, so that a
-command that was stopped goes on. Rows that have not been run say so.
+command that was stopped goes on. A case is run again only where it reads the number: elsewhere its
+result stays. Rows that have not been run say so.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pipeline.records.errors import UsageError
 from pipeline.records.policy import Entry, Number, Overrides, entries, policy_digest
 from tests.benchmark.blind import product
 from tests.benchmark.cases import Case
+from tests.benchmark.policy_reads import READS, listening_product
 from tests.benchmark.running import Book, run
 from tests.benchmark.scoring import judged
 
@@ -24,10 +26,12 @@ HEAD = """# What moves when a constant of judgement is halved or doubled
 
 `python -m tests.benchmark action=policy fields=NAME,... count=N docs=docs/policy-sensitivity.md`
 runs {count} cases of the small blind benchmark ([benchmark.md](benchmark.md)) at the default policy
-and with one chosen number halved and doubled. *right*, *wrong* and *silent* count the cases' marks
-(silent: nothing named with confidence where something is hidden); *moved* counts cases whose
-verdict or names differ from the default's. A share of few cases says little: no row here calibrates
-a number. Rows without figures have not been run. [policy.md](policy.md) says what each number is.
+and with one chosen number halved and doubled; `fields=all` takes every number. *read* counts the
+cases that read the number; in the others it can move nothing, and they are not run again. *right*,
+*wrong* and *silent* count the cases' marks (silent: nothing named with confidence where something
+is hidden); *moved* counts cases whose verdict or names differ from the default's. A share of few
+cases says little: no row here calibrates a number. Rows without figures have not been run.
+[policy.md](policy.md) says what each number is.
 
 Cases: {cases}. Code {code}, seed {seed}.
 """
@@ -73,33 +77,42 @@ def spread(cases: Sequence[Case], count: int) -> list[Case]:
 
 
 def book_of(book: Book, variant: Variant) -> Book:
-    """Where the results of a variant are kept: the code's own place is the default policy's."""
+    """Where the results of a variant are kept; those of the default policy say what they read."""
     if not variant.changes:
-        return book
+        return Book(book.folder, f"{book.code}-read")
     return Book(book.folder, f"{book.code}-{policy_digest(policy_of(variant.changes))[:12]}")
 
 
 def measure(cases: Sequence[Case], book: Book, fields: Sequence[str]) -> int:
     """Runs the default and the variants of some fields; returns how many cases it diagnosed."""
-    wanted = [Variant()]
-    some = chosen_entries(fields)[: len(fields)]
-    wanted += [Variant(entry, factor) for entry in some for factor in FACTORS]
-    return sum(
-        run(list(cases), book_of(book, one), partial(product, policy=one.changes)) for one in wanted
-    )
+    done = run(list(cases), book_of(book, Variant()), listening_product)
+    for entry in chosen_entries(fields)[: len(fields)]:
+        feeling = [case for case in cases if entry.name in _read(case, book)]
+        for factor in FACTORS:
+            one = Variant(entry, factor)
+            done += run(feeling, book_of(book, one), partial(product, policy=one.changes))
+    return done
+
+
+def _read(case: Case, book: Book) -> frozenset[str]:
+    """The numbers that the diagnosis of a case reads by the default policy."""
+    document = book_of(book, Variant()).document(case)
+    return frozenset() if document is None else frozenset(document.get(READS, ()))
 
 
 def page(cases: Sequence[Case], book: Book, fields: Sequence[str], seed: int) -> str:
     """The table of all chosen numbers, as far as they have been run."""
     listed = ", ".join(f"{case.family} {case.line} ({case.motor})" for case in cases)
     lines = [HEAD.format(count=len(cases), cases=listed, code=book.code, seed=seed)]
-    lines += [f"| field | value | halved: {_COLUMNS} | doubled: {_COLUMNS} |"]
-    lines += ["| --- | --- |" + " --- |" * 8]
-    lines.append(f"| *default* | | {_marks(cases, book, Variant())} | | | | |")
+    lines += [f"| field | value | read | halved: {_COLUMNS} | doubled: {_COLUMNS} |"]
+    lines += ["| --- | --- | --- |" + " --- |" * 8]
+    lines.append(f"| *default* | | | {_marks(cases, book, Variant())} | | | | |")
+    known = all(book_of(book, Variant()).document(case) is not None for case in cases)
     for entry in chosen_entries(fields):
         both = (_marks(cases, book, Variant(entry, factor)) for factor in FACTORS)
         value = entry.value if not isinstance(entry.value, tuple) else "row"
-        lines.append(f"| `{entry.name}` | {value} | {' | '.join(both)} |")
+        count = sum(entry.name in _read(case, book) for case in cases) if known else ""
+        lines.append(f"| `{entry.name}` | {value} | {count} | {' | '.join(both)} |")
     return "\n".join([*lines, ""])
 
 
@@ -119,7 +132,9 @@ def _pairs(
     cases: Sequence[Case], book: Book, variant: Variant
 ) -> Iterator[tuple[Case, Mapping[str, Any], Mapping[str, Any]]]:
     for case in cases:
-        document, plain = book_of(book, variant).document(case), book.document(case)
+        plain = book_of(book, Variant()).document(case)
+        moves = variant.entry is None or variant.entry.name in _read(case, book)
+        document = book_of(book, variant).document(case) if moves else plain
         if document is not None and plain is not None:
             yield case, document, plain
 

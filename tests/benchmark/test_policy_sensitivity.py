@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.policy.policy import DEFAULT, policy_of
 from pipeline.io.storage.publish import canonical_json, write_whole
 from pipeline.records.errors import UsageError
-from pipeline.records.policy import entries
+from pipeline.records.policy import entries, policy_digest
 from tests.benchmark.cases import Case
 from tests.benchmark.drawing import cases
+from tests.benchmark.policy_reads import READS, listened, listening
 from tests.benchmark.policy_sensitivity import (
     Variant,
     book_of,
@@ -30,9 +31,9 @@ def nulls(tmp_path_factory: pytest.TempPathFactory) -> list[Case]:
     return [case for case in drawn if case.family == "null"][:2]
 
 
-def keep(book: Book, case: Case, *missing: str) -> None:
+def keep(book: Book, case: Case, *missing: str, read: tuple[str, ...] = ()) -> None:
     document = {"verdict": "missing" if missing else "adequate", "missing": missing, "ranking": []}
-    write_whole(book.result(case), canonical_json(document))
+    write_whole(book.result(case), canonical_json({**document, READS: read}))
 
 
 def test_numbers_are_scaled_and_whole_ones_stay_whole():
@@ -65,12 +66,35 @@ def test_a_row_counts_what_was_run_and_is_empty_where_it_was_not(
     half = book_of(book, Variant(tie, 0.5))
     assert half.code != book.code
     for case in nulls:
-        keep(book, case)
+        keep(book_of(book, Variant()), case, read=("selection.tie",))
     keep(half, nulls[0], "windage")
     rows = page(nulls, book, ["selection.tie"], 3).splitlines()
     (row,) = (row for row in rows if "`selection.tie`" in row)
-    assert row == "| `selection.tie` | 12.0 |  | | |  |  | | |  |"
+    assert row == "| `selection.tie` | 12.0 | 2 |  | | |  |  | | |  |"
     keep(half, nulls[1])
     rows = page(nulls, book, ["selection.tie"], 3).splitlines()
     (row,) = (row for row in rows if "`selection.tie`" in row)
-    assert row == "| `selection.tie` | 12.0 | 1 | 1 | 0 | 1 |  | | |  |"
+    assert row == "| `selection.tie` | 12.0 | 2 | 1 | 1 | 0 | 1 |  | | |  |"
+
+
+def test_a_number_that_no_case_reads_moves_nothing(nulls: list[Case], tmp_path: Path) -> None:
+    """Without a run of it: the results stay."""
+    book = Book(tmp_path, "code")
+    for case in nulls:
+        keep(book_of(book, Variant()), case, read=("selection.least_share",))
+    (row,) = (r for r in page(nulls, book, [], 3).splitlines() if "`selection.tie`" in r)
+    assert row == "| `selection.tie` | 12.0 | 0 | 2 | 0 | 0 | 0 | 2 | 0 | 0 | 0 |"
+
+
+def test_what_is_read_is_noted_and_a_digest_is_no_reading():
+    seen: set[str] = set()
+    policy = listening(DEFAULT, seen)
+    assert policy_digest(policy) == policy_digest(DEFAULT)
+    assert seen == set()
+    assert policy.priors.gain == DEFAULT.priors.gain
+    assert policy.selection.tie == DEFAULT.selection.tie
+    assert seen == {"priors.gain", "selection.tie"}
+    with listened() as named:
+        assert policy_of(()).fit.halvings == DEFAULT.fit.halvings
+    assert named == {"fit.halvings"}
+    assert policy_of(()) is DEFAULT

@@ -29,6 +29,7 @@ from pipeline.criticism.effect import (
     Parameter,
     Values,
 )
+from pipeline.criticism.policy.captures import Priors
 from pipeline.criticism.policy.policy import Policy
 
 _STEP = 1e-30
@@ -81,10 +82,23 @@ BASE: tuple[Constant, ...] = (
 )
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
+_SHARED_PRIORS = {
+    "zero_alpha_a": "zero_a",
+    "zero_beta_a": "zero_a",
+    "unlogged_winding_k": "unlogged_k",
+    "unlogged_magnet_k": "unlogged_k",
+}
+"""Fields of `policy.priors` that stand for several nuisances."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
 GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
+
+
+def _prior(name: str, priors: Priors) -> float | None:
+    """Standard uncertainty of a nuisance by the policy; None of a constant that has no prior."""
+    own: float | None = getattr(priors, _SHARED_PRIORS.get(name, name), None)
+    return priors.gain if own is None and name.startswith("gain_") else own
 
 
 def base_of(machine: Machine) -> tuple[Constant, ...]:
@@ -121,8 +135,8 @@ class Model:
         somebody states of this motor.
         """
         stated = self.machine.stated_u
-        sizes, known = {"1": 1.0, **self.machine.scales}, self.policy.priors
-        base = [(c, known.of(c.name)) for c in base_of(self.machine)]
+        sizes = {"1": 1.0, **self.machine.scales}
+        base = [(c, _prior(c.name, self.policy.priors)) for c in base_of(self.machine)]
         own = {
             c.name: (c.center, stated.get(c.name, u * sizes[c.scale]))
             for c, u in base

@@ -300,10 +300,3 @@ class Priors:
         meaning="winding or magnet over ambient where its temperature was not recorded",
         why="most motors on a bench lie within twice that of their surroundings",
     )
-
-    def of(self, name: str) -> float | None:
-        """The prior of a nuisance of the base model; None of a constant that has none."""
-        shared = {"zero_alpha_a": "zero_a", "zero_beta_a": "zero_a"}
-        shared |= dict.fromkeys(("unlogged_winding_k", "unlogged_magnet_k"), "unlogged_k")
-        own: float | None = getattr(self, shared.get(name, name), None)
-        return self.gain if own is None and name.startswith("gain_") else own
