@@ -33,7 +33,7 @@ class Cutting:
         0.002,
         unit="s",
         meaning="length of a window of a current step",
-        why="short, since all that it tells is over after a few L/R",
+        why="short: all that it shows is over after a few L/R",
     )
     windows: int = chosen(48, unit="windows", meaning="windows of a capture at the most", why=COST)
     windows_drive: int = chosen(
@@ -156,7 +156,7 @@ class Tables:
         4,
         unit="levels",
         meaning="levels of current from which on they are held out one by one",
-        why="the others tell a curve, its slope and scatter",
+        why="the others show a curve, its slope and scatter",
     )
     parts: int = chosen(
         12,
@@ -180,7 +180,7 @@ class Tables:
         1e-3,
         unit="1",
         meaning="noise of a column of a flux map, of its range",
-        why="a table does not tell its own; such tables are good to 0.1 %",
+        why="a table does not state its own; such tables are good to 0.1 %",
     )
     other_axis: float = chosen(
         0.1,
