@@ -64,6 +64,8 @@ class Control(NamedTuple):
     ki_speed: float
     i_limit: float
     held_speed: bool
+    dyno_nms: float
+    dyno_nm: float
     gain_a: float
     gain_b: float
     gain_c: float
@@ -251,7 +253,8 @@ def advance(
     Parameters
     ----------
     y
-        State [7]: ψ_alpha, ψ_beta [Wb], θ, ω, far θ, far ω [rad, rad/s], bristle [rad].
+        State [8]: ψ_alpha, ψ_beta [Wb], θ, ω, far θ, far ω [rad, rad/s], bristle [rad], angle by
+        which the far end is ahead of the dynamometer's set speed [rad].
     work
         Energy in, in copper and in switches so far [3, J]; grows by that of the step.
     volt
@@ -401,7 +404,7 @@ def command(loop: Array, seen: Pair, eps: float, omega: float, want: Array, c: C
 @njit(cache=True)
 def beginning(c: Control, p: Plant) -> Array:
     """State at the start: no current, the magnet's flux, friction already bent."""
-    y = np.zeros(7)
+    y = np.zeros(8)
     y[2], y[3], y[4], y[5] = c.theta, c.omega, c.theta, c.omega
     y[6] = math.copysign(p.bristle, c.omega) if c.omega != 0.0 else 0.0
     eps = p.pole_pairs * c.theta
@@ -412,12 +415,25 @@ def beginning(c: Control, p: Plant) -> Array:
 
 
 @njit(cache=True)
-def shaft_torque(y: Array, load: float, volt: Pair, warm: Pair, c: Control, p: Plant) -> Pair:
-    """Torque the transducer sees, and the electromagnetic torque [N·m]."""
+def load_torque(y: Array, want: Array, c: Control, p: Plant) -> float:
+    """Torque of the load [N·m]: the one wanted, or that of a dynamometer's speed loop."""
+    if c.dyno_nms == 0.0:
+        return float(want[2])
+    ahead = y[5 if p.two_mass else 3] - want[3]
+    return float(c.dyno_nms * ahead + c.dyno_nm * y[7])
+
+
+@njit(cache=True)
+def shaft_torque(y: Array, want: Array, volt: Pair, warm: Pair, c: Control, p: Plant) -> Pair:
+    """Torque the transducer sees, and the electromagnetic torque [N·m].
+
+    A dynamometer that holds the far end has it in the coupling; one whose speed gives way shows the
+    reaction torque of its stator, which the inertia of its rotor is in.
+    """
     mechanics = (y[2], y[3], y[4], y[5])
     field = windings((y[0], y[1]), mechanics, volt, warm, p)
-    if not c.held_speed:
-        return load, field[2]
+    if not c.held_speed or c.dyno_nms > 0.0:
+        return load_torque(y, want, c, p), field[2]
     if p.two_mass:
         return coupling(y[2] - y[4], y[3] - y[5], p), field[2]
     return net_torque(mechanics, y[6], field, warm, p), field[2]
@@ -438,10 +454,14 @@ def run_on(
 ) -> int:
     """Integrate some steps with one voltage vector; returns the newest place in the history."""
     h = c.period_s / c.substeps
+    far = 5 if p.two_mass else 3
+    held = c.held_speed and c.dyno_nms == 0.0
     for _ in range(steps):
-        if c.held_speed:
-            y[5 if p.two_mass else 3] = want[3]
-        advance(y, work, volt, want[2], warm, h, c.held_speed, p)
+        if held:
+            y[far] = want[3]
+        load = load_torque(y, want, c, p)
+        y[7] += h * (y[far] - want[3])
+        advance(y, work, volt, load, warm, h, held, p)
         if c.delay_s > 0.0:
             newest += 1
             i_alpha, i_beta = stator_current(y, warm[1], p)
@@ -493,7 +513,7 @@ def drive(reference: Array, noise: Array, c: Control, p: Plant) -> Array:
         if k > 0:
             omega += blend * ((angle - before) / c.period_s - omega)
         before = angle
-        shaft, torque = shaft_torque(y, want[2], volt, warm, c, p)
+        shaft, torque = shaft_torque(y, want, volt, warm, c, p)
         out[k, 0:9] = (seen[0], seen[1], volt[0], volt[1], angle, omega, shaft, warm[0], warm[1])
         out[k, 9:16] = (y[2], y[3], true[0], true[1], y[0], y[1], torque)
         out[k, 16:19] = work

@@ -172,7 +172,9 @@ class Bench:
     station's own sensors. Hidden faults of the recorder: its clock is fast or
     slow by the share `clock_rel` beyond what `u_rel_clock` states (stated where above 0), while the
     speed that the bench tells goes by a clock of its own; torque and logged dq currents come
-    `late_torque_s` and `late_current_s` late.
+    `late_torque_s` and `late_current_s` late. `dyno_hz` is the bandwidth of the dynamometer's speed
+    loop, whose transducer then shows the reaction torque of its stator; 0 holds the shaft's far
+    end at its speed, with the transducer in the coupling.
     """
 
     station: str = "sim-1"
@@ -206,6 +208,7 @@ class Bench:
     clock_rel: float = 0.0
     late_torque_s: float = 0.0
     late_current_s: float = 0.0
+    dyno_hz: float = 0.0
     instruments: Instruments | None = None
 
     def drawn(self, rng: np.random.Generator) -> Instruments:

@@ -100,6 +100,8 @@ def control(
         "ki_speed": 0.0,
         "i_limit": 1.2 * m.current_rated_a,
         "held_speed": True,
+        "dyno_nms": 0.0,
+        "dyno_nm": 0.0,
         "ambient": m.ambient_degc,
         "temp_winding": warm[0],
         "temp_magnet": warm[1],
@@ -201,7 +203,10 @@ def torque_map(session: Session, how: protocols.TorqueMap) -> Recording:
     )
     reference = np.stack([i_d, i_q, np.zeros(i_d.size), np.full(i_d.size, omega)], axis=1)
     warm = _warm(session, how.temp_winding_degc, how.temp_magnet_degc)
-    loop = control(session, 1.0 / pwm_hz, how.voltage_timing, omega, warm)
+    width = 2.0 * math.pi * session.bench.dyno_hz
+    stiff = width * m.j_rotor_kgm2
+    dyno = {"dyno_nms": stiff, "dyno_nm": 0.25 * width * stiff}
+    loop = control(session, 1.0 / pwm_hz, how.voltage_timing, omega, warm, **dyno)
     rows = drive(reference, loop_noise(session, i_d.size, 1.0 / pwm_hz), loop, session.plant)
     meta = _meta(session, "torque_map", how.voltage_timing, pwm_hz)
     return Recording("torque_map", meta, (log(session, rows, 1.0 / pwm_hz),))

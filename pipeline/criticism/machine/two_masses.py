@@ -5,10 +5,10 @@ The far angle is θ less the twist, so that with a load at the far end
 
     T_load = S − f J (θ″ − twist″) = [T − drags − J θ″] + f J twist″,
 
-while a dynamometer that holds the far end, or a transducer in the coupling, reads S itself,
-[T − drags − J θ″] + f J θ″. Motor angle and load are recorded; the twist is a function of S, that
-of a spring or of a spring behind a gap, which `discriminator` finds from whole logs. A coasting
-shaft passes on next to nothing.
+while a transducer in the coupling reads S itself, [T − drags − J θ″] + f J θ″. A dynamometer that
+holds the far end makes both the same; one whose speed gives way does not. Motor angle and load are
+recorded; the twist is a function of S, that of a spring or of a spring behind a gap, which
+`discriminator` finds from whole logs. A coasting shaft passes on next to nothing.
 
 References: [1] Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000); [2] Nordin & Gutman, Automatica 38
 (2002), backlash as a dead zone of the twist; [3] Tukey, Exploratory Data Analysis (1977), ch. 16.
@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Discrimination, FullLog, Operating, Values
+from pipeline.criticism.effect import Array, Discrimination, FullLog, Machine, Operating, Values
 from pipeline.criticism.machine.torsion import Shaft, law_of_twist
 
 _BLOCK_S = 0.5e-3
@@ -65,6 +65,12 @@ def passed_on(x: Operating, share: float) -> Array:
     J. W. Tukey, Exploratory Data Analysis, Addison-Wesley, 1977, ch. 16 (twicing).
 
     """
+    near = (1.0 - share) * x.base["j_kgm2"]
+    return _smoothed(x, x.torque_nm[1:-1] - near * np.diff(x.theta_rad, 2) / x.ts_s**2)
+
+
+def _smoothed(x: Operating, inner: Array) -> Array:
+    """A signal without its first and last sample [n − 2], as `passed_on` smooths it [n]."""
     block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
     block -= 1 - block % 2
     box = np.full(block, 1.0 / block)
@@ -73,11 +79,71 @@ def passed_on(x: Operating, share: float) -> Array:
     found = np.zeros(x.theta_rad.size)
     if found.size < kernel.size + 2:
         return found
-    near = (1.0 - share) * x.base["j_kgm2"] / x.ts_s**2
-    through = x.torque_nm[1:-1] - near * np.diff(x.theta_rad, 2)
     first = kernel.size // 2 + 1
-    found[first : x.theta_rad.size - first] = np.convolve(through, kernel, mode="valid")
+    found[first : x.theta_rad.size - first] = np.convolve(inner, kernel, mode="valid")
     return found
+
+
+def linear_far_drag(x: Operating, q: Values) -> Array:
+    """`far_drag` of a spring without damping, in parameters that it is linear in.
+
+    Parameters
+    ----------
+    x
+        State of the machine.
+    q
+        `torque_s2` = f J/k and `angle_s2` = f J/k (1 − f) J/J0 [s²], with J0 of `inertia_scale`.
+
+    Returns
+    -------
+    array [n, N·m]
+        −f J twist″ = −(torque_s2 T″ − angle_s2 J0 θ⁗); 0 of a shaft that no inverter drives.
+
+    Notes
+    -----
+    Whatever the inertia of a fit is, both have the right form: of `far_drag` only one combination
+    has, and that at the right inertia.
+
+    """
+    drag = np.zeros(x.theta_rad.size)
+    if not x.inverter:
+        return drag
+    bend = np.diff(x.theta_rad, 2) / x.ts_s**2
+    bent = q["angle_s2"] * inertia_scale(x.machine)
+    made = q["torque_s2"] * x.torque_nm[1:-1] - bent * bend
+    drag[1:-1] = -np.diff(_smoothed(x, made), 2) / x.ts_s**2
+    return drag
+
+
+def inertia_scale(machine: Machine) -> float:
+    """Order of magnitude of an inertia [kg·m²]: a tenth of a second to full speed."""
+    return 0.1 * machine.scales["torque_nm"] / machine.scales["speed_rad_s"]
+
+
+def spring_of(q: Values, j_kgm2: float, machine: Machine) -> dict[str, float] | None:
+    """Share at the far end and twist at the machine's torque, from `linear_far_drag`.
+
+    Parameters
+    ----------
+    q
+        Parameters of `linear_far_drag`.
+    j_kgm2
+        Inertia of both parts [kg·m²].
+    machine
+        Its scales.
+
+    Returns
+    -------
+    mapping or None
+        `share` = f [1] and `twist_rad` = T/k [rad] at the machine's torque T; None where no two
+        masses have such parameters.
+
+    """
+    soft, bent = q["torque_s2"], q["angle_s2"] * inertia_scale(machine)
+    if min(soft, bent, j_kgm2) <= 0.0 or bent >= soft * j_kgm2:
+        return None
+    share = 1.0 - bent / (soft * j_kgm2)
+    return {"share": share, "twist_rad": machine.scales["torque_nm"] * soft / (share * j_kgm2)}
 
 
 def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
@@ -116,8 +182,7 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
     share
         Of the inertia that is at the far end [1].
     between
-        Whether the transducer stands between the two parts, and so reads S whether or not the far
-        end is held.
+        Whether the transducer stands between the two parts, and so reads S.
     twist_rad
         Gives the twist [n, rad] where it is needed.
 
@@ -134,7 +199,7 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
-    moved = x.theta_rad if x.shaft.held or between else twist_rad()
+    moved = x.theta_rad if between else twist_rad()
     drag = np.zeros(x.theta_rad.size)
     drag[1:-1] = -far / x.ts_s**2 * np.diff(moved, 2)
     return drag

@@ -129,6 +129,12 @@ class Selection:
         meaning="ratio of some noise floor, new over old, that calls for a fit by the new ones",
         why="a floor is known to some 6 %; one that is off by half moves what is over it",
     )
+    coupling_floors: float = chosen(
+        20.0,
+        unit="noise floors",
+        meaning="miss of a torque from which on a soft coupling is fitted from a start of its own",
+        why="a base that is a little wrong misses by a few; an inertia behind a soft shaft by tens",
+    )
     inertia_ratio: float = chosen(
         2.0,
         unit="1",

@@ -13,6 +13,7 @@ from pipeline.criticism.effect import Array, Effect
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown, tolerances
 from pipeline.criticism.regression.gauss_newton import first_fit, gauss_newton, rough_anew
 from pipeline.criticism.regression.goodness import (
+    HeldOut,
     in_common,
     leave_out,
     predicted_chi2,
@@ -23,6 +24,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.choices import reconsidered
+from pipeline.criticism.selection.coupled_start import with_coupled_start
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
 from pipeline.criticism.selection.pruning import trimmed, with_all_terms
@@ -64,6 +66,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         significant = significant_groups(wide)
         scores = score_all(wide, offered, significant)
         scores = with_starts(wide, offered, scores, significant)
+        scores = with_coupled_start(wide, offered, scores, significant)
         added = tuple(e.name for e in fit.model.effects[base:])
         steps.append(LadderStep(added, wide, scores))
         if len(steps) == policy.most_steps:
@@ -145,31 +148,71 @@ def _refit_best(
     5. so predicted, what it mends is more than what it spoils where it acts.
     """
     policy = wide.policy.selection
-    before, shrunk = leave_out(wide), _shrunk(wide)
-    any_wrong, significant = _doubt(wide, found), significant_groups(wide)
+    usual = _Rival.of(wide, found)
     tests = {segment.test for segment in wide.segments}
     close = [s for s in passing if s.fall >= policy.close_share * passing[0].fall]
     best: LinearSystem | None = None
-    least = math.inf
+    least = 0.0
     for score in close:
         effect = score.candidate.effect
-        tried = _refitted(wide, score)
+        begun = _by_floors_of(wide, score)
+        tried = _refitted(begun, score)
+        rival = usual if begun is wide else _Rival.of(gauss_newton(begun.fit, begun), found)
+        base = rival.wide
         # of two that tie, the one that some capture here was made to show
         unsought = policy.tie if set(effect.tests).isdisjoint(tests) else 0.0
-        cost = tried.deviance + score.penalty + unsought
-        if not _matters(tried, wide, significant) or cost >= min(least, wide.deviance):
-            continue
-        same_hook = _same_hook(effect, found)
-        doubts = _doubt(wide, same_hook), any_wrong
-        below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
-        promised = policy.held_out_penalties * score.penalty, below * score.penalty
-        one, other = in_common((wide, tried), (before, leave_out(tried)))
-        without = predicted_chi2(wide, one) * shrunk
-        after = predicted_chi2(tried, other) * _shrunk(tried)
-        holds = _holds(wide, without, tried, after, promised, doubts)
-        if holds and not spoils(tried, without, after):
+        cost = tried.deviance - base.deviance + score.penalty + unsought
+        if _matters(tried, base, rival.significant) and cost < least and rival.loses(tried, score):
             best, least = tried, cost
     return best
+
+
+@dataclass(frozen=True, slots=True)
+class _Rival:
+    """The fit without a candidate, as the candidate is judged against it: with the effects `found`
+    so far, what it predicts of captures held out, its `shrunk` floors and `doubts` of form [G].
+    """
+
+    wide: LinearSystem
+    found: Sequence[Effect]
+    held: HeldOut
+    shrunk: Array
+    doubt: Array
+    significant: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, wide: LinearSystem, found: Sequence[Effect]) -> _Rival:
+        held, significant = leave_out(wide), significant_groups(wide)
+        return cls(wide, found, held, _shrunk(wide), _doubt(wide, found), significant)
+
+    def loses(self, tried: LinearSystem, score: Score) -> bool:
+        """Whether a candidate predicts captures held out better, and mends more than it spoils."""
+        wide, policy = self.wide, self.wide.policy.selection
+        same_hook = _same_hook(score.candidate.effect, self.found)
+        doubts = _doubt(wide, same_hook), self.doubt
+        below = policy.same_hook_penalties if same_hook else policy.held_out_penalties
+        promised = policy.held_out_penalties * score.penalty, below * score.penalty
+        one, other = in_common((wide, tried), (self.held, leave_out(tried)))
+        without = predicted_chi2(wide, one) * self.shrunk
+        after = predicted_chi2(tried, other) * _shrunk(tried)
+        holds = _holds(wide, without, tried, after, promised, doubts)
+        return holds and not spoils(tried, without, after)
+
+
+def _by_floors_of(wide: LinearSystem, score: Score) -> LinearSystem:
+    """The fit by the noise floors that a candidate begins with, if it is a coupling.
+
+    A twist told by an angle amplifies its noise: at orders of the angle by hundreds. By the floors
+    of a rigid shaft that would pass for a misfit.
+    """
+    if score.candidate.effect.discriminator is None:
+        return wide
+    begun = begin_from(wide.fit, score)
+    grown = floors(begun.segments, begun.model, begun.values)
+    ratio = np.concatenate(grown) / np.concatenate(wide.fit.sigma)
+    if np.abs(np.log(ratio)).max() < math.log(wide.policy.selection.floor_ratio):
+        return wide
+    return linear_system(replace(wide.fit, sigma=grown, near=begun.values))
 
 
 def _refitted(wide: LinearSystem, score: Score) -> LinearSystem:

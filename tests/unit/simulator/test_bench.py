@@ -312,3 +312,30 @@ def test_mistakes_are_named():
         record("drive", motor, QUIET, rng, voltage_timing="sometimes")
     with pytest.raises(ValueError, match="r_phase_ohm must be positive"):
         replace(motor, r_phase_ohm=-1.0)
+
+
+@pytest.mark.parametrize("name", ["gimbal-5208", "joint-11p", "servo-15kw"])
+def test_a_dynamometer_that_gives_way_shows_its_reaction_torque(name):
+    """Torque of the air gap less drags less J dω/dt, which is large after a step of current."""
+    motor = design(name)
+    motor = replace(motor, effects={})
+    protocol = {"speed": 0.3, "id_levels": (0.0,), "iq_levels": (0.2, 0.6), "dwell_s": 0.1}
+
+    def shown(bench):
+        rng = np.random.default_rng(2)
+        table = record("torque_map", motor, bench, rng, **protocol).tables[0]
+        period = float(table["t_s"][1] - table["t_s"][0])
+        pace = np.gradient(table["theta_mech_rad"], period)
+        made = 1.5 * motor.pole_pairs * motor.psi_pm_wb * table["iq_a"]
+        drag = motor.torque_coulomb_nm + motor.b_visc_nm_s_rad * pace
+        push = motor.j_rotor_kgm2 * np.gradient(pace, period)
+        return table["torque_shaft_nm"], made - drag, push
+
+    inside = slice(200, -200)
+    shaft, net, push = (column[inside] for column in shown(replace(QUIET, dyno_hz=12.0)))
+    rated = motor.torque_rated_nm
+    assert np.percentile(np.abs(shaft - net + push), 90) < 0.02 * rated
+    assert np.abs(push).max() > 0.2 * rated
+    shaft, net, push = (column[inside] for column in shown(QUIET))
+    assert np.percentile(np.abs(shaft - net), 90) < 0.02 * rated
+    assert np.abs(push).max() < 1e-3 * rated

@@ -1,0 +1,99 @@
+"""A soft coupling found from its own start, on a dynamometer that gives way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.diagnosis import diagnose
+from pipeline.criticism.machine.two_masses import (
+    far_drag,
+    inertia_scale,
+    linear_far_drag,
+    passed_on,
+    spring_of,
+    spring_twist,
+)
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import CAMPAIGN, campaign
+from pipeline.simulator.design import Bench
+from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import BASE, operating
+
+TESTS = ("resistance_ab", "torque_map_slow", "torque_map_backward", "drive_0", "spin_down_forward")
+MOTORS = [("gimbal-5208", 65.0, 0.8, 14.0), ("servo-ipm", 120.0, 0.7, 9.0)]
+MOTORS = [*MOTORS, ("joint-11p", 85.0, 0.6, 18.0)]
+"""Motor, resonance [Hz], share of the inertia beyond it [1], bandwidth of the dynamometer [Hz]."""
+
+
+def ladder(name, dyno_hz, seed, **effects):
+    """What is diagnosed from a few captures on a bench that shows the reaction torque."""
+    plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
+    motor = design(name).having(**effects)
+    found = campaign_of(campaign(motor, Bench(dyno_hz=dyno_hz), seed, plan))
+    return diagnose(found, ModelSpec(), Constants())
+
+
+def softness(name, resonance_hz, share):
+    """Of a spring [rad/(N·m)] on which both parts ring at a frequency."""
+    reduced = design(name).j_rotor_kgm2 * share * (1.0 - share)
+    return 1.0 / (reduced * (2.0 * math.pi * resonance_hz) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "resonance_hz", "share", "dyno_hz"),
+    [MOTORS[0], *(pytest.param(*one, marks=pytest.mark.slow) for one in MOTORS[1:])],
+)
+def test_most_inertia_behind_a_soft_shaft_is_found_with_its_size(
+    name, resonance_hz, share, dyno_hz
+):
+    soft = softness(name, resonance_hz, share)
+    found = ladder(name, dyno_hz, 3, compliance={"size": soft, "load_fraction": share})
+    assert found.missing == ("compliance",)
+    known = found.ladder[-1].parameters
+    assert known["compliance.share"][0] == pytest.approx(share, rel=0.08)
+    assert known["j_kgm2"][0] == pytest.approx(design(name).j_rotor_kgm2, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "motor", [MOTORS[0], *(pytest.param(one, marks=pytest.mark.slow) for one in MOTORS[1:])]
+)
+def test_a_stiff_shaft_on_the_same_bench_is_quiet(motor):
+    name, _, _, dyno_hz = motor
+    assert ladder(name, dyno_hz, 4).missing == ()
+
+
+def ringing():
+    """A motor's side that shakes at 40 and 90 Hz under a torque of both."""
+    t = 5e-5 * np.arange(3000)
+    angle = 0.02 * np.sin(2 * math.pi * 40 * t) + 0.004 * np.cos(2 * math.pi * 90 * t)
+    torque = 0.8 * np.sin(2 * math.pi * 40 * t + 0.4) + 0.3 * np.sin(2 * math.pi * 90 * t)
+    return replace(operating(t.size), theta_rad=angle, torque_em_nm=torque)
+
+
+def test_the_linear_form_is_the_spring_and_gives_it_back():
+    x, share, stiffness = ringing(), 0.7, 6.0
+    j, torque = BASE["j_kgm2"], x.machine.scales["torque_nm"]
+    soft = share * j / stiffness
+    linear = {
+        "torque_s2": soft,
+        "angle_s2": soft * (1.0 - share) * j / inertia_scale(x.machine),
+    }
+    spring = {"share": share, "twist_rad": torque / stiffness, "damping_s": 0.0}
+    twist = spring_twist(x, spring, passed_on(x, share))
+    both = far_drag(x, share, False, lambda: twist), linear_far_drag(x, linear)
+    inside = slice(60, -60)
+    assert both[1][inside] == pytest.approx(both[0][inside], rel=1e-6, abs=1e-9)
+    assert np.abs(both[0][inside]).max() > 0.01
+    found = spring_of(linear, j, x.machine)
+    assert found == pytest.approx({"share": share, "twist_rad": torque / stiffness})
+
+
+@pytest.mark.parametrize(("soft", "bent"), [(-1e-6, 1e-6), (1e-6, -1e-6), (1e-6, 1.0)])
+def test_no_two_masses_have_such_parameters(soft, bent):
+    x = operating(4)
+    assert spring_of({"torque_s2": soft, "angle_s2": bent}, BASE["j_kgm2"], x.machine) is None
