@@ -21,7 +21,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Discrimination, FullLog, Machine, Operating, Values
+from pipeline.criticism.effect import (
+    Array,
+    Discrimination,
+    Effect,
+    FullLog,
+    Machine,
+    Operating,
+    Parameter,
+    Values,
+)
 from pipeline.criticism.machine.torsion import Shaft, law_of_twist
 
 _BLOCK_S = 0.5e-3
@@ -113,6 +122,19 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     made = q["torque_s2"] * x.torque_nm[1:-1] - bent * bend
     drag[1:-1] = -np.diff(_smoothed(x, made), 2) / x.ts_s**2
     return drag
+
+
+LINEAR_COUPLING = Effect(
+    name="linear_coupling",
+    words="f J twist″ of a spring, linear in f J/k and f J (1 − f) J/k",
+    signature="a resonance after torque steps",
+    tests=("drive", "torque_map"),
+    experiment="torque steps",
+    reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
+    parameters=(Parameter("torque_s2", "s²", 1e-5, 0.0), Parameter("angle_s2", "s²", 1e-5, 0.0)),
+    torque=linear_far_drag,
+)
+"""A start of `compliance`; its name is never reported."""
 
 
 def inertia_scale(machine: Machine) -> float:

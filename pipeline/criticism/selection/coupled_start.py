@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import row_index
-from pipeline.criticism.effect import Effect, Parameter
-from pipeline.criticism.machine.two_masses import linear_far_drag, spring_of
+from pipeline.criticism.effect import Effect
+from pipeline.criticism.machine.two_masses import LINEAR_COUPLING, spring_of
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
@@ -39,16 +39,6 @@ from pipeline.criticism.selection.score_test import (
 )
 
 _TORQUE = "torque_shaft_nm"
-_LINEAR = Effect(
-    name="linear_coupling",
-    words="f J twist″ of a spring, linear in f J/k and f J (1 − f) J/k",
-    signature="a resonance after torque steps",
-    tests=("drive", "torque_map"),
-    experiment="torque steps",
-    reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
-    parameters=(Parameter("torque_s2", "s²", 1e-5, 0.0), Parameter("angle_s2", "s²", 1e-5, 0.0)),
-    torque=linear_far_drag,
-)
 
 
 def with_coupled_start(
@@ -144,13 +134,15 @@ def _begun(fit: Fit, effect: Effect) -> Fit | None:
         np.where([c == _TORQUE and k != 0 for c, k in row_index(segment)[3]], silent * sigma, sigma)
         for segment, sigma in zip(fit.segments, fit.sigma, strict=True)
     )
-    columns = tuple(effect_columns(_LINEAR, fit.model, ()))
+    columns = tuple(effect_columns(LINEAR_COUPLING, fit.model, ()))
     system = linear_system(replace(fit, sigma=plain), columns)
     places = np.arange(len(system.columns))
     end = system.normal_equations().along(places).best(*fit.policy.selection.thorough)
     steps = zip((c.name for c in system.columns), end.step.tolist(), strict=True)
     moved = {name: fit.values.get(name, 0.0) + step for name, step in steps}
-    linear = {p.name: moved.pop(f"{_LINEAR.name}.{p.name}") for p in _LINEAR.parameters}
+    linear = {
+        p.name: moved.pop(f"{LINEAR_COUPLING.name}.{p.name}") for p in LINEAR_COUPLING.parameters
+    }
     spring = spring_of(linear, moved["j_kgm2"], machine)
     if spring is None:
         return None
