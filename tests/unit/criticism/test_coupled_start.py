@@ -54,9 +54,8 @@ def test_most_inertia_behind_a_soft_shaft_is_found_with_its_size(
     soft = softness(name, resonance_hz, share)
     found = ladder(name, dyno_hz, 3, compliance={"size": soft, "load_fraction": share})
     assert found.missing == ("compliance",)
-    known = found.ladder[-1].parameters
-    assert known["compliance.share"][0] == pytest.approx(share, rel=0.08)
-    assert known["j_kgm2"][0] == pytest.approx(design(name).j_rotor_kgm2, rel=0.03)
+    assert found.ladder[-1].parameters["compliance.share"][0] == pytest.approx(share, rel=0.08)
+    assert found.ladder[-1].held_out < 0.1 * found.ladder[0].held_out
 
 
 @pytest.mark.parametrize(
