@@ -33,7 +33,7 @@ MOTORS = [*MOTORS, ("joint-11p", 85.0, 0.6, 18.0)]
 def ladder(name, dyno_hz, seed, **effects):
     """What is diagnosed from a few captures on a bench that shows the reaction torque."""
     plan = tuple(step for step in CAMPAIGN if step[0] in TESTS)
-    motor = design(name).having(**effects)
+    motor = replace(design(name), effects={}).having(**effects)
     found = campaign_of(campaign(motor, Bench(dyno_hz=dyno_hz), seed, plan))
     return diagnose(found, ModelSpec(), Constants())
 
