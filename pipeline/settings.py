@@ -266,7 +266,9 @@ class RegressSettings(Settings):
 class ExportSettings(Settings):
     """`export`: one controller's configuration from a released datasheet."""
 
-    format: str = key("", "moteus, odrive, vesc, simplefoc, c-header, ssv or csv")
+    format: str = key(
+        "", "c-header, csv, json, moteus, mujoco, odrive, simplefoc, simscape, ssv, vesc"
+    )
     motor: str = key("", "motor_id")
     revision: str | None = key(None, "1, 2, ... of the motor; the newest released without it")
     version: str | None = key(None, "beginning of the version's digest, instead of a revision")

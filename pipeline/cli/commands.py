@@ -123,12 +123,13 @@ COMMANDS = _index(
         "export",
         "export",
         s.ExportSettings,
-        "a released datasheet as a controller's configuration, conventions converted",
+        "a released datasheet for a controller or simulator, conventions converted",
         positional=("format", "motor"),
         common=("format", "motor", "output"),
         examples=(
             "export moteus G52-0601 output=reports/demo",
             "export c-header G52-0601 revision=1",
+            "export mujoco G52-0601 output=reports/demo",
         ),
     ),
     Command(

@@ -15,6 +15,7 @@ from pipeline.physics.glossary import CONSTANTS, TESTS, Term
 from pipeline.records.capture import Integrity
 from pipeline.records.datasheet import CheckStatus, DatasheetStatus
 from pipeline.records.diagnosis import Unexcited
+from pipeline.records.effect_table import EffectTable
 from pipeline.records.estimate import Status
 from pipeline.records.finding import Severity
 from pipeline.records.lot_regression import LotRegression
@@ -153,6 +154,8 @@ def _model() -> Schema:
             "held_out_with": _or_null(SPREAD),
             "unknown": TEXT,
             "unexcited": _list(_kind(Unexcited)),
+            "fitted": _list(_object({"effect": NAME, "parameters": _map(quantity)})),
+            "scales": _map(SPREAD),
         },
     )
 
@@ -215,6 +218,28 @@ def performance_schema() -> Schema:
     needed |= {name: _list(_kind(record)) for name, record in lists.items()}
     body = _object(needed, {"regimes": _list(TEXT), "notes": _list(TEXT)})
     return _document("motor-performance/1", "A motor's curves and ratings", body)
+
+
+def export_schema() -> Schema:
+    """`export json`: constants, effects, and the effects as tables."""
+    quantity = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": TEXT})
+    constant = _object(
+        {"value": NUMBER, "u": SPREAD, "unit": NAME, "status": _one_of(Status), "words": TEXT},
+        {"at": _map({"type": ["number", "string"]})},
+    )
+    body = _object(
+        {
+            "motor_id": NAME,
+            "motor_type": _or_null(TEXT),
+            "version": SHA256,
+            "revision": COUNT,
+            "constants": _map(constant),
+            "effects": _list(_object({"effect": NAME, "parameters": _map(quantity)})),
+            "tables": _list(_kind(EffectTable)),
+            "without_table": _map(NAME),
+        }
+    )
+    return _document("motor-export/1", "A released motor for other programs", body)
 
 
 def findings_schema() -> Schema:
@@ -404,6 +429,7 @@ def _kind(kind: Any) -> Schema:
 SCHEMAS: dict[str, Callable[[], Schema]] = {
     "motor-datasheet": datasheet_schema,
     "findings": findings_schema,
+    "motor-export": export_schema,
     "motor-performance": performance_schema,
     "model-comparison": comparison_schema,
     "model-diagnosis": diagnosis_schema,

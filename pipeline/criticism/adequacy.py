@@ -22,7 +22,7 @@ from pipeline.criticism.validation.error_maps import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.records.diagnosis import Diagnosis
+from pipeline.records.diagnosis import Diagnosis, ToldParameter
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 
 
@@ -72,7 +72,8 @@ def model_verdict(
     found, kept = searched(campaign, model, base)
     # instruments that drift count as noise where the verdict says that nothing else is left
     tested = _residuals(base if found.verdict in ("missing", "unknown") else kept)
-    return _stated(model, _named(tested, found)), found
+    named = replace(_named(tested, found), scales=base.system.fit.machine.scales)
+    return _stated(model, named), found
 
 
 def _stated(model: ModelSpec, found: ModelVerdict) -> ModelVerdict:
@@ -106,7 +107,21 @@ def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
         held_out_with=found.ladder[-1].held_out if missing else None,
         unknown="" if one is None else f"{one.signal}, {one.shape}",
         unexcited=unseen,
+        fitted=_fitted(found),
     )
+
+
+def _fitted(found: Diagnosis) -> dict[str, dict[str, ToldParameter]]:
+    """Parameters of the effects that were asked for, beside those that were found."""
+    if not found.ladder:
+        return {}
+    last = found.ladder[-1].parameters
+    own = {full.partition("."): one for full, one in last.items()}
+    return {
+        name: {short: one for (effect, _, short), one in own.items() if effect == name}
+        for name in found.asked
+        if any(effect == name for effect, _, _ in own)
+    }
 
 
 def _residuals(base: BaseFit) -> ModelVerdict:

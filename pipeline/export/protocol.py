@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 
 from pipeline.physics.glossary import CONSTANTS, Term
 from pipeline.records.datasheet import Datasheet
+from pipeline.records.effect_table import EffectTable, EffectTables
 from pipeline.records.errors import UsageError
 from pipeline.records.estimate import Estimate
+from pipeline.records.model_verdict import Parameters
 
 USABLE = ("measured", "derived")
 Options = Mapping[str, str]
@@ -17,11 +19,14 @@ Values = dict[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A released datasheet on its way out: what it says, its revision, constants' own terms."""
+    """A released datasheet on its way out: what it says, its revision, constants' own terms, and
+    what the effects that are known of the motor add to it, as tables.
+    """
 
     sheet: Datasheet
     revision: int
     terms: Mapping[str, Term] = field(default_factory=lambda: dict(CONSTANTS))
+    effects: EffectTables = field(default_factory=EffectTables)
 
     def estimate(self, name: str) -> Estimate:
         """A constant that may be exported.
@@ -65,6 +70,29 @@ class Source:
         found = (self.optional(name) for name in sorted(self.sheet.constants))
         return [estimate for estimate in found if estimate is not None]
 
+    def sizes(self) -> Mapping[str, Parameters]:
+        """Parameters of the effects that are known of the motor, asked for or found."""
+        return {} if self.sheet.model is None else self.sheet.model.sizes
+
+    def effect_parameters(self) -> list[tuple[str, float, float, str]]:
+        """Every known parameter of an effect: `EFFECT_PARAMETER`, value, u and unit."""
+        return [
+            (f"{effect}_{name}", value, u or 0.0, unit)
+            for effect, parameters in self.sizes().items()
+            for name, (value, u, unit) in parameters.items()
+            if value is not None
+        ]
+
+    def left_out(self, *held: str) -> tuple[str, ...]:
+        """Effects that a format cannot hold, with the reason; `held` are those that it does."""
+        every = dict.fromkeys(self.sizes(), "the format has no place for it")
+        every |= self.effects.without
+        return tuple(f"{name}: {why}" for name, why in every.items() if name not in held)
+
+    def tables(self, variable: str) -> list[EffectTable]:
+        """Tables of the effects over one variable, by its glossary name."""
+        return [one for one in self.effects.tables if variable in one.variables]
+
     def heading(self) -> list[str]:
         """Lines that say what this is, free of anything that would end a comment."""
         sheet = self.sheet
@@ -80,6 +108,7 @@ class Source:
 class Exporter:
     """One format. `render` gives the text, `read` the constants (glossary's names, units and
     conventions) back out of it, whatever the receiver's own conventions; `options` with words.
+    `omits` lists the effects of a datasheet that the format cannot hold.
     """
 
     name: str
@@ -88,6 +117,13 @@ class Exporter:
     render: Callable[[Source, Options], str]
     read: Callable[[str], Values]
     options: Mapping[str, str] = field(default_factory=dict)
+    omits: Callable[[Source], tuple[str, ...]] = Source.left_out
+
+
+def no_effect_omitted(source: Source) -> tuple[str, ...]:
+    """Of a format that holds every parameter of every effect."""
+    del source
+    return ()
 
 
 def plain(text: str) -> str:

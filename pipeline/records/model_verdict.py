@@ -10,6 +10,8 @@ from typing import Any, Literal
 from pipeline.records.diagnosis import ToldParameter, Unexcited
 
 ModelState = Literal["adequate", "missing", "unknown", "insufficient", "not_tested"]
+Parameters = Mapping[str, ToldParameter]
+"""Value, standard uncertainty and unit of an effect's parameters, by name."""
 MODEL_REASON = "model: "
 """How a reason in `why` begins that is about the model: a person may approve in spite of it."""
 
@@ -53,7 +55,7 @@ class FoundEffect:
     what would tell.
     """
 
-    parameters: Mapping[str, ToldParameter]
+    parameters: Parameters
     headline: str = ""
     confused_with: tuple[str, ...] = ()
     experiment: str = ""
@@ -61,10 +63,7 @@ class FoundEffect:
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, with more keys and without the effect's name."""
         return {
-            "parameters": {
-                name: {"value": value, "u": u, "unit": unit}
-                for name, (value, u, unit) in self.parameters.items()
-            },
+            "parameters": _quantities(self.parameters),
             "headline": self.headline,
             "confused_with": list(self.confused_with),
             "experiment": self.experiment,
@@ -74,10 +73,7 @@ class FoundEffect:
     def of(cls, document: Mapping[str, Any]) -> FoundEffect:
         """The record that `document` wrote."""
         return cls(
-            {
-                name: (parameter["value"], parameter["u"], parameter["unit"])
-                for name, parameter in document["parameters"].items()
-            },
+            _parameters(document["parameters"]),
             document.get("headline", ""),
             tuple(document.get("confused_with", ())),
             document.get("experiment", ""),
@@ -95,7 +91,8 @@ class ModelVerdict:
     former with the effects found. `worst` is the largest one of a size that matters, `over` how
     many of that size there are. `effects` were asked for beside the `model`'s own. `unknown` says
     what depends on what, where no known effect explains it. `unexcited` are effects that no capture
-    would show.
+    would show. `fitted` are the parameters of `effects`, and `scales` the sizes of the machine
+    [unit of the name's suffix] that an effect's parameters are multiples of.
     """
 
     verdict: ModelState
@@ -110,6 +107,13 @@ class ModelVerdict:
     held_out_with: float | None = None
     unknown: str = ""
     unexcited: tuple[Unexcited, ...] = ()
+    fitted: Mapping[str, Parameters] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def sizes(self) -> dict[str, Parameters]:
+        """The parameters of all effects that are known of the motor, asked for or found."""
+        return {**self.fitted, **{name: one.parameters for name, one in self.missing.items()}}
 
     @property
     def tested(self) -> bool:
@@ -204,6 +208,11 @@ class ModelVerdict:
             "held_out_with": self.held_out_with,
             "unknown": self.unknown,
             "unexcited": [one.document() for one in self.unexcited],
+            "fitted": [
+                {"effect": name, "parameters": _quantities(one)}
+                for name, one in self.fitted.items()
+            ],
+            "scales": dict(sorted(self.scales.items())),
         }
 
     @classmethod
@@ -228,7 +237,19 @@ class ModelVerdict:
                 )
                 for one in document.get("unexcited", ())
             ),
+            fitted={
+                one["effect"]: _parameters(one["parameters"]) for one in document.get("fitted", ())
+            },
+            scales=document.get("scales", {}),
         )
+
+
+def _quantities(parameters: Parameters) -> dict[str, dict[str, Any]]:
+    return {name: {"value": v, "u": u, "unit": unit} for name, (v, u, unit) in parameters.items()}
+
+
+def _parameters(document: Mapping[str, Any]) -> dict[str, ToldParameter]:
+    return {name: (one["value"], one["u"], one["unit"]) for name, one in document.items()}
 
 
 def number(floors: float) -> str:

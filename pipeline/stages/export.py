@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pipeline.criticism.library.effect_tables import effect_tables
 from pipeline.estimation.registry import estimators
 from pipeline.export.protocol import Exporter, Source
 from pipeline.export.registry import exporters
 from pipeline.io.registry.store import Registry, one_of
 from pipeline.io.storage.publish import output_folder, write_whole
 from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.datasheet import Datasheet
+from pipeline.records.effect_table import EffectTables
 from pipeline.records.errors import UsageError
 from pipeline.records.ledger import Selection, Version, in_force
 from pipeline.records.naming import file_stem
@@ -37,17 +40,33 @@ def main(settings: ExportSettings) -> Outcome:
     version, notes = _version(registry, settings)
     (sheet,) = registry.datasheets([version])
     of_estimators = {term.name: term for estimator in estimators() for term in estimator.terms}
-    text = exporter.render(Source(sheet, version.revision, {**of_estimators, **CONSTANTS}), options)
+    terms = {**of_estimators, **CONSTANTS}
+    source = Source(sheet, version.revision, terms, _effects(sheet))
+    text = exporter.render(source, options)
     ending = dict.fromkeys((exporter.name, exporter.extension))
     name = ".".join((file_stem(version.motor_id), *ending))
     path = output_folder(settings.output) / "export" / name
     write_whole(path, text.encode())
     which = f"note: {exported(version)}"
+    left = tuple(f"note: not in {exporter.name}: {line}" for line in exporter.omits(source))
     return Outcome(
         text=text,
-        errors=(which, *notes, f"note: wrote {path.as_posix()}"),
+        errors=(which, *notes, *left, f"note: wrote {path.as_posix()}"),
         result={"path": path, "content": text},
     )
+
+
+BASE = {"r_ohm": "r_phase_ohm", "ld_h": "ld_h", "lq_h": "lq_h", "psi_wb": "psi_pm_wb"}
+
+
+def _effects(sheet: Datasheet) -> EffectTables:
+    """What the effects known of a motor add to it; none where its own constants are not known."""
+    found = {name: sheet.constants.get(own) for name, own in BASE.items()}
+    base = {name: one.number for name, one in found.items() if one is not None and one.known}
+    poles = sheet.constants.get("pole_pairs")
+    if len(base) < len(BASE) or poles is None or not poles.known:
+        return EffectTables()
+    return effect_tables(sheet.model, base, round(poles.number))
 
 
 def _exporter(settings: ExportSettings) -> Exporter:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from pipeline.export.protocol import Exporter, Options, Source, Values, plain
+from pipeline.export.protocol import Exporter, Options, Source, Values, no_effect_omitted, plain
 
 PREFIX = "MOTOR_"
 MACRO = re.compile(rf"#define {PREFIX}([A-Z0-9_]+) \(?([-+.0-9eE]+)\)?")
@@ -27,6 +27,10 @@ def render(source: Source, options: Options) -> str:
         unit = "" if term.unit == "1" else f" [{term.unit}]"
         words = plain(f"{term.words}{unit}, u = {estimate.u:.3g}, {estimate.status}")
         lines.append(f"#define {PREFIX}{estimate.name.upper()} {shown} /* {words} */")
+    for name, value, u, unit in source.effect_parameters():
+        number = f"({value!r})" if value < 0.0 else repr(value)
+        words = plain(f"effect [{unit}], u = {u:.3g}")
+        lines.append(f"#define {PREFIX}{name.upper()} {number} /* {words} */")
     return "\n".join([*lines, "", "#endif", ""])
 
 
@@ -35,4 +39,6 @@ def read(text: str) -> Values:
     return {name.lower(): float(number) for name, number in MACRO.findall(text)}
 
 
-EXPORTER = Exporter("c-header", "h", "C header, one macro a constant", render, read)
+EXPORTER = Exporter(
+    "c-header", "h", "C header, one macro a constant", render, read, omits=no_effect_omitted
+)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 
-from pipeline.export.protocol import Exporter, Options, Source, Values, plain
+from pipeline.export.protocol import Exporter, Options, Source, Values, no_effect_omitted, plain
 
 HEAD = ("name", "value", "unit", "u", "status", "conditions", "words")
 
@@ -38,6 +38,8 @@ def render(source: Source, options: Options) -> str:
                 term.words,
             )
         )
+    for name, value, u, unit in source.effect_parameters():
+        writer.writerow((name, repr(value), unit, repr(u), "measured", "", "of an effect"))
     return stream.getvalue()
 
 
@@ -47,4 +49,6 @@ def read(text: str) -> Values:
     return {row["name"]: float(row["value"]) for row in rows if row["unit"]}
 
 
-EXPORTER = Exporter("csv", "csv", "table of constants with uncertainties", render, read)
+EXPORTER = Exporter(
+    "csv", "csv", "table of constants with uncertainties", render, read, omits=no_effect_omitted
+)

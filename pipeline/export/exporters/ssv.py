@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from xml.etree import ElementTree as Xml
 
-from pipeline.export.protocol import Exporter, Options, Source, Values
+from pipeline.export.protocol import Exporter, Options, Source, Values, no_effect_omitted
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -63,6 +63,14 @@ def render(source: Source, options: Options) -> str:
             units.add(term.unit)
             real["unit"] = term.unit
         Xml.SubElement(parameter, "ssv:Real", real)
+    for name, value, _, unit in source.effect_parameters():
+        words = "of an effect" if unit in UNITS else f"of an effect [{unit}]"
+        parameter = Xml.SubElement(
+            parameters, "ssv:Parameter", {"name": name, "description": words}
+        )
+        known_unit = {"unit": unit} if unit in UNITS else {}
+        units |= set(known_unit.values())
+        Xml.SubElement(parameter, "ssv:Real", {"value": repr(value), **known_unit})
     declared = Xml.SubElement(root, "ssv:Units")
     for unit in sorted(units):
         own_unit = Xml.SubElement(declared, "ssc:Unit", {"name": unit})
@@ -80,4 +88,11 @@ def read(text: str) -> Values:
     }
 
 
-EXPORTER = Exporter("ssv", "ssv", "SSP parameter set for simulators, XML", render, read)
+EXPORTER = Exporter(
+    "ssv",
+    "ssv",
+    "SSP parameter set for simulators, XML",
+    render,
+    read,
+    omits=no_effect_omitted,
+)
