@@ -136,6 +136,9 @@ class RunSettings(ReadingSettings):
     settle_s: float = key(
         1.0, "with watch=true: how long nothing in input may change before a run", result=False
     )
+    prune: bool = key(
+        False, "remove the motors of earlier runs that output holds beside these", result=False
+    )
     cache: bool = key(True, "remember in output/.cache what need not be done again", result=False)
     recordings: bool = key(True, "write a Rerun recording a capture", result=False)
     report: bool = key(True, "write the HTML report", result=False)

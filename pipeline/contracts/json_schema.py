@@ -399,7 +399,11 @@ def truth_schema() -> Schema:
 
 def outputs_schema() -> Schema:
     """`outputs.json`, the list of files that the last run wrote."""
-    return _document("outputs/1", "Files of the last run", _object({"files": _list(NAME)}))
+    return _document(
+        "outputs/1",
+        "Files of the last run",
+        _object({"files": _list(NAME)}, {"motors": _map(_list(NAME))}),
+    )
 
 
 def lot_regression_schema() -> Schema:

@@ -20,15 +20,26 @@ from pipeline.execution.caches.versions import RUN, tools
 from pipeline.execution.jobs import MotorJob, MotorResult
 from pipeline.execution.outputs.publishing import (
     fleet_of,
+    other_motors,
+    others_note,
     outcome_of,
     publish,
     removed_note,
     with_folder_names,
 )
+<<<<<<< HEAD
 from pipeline.execution.outputs.statuses import histories_of, with_current_statuses
 from pipeline.execution.tasks.survey_tasks import survey_with
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
+=======
+from pipeline.execution.run_cache import Batch, RunCache
+from pipeline.execution.stamp import configuration_digest
+from pipeline.execution.statuses import histories_of, status_now, with_current_statuses
+from pipeline.execution.survey_tasks import survey_with
+from pipeline.execution.versions import RUN, tools
+from pipeline.execution.worker_pool import WorkerPool
+>>>>>>> 05a6d68 (run keeps the motors of earlier runs in an output unless prune=true)
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
@@ -133,15 +144,18 @@ def _run(
     findings = tuple(
         sorted({*found.findings, *(f for r in results for f in r.finished.findings)}, key=_order)
     )
+    others = other_motors(output, [job.motor_id for job in jobs], prune=settings.prune)
     with watch.stage("registry"):
         registered = _register(registry, output, results)
         # before the statuses are read: a later decision is not in them
         batch = _batch_key(settings, plain, found, registry)
-        results, statuses = with_current_statuses(output, results, histories_of(registry))
+        histories = histories_of(registry)
+        results, statuses = with_current_statuses(output, results, histories)
     with watch.stage("fleet"):
-        fleet = fleet_of(output, results)
+        fleet = fleet_of(output, results, others)
         datasheets = fleet.datasheets
-        files, removed = publish(settings, results, fleet, findings, statuses)
+        there = {one.motor_id: status_now(output, one, histories) for one in fleet.others}
+        files, removed = publish(settings, results, fleet, findings, {**there, **statuses}, others)
         outcome = outcome_of(datasheets, findings, found, statuses, report=settings.report)
     lasting = not died and all(result.lasting for result in results)
     if lasting and registered.code == 0 and _revocations(registry) == revoked:
@@ -152,7 +166,7 @@ def _run(
             for sheet, sha256 in zip(datasheets, digests, strict=True)
         )
         cache.keep_outcome(batch, Batch(outcome, contents), files)
-    cache.forget_others([job.motor_id for job in jobs])
+    cache.forget_others([*others, *(job.motor_id for job in jobs)])
     outcome = with_folder_names(outcome, settings)
     for result in results:
         for name, seconds in result.seconds.items():
@@ -163,6 +177,7 @@ def _run(
         (
             *outcome.errors,
             *removed_note(removed, settings.output),
+            *others_note(others, settings.output),
             *registered.errors,
             *(f"error: {e}" for e in died),
         ),

@@ -98,27 +98,47 @@ def test_what_a_changed_capture_touches_is_done(folder: Folder) -> None:
     changed.unlink()
     assert folder.run() == [TWO]
     shutil.rmtree(folder.input / "one")
-    assert folder.run() == []
+    assert folder.run("prune=true") == []
     assert [path.name for path in (folder.output / "datasheets").iterdir()] == ["gimbal~2ftwo.json"]
 
 
-def test_another_input_into_the_same_output_says_what_it_removes(
+def test_another_input_into_the_same_output_keeps_the_motors_of_the_first(
     folder: Folder, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The output mirrors one input: what goes is counted and named, once; a user's file stays."""
+    """Two inputs one after the other give the fleet of one input that holds both."""
+    folder.run()
+    together = results(folder.output)
+    shutil.rmtree(folder.output)
+    outputs = f"output={folder.output}"
+    for motor in ("one", "two"):
+        main(["run", f"input={folder.input / motor}", outputs, *WORDS])
+        (folder.output / "findings.json").unlink()
+    (line,) = (one for one in capsys.readouterr().err.splitlines() if "keeps" in one)
+    assert line.startswith(f"note: {folder.output} keeps 1 motor of earlier runs: gimbal/one; ")
+    for name in ("fleet.csv", "datasheets/gimbal~2fone.json", "report/gimbal~2fone.html"):
+        assert name in results(folder.output)
+    index = (folder.output / "report" / "index.html").read_text()
+    assert all(f"gimbal~2f{motor}.html" in index for motor in ("one", "two"))
+    assert set(results(folder.output)) == set(together) - {"findings.json"}
+    assert results(folder.output)["fleet.csv"].count(b"gimbal/one") > 5
+
+
+def test_prune_says_what_it_removes(folder: Folder, capsys: pytest.CaptureFixture[str]) -> None:
+    """What goes is counted and named, once; a user's file stays."""
     folder.run()
     own = folder.output / "datasheets" / "notes.txt"
     own.write_text("mine")
     (folder.input / "one").rename(folder.place / "elsewhere")
     capsys.readouterr()
-    main(["run", f"input={folder.input}", f"output={folder.output}", *WORDS])
+    words = ["run", f"input={folder.input}", f"output={folder.output}", *WORDS, "prune=true"]
+    main(words)
     (line,) = (one for one in capsys.readouterr().err.splitlines() if "removed" in one)
-    assert line.startswith(f"note: {folder.output} holds what comes of this input alone: 4 files")
+    assert line.startswith(f"note: {folder.output}: 4 files of an earlier run removed: ")
     kinds = {"datasheets": "json", "performance": "json", "report": "html", "sheet": "html"}
     names = ", ".join(f"{kind}/gimbal~2fone.{form}" for kind, form in kinds.items())
     assert line.endswith(f"removed: {names}")
     assert own.read_text() == "mine"
-    main(["run", f"input={folder.input}", f"output={folder.output}", *WORDS])
+    main(words)
     assert "removed" not in capsys.readouterr().err
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from pipeline.execution.jobs import Files, MotorResult
 from pipeline.execution.outputs.page_links import INDEX, links_of
@@ -18,7 +19,7 @@ from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.io.storage.publish import canonical_json, partial_owner, write_whole
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.finding import Finding, lines_of
-from pipeline.records.naming import counted
+from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.report.text.console import nothing_usable, summary
 from pipeline.settings import RunSettings
@@ -36,26 +37,55 @@ FOLDERS = ("datasheets", "report", "recordings", "performance", "sheet", "diagno
 
 @dataclass(frozen=True, slots=True)
 class Fleet:
-    """The datasheets of a batch with what its page shows of each, and all constants as a table."""
+    """The datasheets of a batch with what its page shows of each, those of other motors that the
+    output holds, and all constants as a table.
+    """
 
     datasheets: tuple[Datasheet, ...]
+    others: tuple[Datasheet, ...]
     tables: Mapping[str, bytes]
 
+    @property
+    def every(self) -> tuple[Datasheet, ...]:
+        """All datasheets of the output, by motor."""
+        return tuple(sorted((*self.datasheets, *self.others), key=lambda one: one.motor_id))
 
-def fleet_of(output: Path, results: Sequence[MotorResult]) -> Fleet:
-    """The datasheets of a batch, read back from where they were written.
+
+Others = Mapping[str, tuple[str, ...]]
+"""Files of the motors of earlier runs that an output holds beside the batch, by motor."""
+
+
+def other_motors(output: Path, batch: Collection[str], *, prune: bool) -> Others:
+    """The motors of earlier runs that stay in an output: none with `prune`."""
+    listed = {} if prune else _manifest(output).get("motors")
+    others = {}
+    for motor_id, names in listed.items() if isinstance(listed, dict) else ():
+        there = isinstance(names, list) and all(isinstance(name, str) for name in names)
+        if motor_id in batch or not there:
+            continue
+        files = tuple(name for name in names if _inside(output, name).is_file())
+        if any(name.startswith("datasheets/") for name in files):
+            others[motor_id] = files
+    return others
+
+
+def fleet_of(output: Path, results: Sequence[MotorResult], others: Others) -> Fleet:
+    """The datasheets of an output, read back from where they were written.
 
     Only what belongs to the batch is kept of each, or memory would grow with the batch.
     """
     from pipeline.views.tables import constants_frame, fleet_files
 
-    names = [name for result in results for name, _ in result.finished.files]
-    sheets, frames = [], []
-    for name in (name for name in names if name.startswith("datasheets/")):
-        sheet = read_datasheet(output / name)
-        frames.append(constants_frame(sheet))
-        sheets.append(_kept(sheet))
-    return Fleet(tuple(sheets), fleet_files(frames) if frames else {})
+    own = [name for result in results for name, _ in result.finished.files]
+    sheets: dict[bool, list[Datasheet]] = {True: [], False: []}
+    frames = {}
+    for mine, names in ((True, own), (False, [name for f in others.values() for name in f])):
+        for name in (name for name in names if name.startswith("datasheets/")):
+            sheet = read_datasheet(output / name)
+            frames[sheet.motor_id] = constants_frame(sheet)
+            sheets[mine].append(_kept(sheet))
+    tables = fleet_files([frame for _, frame in sorted(frames.items())]) if frames else {}
+    return Fleet(tuple(sheets[True]), tuple(sheets[False]), tables)
 
 
 def _kept(sheet: Datasheet) -> Datasheet:
@@ -69,10 +99,11 @@ def publish(
     fleet: Fleet,
     findings: Sequence[Finding],
     statuses: Statuses,
+    others: Others,
 ) -> tuple[Files, tuple[str, ...]]:
     """Writes the outputs of the batch, then removes the outdated files of an earlier run.
 
-    `statuses` are the current ones by motor.
+    `statuses` are the current ones by motor; the files of `others` stay.
     Returns every file of the batch, and the names of the removed files.
     """
     output = Path(settings.output)
@@ -91,11 +122,16 @@ def publish(
         from pipeline.report.pages.fleet_page import render_fleet
 
         links = links_of(output, INDEX, coming=fleet.tables)
-        page = render_fleet(fleet.datasheets, tuple(findings), statuses, links)
+        page = render_fleet(fleet.every, tuple(findings), statuses, links)
         write(INDEX, page.encode())
-    names = sorted(name for name, _ in files)
+    motors = dict(others)
+    for result in results:
+        motors[result.motor_id] = tuple(sorted(name for name, _ in result.finished.files))
+    kept = (name for names in others.values() for name in names)
+    names = sorted({*(name for name, _ in files), *kept})
     removed = _sweep(output, names)
-    write(MANIFEST, canonical_json({"schema": "outputs/1", "files": names}))
+    listed = {"schema": "outputs/1", "files": names, "motors": motors}
+    write(MANIFEST, canonical_json(listed))
     return tuple(sorted(files)), removed
 
 
@@ -105,9 +141,9 @@ def _sweep(output: Path, files: Sequence[str]) -> tuple[str, ...]:
     Returns the names of the former.
     """
     removed = []
-    for name in sorted(_listed(output / MANIFEST) - set(files)):
-        stale = output / name
-        if stale.resolve().is_relative_to(output.resolve()):
+    for name in sorted(_listed(output) - set(files)):
+        stale = _inside(output, name)
+        if stale != output:
             with suppress(IsADirectoryError, NotADirectoryError, FileNotFoundError):
                 stale.unlink()
                 removed.append(name)
@@ -123,18 +159,39 @@ def removed_note(removed: Sequence[str], output: str) -> tuple[str, ...]:
     if not removed:
         return ()
     names = ", ".join(removed[:MOST_NAMED]) + (", ..." if len(removed) > MOST_NAMED else "")
+    return (f"note: {output}: {counted(len(removed), 'file')} of an earlier run removed: {names}",)
+
+
+def others_note(others: Others, output: str) -> tuple[str, ...]:
+    """A line that counts and names the motors of earlier runs that the output still holds."""
+    if not others:
+        return ()
+    names = ", ".join([printable(one) for one in sorted(others)][:MOST_NAMED])
+    more = ", ..." if len(others) > MOST_NAMED else ""
     return (
-        f"note: {output} holds what comes of this input alone: "
-        f"{counted(len(removed), 'file')} of an earlier run removed: {names}",
+        f"note: {output} keeps {counted(len(others), 'motor')} of earlier runs: {names}{more}; "
+        "`run prune=true` removes what is not of this input",
     )
 
 
-def _listed(manifest: Path) -> set[str]:
-    """The files that a manifest names; empty for a file that is no manifest."""
+def _inside(output: Path, name: str) -> Path:
+    """The file of a manifest's name; the output itself for one that is elsewhere."""
+    path = output / name
+    return path if path.resolve().is_relative_to(output.resolve()) else output
+
+
+def _manifest(output: Path) -> dict[str, Any]:
+    """The list of an earlier run; empty where there is none that can be read."""
     try:
-        files = json.loads(manifest.read_bytes())["files"]
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return set()
+        found = json.loads((output / MANIFEST).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _listed(output: Path) -> set[str]:
+    """The files that the manifest of an output names."""
+    files = _manifest(output).get("files")
     return {name for name in files if isinstance(name, str)} if isinstance(files, list) else set()
 
 
