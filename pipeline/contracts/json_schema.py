@@ -6,11 +6,26 @@ Every file may hold more than its schema names; numbers are finite or null, neve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import is_dataclass
-from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from collections.abc import Callable
 
+from pipeline.contracts.schema_form import (
+    COUNT,
+    NAME,
+    NUMBER,
+    SHA256,
+    SHARE,
+    SPREAD,
+    TEXT,
+    WHOLE,
+    Schema,
+    document,
+    list_of,
+    map_of,
+    object_of,
+    of_kind,
+    one_of,
+    or_null,
+)
 from pipeline.physics.glossary import CONSTANTS, TESTS, Term
 from pipeline.records.capture import Integrity
 from pipeline.records.datasheet import CheckStatus, DatasheetStatus
@@ -21,81 +36,37 @@ from pipeline.records.finding import Severity
 from pipeline.records.lot_regression import LotRegression
 from pipeline.records.model_verdict import ModelState
 from pipeline.records.performance import Blank, Curve, Derived, MapCell, Operation
-from pipeline.records.plain_form import hints_of
 from pipeline.records.uncertainty import Kind
-
-Schema = dict[str, Any]
-
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-TEXT: Schema = {"type": "string"}
-NAME: Schema = {"type": "string", "minLength": 1}
-NUMBER: Schema = {"type": "number"}
-WHOLE: Schema = {"type": "integer"}
-SPREAD: Schema = {"type": "number", "minimum": 0}
-SHARE: Schema = {"type": "number", "minimum": 0, "maximum": 1}
-COUNT: Schema = {"type": "integer", "minimum": 0}
-SHA256: Schema = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
-
-
-def _or_null(schema: Schema) -> Schema:
-    return {"anyOf": [schema, {"type": "null"}]}
-
-
-def _one_of(literal: Any) -> Schema:
-    return {"enum": list(get_args(literal))}
-
-
-def _list(items: Schema, **more: Any) -> Schema:
-    return {"type": "array", "items": items, **more}
-
-
-def _map(values: Schema) -> Schema:
-    return {"type": "object", "additionalProperties": values}
-
-
-def _object(needed: Mapping[str, Schema], more: Mapping[str, Schema] | None = None) -> Schema:
-    """An object that holds `needed`, may hold `more`, and anything else."""
-    return {
-        "type": "object",
-        "properties": {**needed, **(more or {})},
-        "required": sorted(needed),
-    }
-
-
-def _document(identity: str, words: str, body: Schema) -> Schema:
-    body["properties"]["schema"] = {"const": identity}
-    body["required"] = sorted({*body["required"], "schema"})
-    return {"$schema": DIALECT, "$id": f"urn:{identity}", "title": words, **body}
 
 
 def _estimate() -> Schema:
     """An estimate as records write it: a value exactly when it is identifiable."""
     known = {"value": NUMBER, "u": SPREAD, "u_a": SPREAD, "u_b": SPREAD}
     unknown = {name: {"type": "null"} for name in known}
-    schema = _object(
+    schema = object_of(
         {
-            "value": _or_null(NUMBER),
+            "value": or_null(NUMBER),
             "unit": NAME,
-            "u": _or_null(SPREAD),
-            "u_a": _or_null(SPREAD),
-            "u_b": _or_null(SPREAD),
-            "dof": _or_null(SPREAD),
-            "at": _map({"type": ["number", "string"]}),
+            "u": or_null(SPREAD),
+            "u_a": or_null(SPREAD),
+            "u_b": or_null(SPREAD),
+            "dof": or_null(SPREAD),
+            "at": map_of({"type": ["number", "string"]}),
             "method": TEXT,
-            "status": _one_of(Status),
-            "captures": _list(NAME),
+            "status": one_of(Status),
+            "captures": list_of(NAME),
             "note": TEXT,
         },
         {
-            "bounds": _or_null(_list(NUMBER, minItems=2, maxItems=2)),
+            "bounds": or_null(list_of(NUMBER, minItems=2, maxItems=2)),
             "at_bound": {"type": "boolean"},
             "settled": {"const": True},
-            "orders": _list(
-                _object({"order": COUNT, "amplitude": SPREAD, "u": SPREAD, "phase_rad": NUMBER})
+            "orders": list_of(
+                object_of({"order": COUNT, "amplitude": SPREAD, "u": SPREAD, "phase_rad": NUMBER})
             ),
-            "budget": _list(
-                _object(
-                    {"source": NAME, "u": NUMBER, "kind": _one_of(Kind)}, {"dof": _or_null(SPREAD)}
+            "budget": list_of(
+                object_of(
+                    {"source": NAME, "u": NUMBER, "kind": one_of(Kind)}, {"dof": or_null(SPREAD)}
                 )
             ),
         },
@@ -116,46 +87,46 @@ def _constant(term: Term) -> Schema:
 
 
 def _check() -> Schema:
-    return _object(
+    return object_of(
         {
             "name": NAME,
-            "status": _one_of(CheckStatus),
-            "value": _or_null(NUMBER),
-            "limit": _or_null(NUMBER),
+            "status": one_of(CheckStatus),
+            "value": or_null(NUMBER),
+            "limit": or_null(NUMBER),
             "unit": NAME,
             "meaning": TEXT,
-            "suspect": _or_null(TEXT),
+            "suspect": or_null(TEXT),
         }
     )
 
 
 def _model() -> Schema:
     """The residual test of a datasheet: numbers where a model was fitted."""
-    quantity = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": TEXT})
+    quantity = object_of({"value": or_null(NUMBER), "u": or_null(SPREAD), "unit": TEXT})
     excess = {"capture": NAME, "signal": NAME, "order": SPREAD, "floors": SPREAD, "size": SPREAD}
-    return _object(
+    return object_of(
         {
-            "verdict": _one_of(ModelState),
-            "missing": _list(
-                _object(
-                    {"effect": NAME, "parameters": _map(quantity)},
-                    {"headline": TEXT, "confused_with": _list(NAME), "experiment": TEXT},
+            "verdict": one_of(ModelState),
+            "missing": list_of(
+                object_of(
+                    {"effect": NAME, "parameters": map_of(quantity)},
+                    {"headline": TEXT, "confused_with": list_of(NAME), "experiment": TEXT},
                 )
             ),
-            "held_out": _or_null(SPREAD),
-            "residual": _or_null(SPREAD),
+            "held_out": or_null(SPREAD),
+            "residual": or_null(SPREAD),
         },
         {
             "name": NAME,
-            "effects": _list(NAME),
-            "worst": _or_null(_object({**excess, "unit": TEXT})),
+            "effects": list_of(NAME),
+            "worst": or_null(object_of({**excess, "unit": TEXT})),
             "over": COUNT,
             "note": TEXT,
-            "held_out_with": _or_null(SPREAD),
+            "held_out_with": or_null(SPREAD),
             "unknown": TEXT,
-            "unexcited": _list(_kind(Unexcited)),
-            "fitted": _list(_object({"effect": NAME, "parameters": _map(quantity)})),
-            "scales": _map(SPREAD),
+            "unexcited": list_of(of_kind(Unexcited)),
+            "fitted": list_of(object_of({"effect": NAME, "parameters": map_of(quantity)})),
+            "scales": map_of(SPREAD),
         },
     )
 
@@ -163,28 +134,28 @@ def _model() -> Schema:
 def datasheet_schema() -> Schema:
     """`datasheets/MOTOR.json`."""
     capture = {"path": NAME, "sha256": SHA256, "test": {"enum": [*TESTS]}}
-    capture["integrity"] = _one_of(Integrity)
+    capture["integrity"] = one_of(Integrity)
     constants: Schema = {
         "type": "object",
         "properties": {name: _constant(term) for name, term in sorted(CONSTANTS.items())},
         "additionalProperties": {"$ref": "#/$defs/estimate"},
     }
-    body = _object(
+    body = object_of(
         {
             "motor_id": NAME,
-            "motor_type": _or_null(TEXT),
-            "lot": _or_null(TEXT),
+            "motor_type": or_null(TEXT),
+            "lot": or_null(TEXT),
             "version": SHA256,
-            "status": _one_of(DatasheetStatus),
-            "provenance": _object(
+            "status": one_of(DatasheetStatus),
+            "provenance": object_of(
                 {
-                    "captures": _list(
-                        _object(
+                    "captures": list_of(
+                        object_of(
                             capture,
                             {
-                                "station": _or_null(TEXT),
-                                "started_at": _or_null(TEXT),
-                                "read_sha256": _or_null(SHA256),
+                                "station": or_null(TEXT),
+                                "started_at": or_null(TEXT),
+                                "read_sha256": or_null(SHA256),
                             },
                         )
                     ),
@@ -194,18 +165,18 @@ def datasheet_schema() -> Schema:
                 {"libraries": TEXT},
             ),
             "constants": constants,
-            "checks": _list(_check()),
+            "checks": list_of(_check()),
         },
         {
-            "why": _list(TEXT),
-            "supersedes": _or_null(_object({"version": SHA256, "by": TEXT, "why": TEXT})),
-            "alternatives": _list(
-                {"allOf": [{"$ref": "#/$defs/estimate"}, _object({"name": NAME})]}
+            "why": list_of(TEXT),
+            "supersedes": or_null(object_of({"version": SHA256, "by": TEXT, "why": TEXT})),
+            "alternatives": list_of(
+                {"allOf": [{"$ref": "#/$defs/estimate"}, object_of({"name": NAME})]}
             ),
             "model": _model(),
         },
     )
-    return _document("motor-datasheet/1", "One version of one motor's datasheet", body) | {
+    return document("motor-datasheet/1", "One version of one motor's datasheet", body) | {
         "$defs": {"estimate": _estimate()}
     }
 
@@ -214,73 +185,73 @@ def performance_schema() -> Schema:
     """`performance/MOTOR.json`: what a motor does at stated conditions, 95 % intervals."""
     lists = {"numbers": Derived, "curves": Curve, "efficiency_map": MapCell, "blanks": Blank}
     needed = {"motor_id": NAME, "datasheet_version": SHA256}
-    needed |= {"operation": _or_null(_kind(Operation))}
-    needed |= {name: _list(_kind(record)) for name, record in lists.items()}
-    body = _object(needed, {"regimes": _list(TEXT), "notes": _list(TEXT)})
-    return _document("motor-performance/1", "A motor's curves and ratings", body)
+    needed |= {"operation": or_null(of_kind(Operation))}
+    needed |= {name: list_of(of_kind(record)) for name, record in lists.items()}
+    body = object_of(needed, {"regimes": list_of(TEXT), "notes": list_of(TEXT)})
+    return document("motor-performance/1", "A motor's curves and ratings", body)
 
 
 def export_schema() -> Schema:
     """`export json`: constants, effects, and the effects as tables."""
-    quantity = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": TEXT})
-    constant = _object(
-        {"value": NUMBER, "u": SPREAD, "unit": NAME, "status": _one_of(Status), "words": TEXT},
-        {"at": _map({"type": ["number", "string"]})},
+    quantity = object_of({"value": or_null(NUMBER), "u": or_null(SPREAD), "unit": TEXT})
+    constant = object_of(
+        {"value": NUMBER, "u": SPREAD, "unit": NAME, "status": one_of(Status), "words": TEXT},
+        {"at": map_of({"type": ["number", "string"]})},
     )
-    body = _object(
+    body = object_of(
         {
             "motor_id": NAME,
-            "motor_type": _or_null(TEXT),
+            "motor_type": or_null(TEXT),
             "version": SHA256,
             "revision": COUNT,
-            "constants": _map(constant),
-            "effects": _list(_object({"effect": NAME, "parameters": _map(quantity)})),
-            "tables": _list(_kind(EffectTable)),
-            "without_table": _map(NAME),
+            "constants": map_of(constant),
+            "effects": list_of(object_of({"effect": NAME, "parameters": map_of(quantity)})),
+            "tables": list_of(of_kind(EffectTable)),
+            "without_table": map_of(NAME),
         }
     )
-    return _document("motor-export/1", "A released motor for other programs", body)
+    return document("motor-export/1", "A released motor for other programs", body)
 
 
 def findings_schema() -> Schema:
     """`findings.json`."""
-    finding = _object(
+    finding = object_of(
         {
             "file": TEXT,
-            "severity": _one_of(Severity),
+            "severity": one_of(Severity),
             "code": {"type": "string", "pattern": "^[a-z0-9_]+$"},
-            "rows": _or_null(_list(COUNT, minItems=2, maxItems=2)),
+            "rows": or_null(list_of(COUNT, minItems=2, maxItems=2)),
             "message": NAME,
             "remedy": TEXT,
         }
     )
-    return _document(
-        "findings/1", "What was refused or doubted", _object({"findings": _list(finding)})
+    return document(
+        "findings/1", "What was refused or doubted", object_of({"findings": list_of(finding)})
     )
 
 
 def _error_map() -> Schema:
     """Mean error over cells of one variable, or rows of cells of two."""
-    numbers = _list({"type": ["number", "null", "array"]})
-    bins = _object({"variable": NAME, "edges": _list(NUMBER, minItems=2)})
-    return _object(
+    numbers = list_of({"type": ["number", "null", "array"]})
+    bins = object_of({"variable": NAME, "edges": list_of(NUMBER, minItems=2)})
+    return object_of(
         {
             "signal": NAME,
             "unit": TEXT,
             "x": bins,
-            "y": _or_null(bins),
-            "count": _list({"type": ["integer", "array"]}),
+            "y": or_null(bins),
+            "count": list_of({"type": ["integer", "array"]}),
             "mean": numbers,
             "p_value": numbers,
             "explained": SHARE,
-            "p_map": _or_null(SHARE),
+            "p_map": or_null(SHARE),
         }
     )
 
 
 def _combination() -> Schema:
-    return _object(
-        {"expression": NAME, "value": NUMBER, "u": SPREAD, "unit": NAME, "of": _list(NAME)}
+    return object_of(
+        {"expression": NAME, "value": NUMBER, "u": SPREAD, "unit": NAME, "of": list_of(NAME)}
     )
 
 
@@ -288,29 +259,29 @@ def comparison_schema() -> Schema:
     """`comparison/MOTOR.json`."""
     signals = ["vd_v", "vq_v", "torque_shaft_nm", "omega_mech_rad_s", "iq_a", "psi_d_wb"]
     signal: Schema = {"enum": [*signals, "psi_q_wb"]}
-    parameter = _object(
+    parameter = object_of(
         {
-            "value": _or_null(NUMBER),
-            "u": _or_null(SPREAD),
+            "value": or_null(NUMBER),
+            "u": or_null(SPREAD),
             "unit": NAME,
             "at_bound": {"type": "boolean"},
         },
         {"status": {"enum": ["measured", "stated", "not_identifiable"]}},
     )
-    error = _object(
+    error = object_of(
         {
             "signal": signal,
             "capture": NAME,
             "split": {"enum": ["fit", "held_out"]},
-            "rmse": _or_null(SPREAD),
-            "noise_floor": _or_null(SPREAD),
+            "rmse": or_null(SPREAD),
+            "noise_floor": or_null(SPREAD),
             "n": COUNT,
-            "n_eff": _or_null(SPREAD),
+            "n_eff": or_null(SPREAD),
         },
         {"unit": TEXT, "kind": {"enum": ["equation", "free_run"]}},
     )
-    before = _object({"value": NUMBER, "u": SPREAD})
-    moved = _object(
+    before = object_of({"value": NUMBER, "u": SPREAD})
+    moved = object_of(
         {
             "parameter": NAME,
             "unit": NAME,
@@ -319,69 +290,69 @@ def comparison_schema() -> Schema:
             "change_in_u": NUMBER,
         }
     )
-    where = _object(
-        {"signal": signal, "variable": NAME, "explained": SHARE, "p_value": _or_null(SHARE)}
+    where = object_of(
+        {"signal": signal, "variable": NAME, "explained": SHARE, "p_value": or_null(SHARE)}
     )
-    body = _object(
+    body = object_of(
         {
             "motor_id": NAME,
-            "model": _object(
-                {"name": NAME, "effects": _list(NAME), "parameters": _map(parameter)},
-                {"combinations": _list(_combination())},
+            "model": object_of(
+                {"name": NAME, "effects": list_of(NAME), "parameters": map_of(parameter)},
+                {"combinations": list_of(_combination())},
             ),
-            "errors": _list(error),
-            "total": _object({"held_out": _or_null(SPREAD)}),
-            "where": _list(where),
+            "errors": list_of(error),
+            "total": object_of({"held_out": or_null(SPREAD)}),
+            "where": list_of(where),
         },
-        {"maps": _list(_error_map()), "moved": _list(moved)},
+        {"maps": list_of(_error_map()), "moved": list_of(moved)},
     )
-    return _document("model-comparison/1", "A model held against a motor's captures", body)
+    return document("model-comparison/1", "A model held against a motor's captures", body)
 
 
 def diagnosis_schema() -> Schema:
     """`diagnosis/MOTOR.json`."""
-    sized = _object({"value": _or_null(NUMBER), "u": _or_null(SPREAD), "unit": NAME})
-    rank = _object(
+    sized = object_of({"value": or_null(NUMBER), "u": or_null(SPREAD), "unit": NAME})
+    rank = object_of(
         {
             "effect": NAME,
-            "score": _or_null(NUMBER),
-            "held_out_drop": _or_null(NUMBER),
-            "p_value": _or_null(SHARE),
-            "confused_with": _list(NAME),
+            "score": or_null(NUMBER),
+            "held_out_drop": or_null(NUMBER),
+            "p_value": or_null(SHARE),
+            "confused_with": list_of(NAME),
             "explanation": TEXT,
             "experiment": TEXT,
         },
-        {"parameters": _map(sized)},
+        {"parameters": map_of(sized)},
     )
-    step = _object(
+    step = object_of(
         {
-            "effects": _list(NAME),
-            "held_out": _or_null(SPREAD),
-            "signals": _map(_or_null(SPREAD)),
+            "effects": list_of(NAME),
+            "held_out": or_null(SPREAD),
+            "signals": map_of(or_null(SPREAD)),
         },
         {
-            "errors": _map(_object({"rmse": SPREAD, "noise_floor": SPREAD, "unit": TEXT})),
-            "parameters": _map(sized),
-            "maps": _list(_error_map()),
+            "errors": map_of(object_of({"rmse": SPREAD, "noise_floor": SPREAD, "unit": TEXT})),
+            "parameters": map_of(sized),
+            "maps": list_of(_error_map()),
         },
     )
-    term = _object({"term": NAME, "coefficient": NUMBER, "unit": NAME})
-    unknown = _object(
-        {"signal": NAME, "variables": _list(NAME), "shape": TEXT, "sketch": _list(term)}
+    term = object_of({"term": NAME, "coefficient": NUMBER, "unit": NAME})
+    unknown = object_of(
+        {"signal": NAME, "variables": list_of(NAME), "shape": TEXT, "sketch": list_of(term)}
     )
-    body = _object(
+    body = object_of(
         {
             "motor_id": NAME,
             "model": {"type": ["string", "object"]},
             "verdict": {"enum": ["adequate", "missing", "unknown", "insufficient"]},
-            "missing": _list(NAME),
-            "ranking": _list(rank),
-            "ladder": _list(step),
-            "unknown": _or_null(unknown),
+            "missing": list_of(NAME),
+            "ranking": list_of(rank),
+            "ladder": list_of(step),
+            "unknown": or_null(unknown),
         },
-        {"policy": TEXT, "asked": _list(NAME), "combinations": _list(_combination())},
+        {"policy": TEXT, "asked": list_of(NAME), "combinations": list_of(_combination())},
     )
-    return _document("model-diagnosis/1", "What a model of a motor leaves out", body)
+    return document("model-diagnosis/1", "What a model of a motor leaves out", body)
 
 
 def truth_schema() -> Schema:
@@ -389,45 +360,30 @@ def truth_schema() -> Schema:
     constants: Schema = {
         "type": "object",
         "properties": {
-            name: _or_null(WHOLE if term.integer else NUMBER)
+            name: or_null(WHOLE if term.integer else NUMBER)
             for name, term in sorted(CONSTANTS.items())
         },
     }
-    body = _object({"constants": constants, "hidden": _list(NAME), "sizes": _map({})})
-    return _document("motor-truth/1", "What is true of simulated captures", body)
+    body = object_of({"constants": constants, "hidden": list_of(NAME), "sizes": map_of({})})
+    return document("motor-truth/1", "What is true of simulated captures", body)
 
 
 def outputs_schema() -> Schema:
     """`outputs.json`, the list of files that the last run wrote."""
-    return _document(
+    return document(
         "outputs/1",
         "Files of the last run",
-        _object({"files": _list(NAME)}, {"motors": _map(_list(NAME))}),
+        object_of({"files": list_of(NAME)}, {"motors": map_of(list_of(NAME))}),
     )
 
 
 def lot_regression_schema() -> Schema:
     """`regression/report.json`, from the kinds of its record's fields."""
-    return _document(
-        "lot-regression/1", "A lot, or a version of the code, against another", _kind(LotRegression)
+    return document(
+        "lot-regression/1",
+        "A lot, or a version of the code, against another",
+        of_kind(LotRegression),
     )
-
-
-def _kind(kind: Any) -> Schema:
-    """The schema of a field of a record: a record, a tuple, a literal, a scalar or nothing."""
-    origin, inner = get_origin(kind), get_args(kind)
-    if is_dataclass(kind) and isinstance(kind, type):
-        return _object({name: _kind(hint) for name, hint in hints_of(kind).items()})
-    if origin in (Union, UnionType):
-        (one,) = (part for part in inner if part is not type(None))
-        return _or_null(_kind(one))
-    if origin is tuple:
-        return _list(_kind(inner[0]))
-    if origin is Mapping:
-        return _map(_kind(inner[1]))
-    if origin is Literal:
-        return _one_of(kind)
-    return {float: NUMBER, int: WHOLE, str: TEXT, bool: {"type": "boolean"}}[kind]
 
 
 SCHEMAS: dict[str, Callable[[], Schema]] = {

@@ -13,7 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Effect, Machine, Operating, TorqueHook, Values
+from pipeline.criticism.effect import (
+    Array,
+    Effect,
+    Machine,
+    Operating,
+    ShaftState,
+    TorqueHook,
+    Values,
+)
 from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import air_gap_torque, base_flux, effect_flux
 from pipeline.records.effect_table import EffectTable, EffectTables
@@ -111,7 +119,7 @@ def _anywhere(machine: Machine, base: Mapping[str, float]) -> Operating:
         inverter=True,
         freq_hz=np.full(_PROBES, machine.scales["freq_hz"]),
         ts_s=machine.scales["period_s"],
-        held=True,
+        shaft=ShaftState(held=True),
     )
 
 

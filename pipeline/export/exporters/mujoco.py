@@ -74,7 +74,7 @@ def omits(source: Source) -> tuple[str, ...]:
     """Effects that MuJoCo's motor cannot hold, and what of the others it misses."""
     shaft = _shaft(source)
     ld, lq = source.optional("ld_h"), source.optional("lq_h")
-    salient = ()
+    salient: tuple[str, ...] = ()
     if ld is not None and lq is not None and abs(lq.number - ld.number) > _SMALL * lq.number:
         salient = ("reluctance torque: the motor has no d current",)
     return (*source.left_out(*shaft.held), *shaft.notes, *salient)

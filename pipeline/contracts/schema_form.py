@@ -1,0 +1,75 @@
+"""The words of JSON Schema: objects, lists, numbers, and the schema of a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pipeline.records.plain_form import hints_of
+
+Schema = dict[str, Any]
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+TEXT: Schema = {"type": "string"}
+NAME: Schema = {"type": "string", "minLength": 1}
+NUMBER: Schema = {"type": "number"}
+WHOLE: Schema = {"type": "integer"}
+SPREAD: Schema = {"type": "number", "minimum": 0}
+SHARE: Schema = {"type": "number", "minimum": 0, "maximum": 1}
+COUNT: Schema = {"type": "integer", "minimum": 0}
+SHA256: Schema = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
+
+
+def or_null(schema: Schema) -> Schema:
+    """A schema, or null."""
+    return {"anyOf": [schema, {"type": "null"}]}
+
+
+def one_of(literal: Any) -> Schema:
+    """One of the words of a literal type."""
+    return {"enum": list(get_args(literal))}
+
+
+def list_of(items: Schema, **more: Any) -> Schema:
+    """A list of one kind of item."""
+    return {"type": "array", "items": items, **more}
+
+
+def map_of(values: Schema) -> Schema:
+    """An object of one kind of value under any name."""
+    return {"type": "object", "additionalProperties": values}
+
+
+def object_of(needed: Mapping[str, Schema], more: Mapping[str, Schema] | None = None) -> Schema:
+    """An object that holds `needed`, may hold `more`, and anything else."""
+    return {
+        "type": "object",
+        "properties": {**needed, **(more or {})},
+        "required": sorted(needed),
+    }
+
+
+def document(identity: str, words: str, body: Schema) -> Schema:
+    """A schema of a file: its identity, a sentence and its keys."""
+    body["properties"]["schema"] = {"const": identity}
+    body["required"] = sorted({*body["required"], "schema"})
+    return {"$schema": DIALECT, "$id": f"urn:{identity}", "title": words, **body}
+
+
+def of_kind(kind: Any) -> Schema:
+    """The schema of a field of a record: a record, a tuple, a literal, a scalar or nothing."""
+    origin, inner = get_origin(kind), get_args(kind)
+    if is_dataclass(kind) and isinstance(kind, type):
+        return object_of({name: of_kind(hint) for name, hint in hints_of(kind).items()})
+    if origin in (Union, UnionType):
+        (one,) = (part for part in inner if part is not type(None))
+        return or_null(of_kind(one))
+    if origin is tuple:
+        return list_of(of_kind(inner[0]))
+    if origin is Mapping:
+        return map_of(of_kind(inner[1]))
+    if origin is Literal:
+        return one_of(kind)
+    return {float: NUMBER, int: WHOLE, str: TEXT, bool: {"type": "boolean"}}[kind]
