@@ -153,7 +153,7 @@ def test_every_setting_that_changes_a_result_changes_the_work(found: Survey) -> 
         except UsageError:
             continue
         assert (job.config_sha256 != base.config_sha256) == (name in marked), where
-        free = name in keys.NOT_OF_A_BATCH or name == "registry"
+        free = name in keys.NOT_OF_A_BATCH or name in ("registry", "prune")
         assert (job.key != base.key) == (not free) or not settings.cache, where
 
 
