@@ -27,19 +27,10 @@ from pipeline.execution.outputs.publishing import (
     removed_note,
     with_folder_names,
 )
-<<<<<<< HEAD
-from pipeline.execution.outputs.statuses import histories_of, with_current_statuses
+from pipeline.execution.outputs.statuses import histories_of, status_now, with_current_statuses
 from pipeline.execution.tasks.survey_tasks import survey_with
 from pipeline.execution.workers.pools import Cluster, core_count, open_pool
 from pipeline.execution.workers.worker_pool import WorkerPool
-=======
-from pipeline.execution.run_cache import Batch, RunCache
-from pipeline.execution.stamp import configuration_digest
-from pipeline.execution.statuses import histories_of, status_now, with_current_statuses
-from pipeline.execution.survey_tasks import survey_with
-from pipeline.execution.versions import RUN, tools
-from pipeline.execution.worker_pool import WorkerPool
->>>>>>> 05a6d68 (run keeps the motors of earlier runs in an output unless prune=true)
 from pipeline.io.ingest.files import input_folder, size_bytes
 from pipeline.io.ingest.guard import ReadLimits
 from pipeline.io.ingest.survey import Answer, Entry, Question, Survey, settled, survey
