@@ -151,7 +151,7 @@ def _motor(source: Source, shaft: _Shaft, options: Options) -> dict[str, str]:
 
 
 def read(text: str) -> Values:
-    """The constants of such a document that we wrote."""
+    """The constants of such a document that we wrote; raises ValueError where there is no motor."""
     root = Xml.fromstring(text)  # noqa: S314 (our own text)
     motor, joint = root.find("actuator/dcmotor"), root.find("worldbody/body/joint")
     pairs = root.find("custom/numeric")
