@@ -75,7 +75,7 @@ class Source:
         return {} if self.sheet.model is None else self.sheet.model.sizes
 
     def effect_parameters(self) -> list[tuple[str, float, float, str]]:
-        """Every known parameter of an effect: `EFFECT_PARAMETER`, value, u and unit."""
+        """Every known parameter: effect and parameter joined by a low line, value, u and unit."""
         return [
             (f"{effect}_{name}", value, u or 0.0, unit)
             for effect, parameters in self.sizes().items()

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from pipeline.execution.caches.run_cache import note_files
 from pipeline.execution.jobs import Files, MotorResult
 from pipeline.execution.outputs.page_links import INDEX, MOTOR, links_of, relink
-from pipeline.execution.caches.run_cache import note_files
 from pipeline.io.registry.store import Registry
 from pipeline.io.storage.datasheets import read_datasheet
 from pipeline.io.storage.publish import write_whole
