@@ -32,6 +32,7 @@ from pipeline.criticism.selection.score_test import (
     Candidate,
     Score,
     Standing,
+    clears,
     paid_for,
     quiet_fall,
     searched,
@@ -127,7 +128,8 @@ def _begun(fit: Fit, effect: Effect) -> Fit | None:
     """Where a fit with the coupling begins: at the share and stiffness that the torque shows.
 
     At an order of the angle the torque's fourth derivative of an angle is noise. These rows are
-    left out.
+    left out. None where the linear form does not take most of the torque's power over the floor:
+    what makes the torque miss is something else.
     """
     silent, machine = fit.policy.fit.silent, fit.machine
     plain = tuple(
@@ -136,8 +138,12 @@ def _begun(fit: Fit, effect: Effect) -> Fit | None:
     )
     columns = tuple(effect_columns(LINEAR_COUPLING, fit.model, ()))
     system = linear_system(replace(fit, sigma=plain), columns)
-    places = np.arange(len(system.columns))
-    end = system.normal_equations().along(places).best(*fit.policy.selection.thorough)
+    known, effort = system.normal_equations(), fit.policy.selection.thorough
+    end = known.along(np.arange(len(system.columns))).best(*effort)
+    rigid = known.along(system.own).best(*effort)
+    torque = np.array([channel == _TORQUE for _, channel, _ in system.labels])
+    if not clears(system, torque, rigid.reduced_chi2, end.reduced_chi2):
+        return None
     steps = zip((c.name for c in system.columns), end.step.tolist(), strict=True)
     moved = {name: fit.values.get(name, 0.0) + step for name, step in steps}
     linear = {
