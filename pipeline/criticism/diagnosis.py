@@ -95,7 +95,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
     unseen = unexcited(campaign, library, ladder.steps[-1], offered)
     verdict = _verdict_of(end, unseen)
     together = reported_combinations(last, ladder.held[-1])
-    stateless = verdict == "unknown" and end.sketch is None
+    stateless = verdict == "unknown" and end.sketch is None and end.change is None
     diagnosis = Diagnosis(
         campaign.motor_id,
         model.name,

@@ -6,9 +6,11 @@ so the ladder is searched once more where either is found, and the end that is r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from pipeline.criticism.discovery.changed_constants import Change, changed_constant
 from pipeline.criticism.discovery.unknown_structure import SHAFT, unknown_structure
 from pipeline.criticism.effect import Effect, Machine
 from pipeline.criticism.library.named_models import model_of
@@ -26,6 +28,10 @@ from pipeline.records.comparison import ModelSpec
 from pipeline.records.diagnosis import Remainder, UnknownStructure
 
 _DRIFT = "instruments drift slowly, by some {:g} times their noise at most: taken as noise"
+_SMALLER = (
+    "the sketch is of {}; {} misses by more, {:.3g} noise floors in {}, and no state of the "
+    "machine predicts that"
+)
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
     "capture shows it: whatever changes as slowly looks the same; record that test once more"
@@ -63,11 +69,14 @@ class Ladder:
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """The last ladder, what it leaves that is reported, the sketch of that, and notes on both."""
+    """The last ladder, what it leaves that is reported, the sketch of that or the constant that
+    changed, and notes on all.
+    """
 
     ladder: Ladder
     left: tuple[Remainder, ...]
     sketch: UnknownStructure | None
+    change: Change | None
     notes: tuple[str, ...]
 
 
@@ -91,26 +100,40 @@ def search_ladder(
         wider = replace(machine, load_orders=orders)
         return ladder_from(fit_of(segments(campaign, wider), model_of(model, wider)), library)
 
-    ladder, sketch = _by_orders(search_again, name)
+    ladder, sketch, gain = _by_orders(search_again, name)
     left, notes = ladder.left, []
     if sketch is None:
         drifting = _with_drift(ladder, library)
         if drifting is not None:
             ladder, left = drifting, drifting.large()
-            sketch, _ = _sketched(ladder, left, name)
+            sketch, gain = _sketched(ladder, left, name)
             notes.append(_DRIFT.format(policy_of(model.policy).selection.drift_size))
     if sketch is None:
-        sketch, _ = _sketched(ladder, left, name, in_parts=True)
+        sketch, gain = _sketched(ladder, left, name, in_parts=True)
         left = left if sketch else ladder.large()
         notes += [_WITHIN] if sketch else []
-    return SearchResult(ladder, left, sketch, tuple(notes))
+    change = None if ladder.explains(left) else changed_constant(ladder.steps[-1].system)
+    if change is not None and (sketch is None or change.gain > gain):
+        return SearchResult(ladder, left or ladder.left, None, change, (change.words,))
+    notes += _beside(sketch, left)
+    return SearchResult(ladder, left, sketch, None, tuple(notes))
+
+
+def _beside(sketch: UnknownStructure | None, left: Sequence[Remainder]) -> list[str]:
+    """A note where the signal that misses by most is not the sketched one's, winding or shaft."""
+    worst = max(left, key=lambda one: one.chi2_per_n, default=None)
+    if sketch is None or worst is None or (worst.signal in SHAFT) == (sketch.signal in SHAFT):
+        return []
+    floors = math.sqrt(worst.chi2_per_n)
+    return [_SMALLER.format(sketch.signal, worst.signal, floors, worst.capture)]
 
 
 def _by_orders(
     search_again: Callable[..., Ladder], name: str
-) -> tuple[Ladder, UnknownStructure | None]:
-    """The ladder, and a sketch of what it leaves, with rows for the orders a turn that a first one
-    leaves unseen.
+) -> tuple[Ladder, UnknownStructure | None, float]:
+    """The ladder, a sketch of what it leaves and the deviance that this takes.
+
+    Orders a turn that a first ladder leaves unseen have rows of their own.
 
     Steps of a programme make lines of any order too, and these predict no other capture: orders
     that are no whole numbers join where the sketch with them takes more.
@@ -125,8 +148,8 @@ def _by_orders(
         between = search_again(*unlooked)
         other, more = _sketched(between, between.left, name)
         if other is not None and (sketch is None or more > gain):
-            return between, other
-    return ladder, sketch
+            return between, other, more
+    return ladder, sketch, gain
 
 
 def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:

@@ -93,7 +93,8 @@ def record(
     rng
         Source of gains, noise and start angle.
     protocol
-        Fields of the test's dataclass in `protocols`.
+        Fields of the test's dataclass in `protocols`; `changed`: constants of the motor [units of
+        `design.Motor`] that are others in this capture, such as a magnet that has lost flux.
 
     Returns
     -------
@@ -110,6 +111,7 @@ def record(
     """
     if test not in _TESTS:
         raise ValueError(f"no test {test}; there are {', '.join(_TESTS)}")
+    motor = replace(motor, **protocol.pop("changed", {}))
     how = PROTOCOLS[test](**protocol)
     session = Session(motor, plant_of(motor), bench, bench.drawn(rng), rng)
     recording = _TESTS[test](session, how)

@@ -24,7 +24,7 @@ IN_POLICY = (
 )
 ARITHMETIC = {
     "discovery/bases.py": {"TURN_RAD", "_EDGE"},  # a turn; beside zero and not at it
-    "discovery/description.py": {"_POINTS", "_TURN_POINTS", "_DENSE"},  # points of a picture
+    "discovery/description.py": {"_POINTS", "_TURN_POINTS", "_DENSE", "_A_WAVE"},  # of a picture
     "discovery/dictionary.py": {"SHAPES", "_ABOVE_DEGC"},  # formulas; the model's temperature
     "discovery/matching_pursuit.py": {"_RIDGE"},  # against rounding
     "discovery/residual_inputs.py": {"_WIDE"},  # no bound

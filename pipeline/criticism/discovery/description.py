@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +16,11 @@ from pipeline.criticism.policy.discovery import Discovery
 from pipeline.records.diagnosis import CurvePoint, UnknownStructure
 
 _POINTS, _TURN_POINTS, _DENSE = 17, 48, 2001
-"""Points of a curve that is reported, of one over a turn, and of one that is looked at."""
+"""Points of a curve that is reported, of one over a turn at the least, and of one that is looked
+at."""
+_A_WAVE = 8
+"""Points a wave of a curve that is reported over a turn: with fewer its lines cut the tops off, and
+with less than two another order is seen."""
 _WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
 
@@ -101,7 +106,7 @@ def _curve(
         return _map_curve(pursuit, found)
     turning = port.variable.kind == "turn"
     if turning:
-        at = 2 * np.pi * np.arange(_TURN_POINTS) / _TURN_POINTS
+        at = turn_angles([term.order for term in found.terms] or port.basis.orders)
     else:
         low, high = _visited(pursuit)
         at = np.linspace(low, high, _POINTS)
@@ -115,6 +120,13 @@ def _curve(
         )
         for a, v, u in zip(at, value, spread, strict=True)
     )
+
+
+def turn_angles(orders: Sequence[float]) -> Array:
+    """Angles of a turn [n, rad] at which a curve of these orders is reported."""
+    points = max(_TURN_POINTS, _A_WAVE * math.ceil(max(orders, default=1.0)))
+    angles: Array = 2 * np.pi * np.arange(points) / points
+    return angles
 
 
 def _smooth_in_hats(pursuit: Pursuit, smooth: Port) -> Array:

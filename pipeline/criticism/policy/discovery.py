@@ -29,6 +29,12 @@ class Discovery:
         meaning="parts that a capture without a second one is held out in",
         why="as many as drive logs are held out in",
     )
+    change_captures: int = chosen(
+        3,
+        unit="1",
+        meaning="fewest captures that hold a constant which changed between some of them",
+        why="of two that disagree nobody knows which one is odd",
+    )
     knot_exponent: float = chosen(
         1.6,
         unit="1",

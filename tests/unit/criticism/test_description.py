@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.criticism.discovery.description import _run
+from pipeline.criticism.discovery.description import _run, turn_angles
 from pipeline.criticism.discovery.dictionary import Term
 from pipeline.criticism.discovery.matching_pursuit import Expression
 from pipeline.criticism.discovery.residual_inputs import ports
@@ -54,3 +54,13 @@ def test_a_curve_grows_at_its_end_only_where_it_still_rises(low, high, term, tol
 def test_a_drag_below_the_freezing_point_is_told_below_it():
     told = words("temp_winding_degc", -40.0, 10.0, (0.02, Term("line", parity="even", scale=40.0)))
     assert told == "largest, 0.02 N·m at -15 degC"
+
+
+@pytest.mark.parametrize("orders", [(1.0, 2.0), (1.73,), (30.0, 6.0), (84.0,), (264.0,)])
+def test_a_curve_over_a_turn_is_reported_finely_enough_for_its_waves(orders):
+    """Lines between the points follow the highest wave; with fewer points another order is seen."""
+    at, fine = turn_angles(orders), np.linspace(0.0, 6.0, 40_001)
+    wave = np.sin(max(orders) * at)
+    drawn = np.interp(fine, at, wave)
+    assert np.abs(drawn - np.sin(max(orders) * fine)).max() < 0.09
+    assert at[0] == 0.0 and at.size >= 48 and at[-1] < 2.0 * np.pi

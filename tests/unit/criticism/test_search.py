@@ -20,7 +20,7 @@ def climbs(monkeypatch):
     them leave something that a state of the machine predicts, `drifts` gives a calmer one.
     """
     made = SimpleNamespace(
-        orders=[], seen=(), sketched=set(), gains={}, explained=False, drifts=False
+        orders=[], seen=(), sketched=set(), gains={}, explained=False, drifts=False, change=None
     )
 
     class Ladder(SimpleNamespace):
@@ -44,6 +44,8 @@ def climbs(monkeypatch):
 
     monkeypatch.setattr(search, "ladder_from", climbed)
     monkeypatch.setattr(search, "_sketched", sketched)
+    monkeypatch.setattr(search, "_beside", lambda *_: [])
+    monkeypatch.setattr(search, "changed_constant", lambda _: made.change)
     monkeypatch.setattr(search, "segments", lambda _, of: of.load_orders)
     monkeypatch.setattr(search, "fit_of", lambda found, _: tuple(found))
     monkeypatch.setattr(search, "model_of", lambda *_: None)
@@ -106,3 +108,18 @@ def test_a_sketch_held_out_in_parts_is_said_to_be_so(climbs):
     assert (found.left, len(found.notes)) == (((),), 1)
     climbs.sketched = set()
     assert (end().left, end().notes) == (("large", ()), ())
+
+
+@pytest.mark.parametrize(("gain", "reported"), [(2.0, True), (0.5, False)])
+def test_a_changed_constant_is_reported_where_it_takes_more_than_a_sketch(climbs, gain, reported):
+    climbs.sketched = {((), False)}
+    climbs.change = SimpleNamespace(gain=gain, words="psi_wb is lower")
+    found = end()
+    assert (found.change is not None) is reported
+    assert (found.sketch is None) is reported
+    assert found.notes == (("psi_wb is lower",) if reported else ())
+
+
+def test_a_changed_constant_is_no_matter_where_the_names_explain_all(climbs):
+    climbs.explained, climbs.change = True, SimpleNamespace(gain=9.0, words="psi_wb is lower")
+    assert (end().change, end().notes) == (None, ())

@@ -1,0 +1,149 @@
+"""A constant that changed between captures: a magnet that lost flux, a lead that was replaced.
+
+No state of the machine predicts such a change, so no effect and no generic input shows it. Each
+constant is given a value of its own in every capture, to first order. In the order of these values
+the captures are then cut in two, and the cut that removes most of the deviance is kept.
+
+Reference: Fisher, J. Am. Stat. Assoc. 53 (1958) 789, doi:10.1080/01621459.1958.10501479, groups
+that are contiguous in the ordered values.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.criticism.effect import Array
+from pipeline.criticism.machine.model import BASE, PHYSICAL
+from pipeline.criticism.regression.goodness import significant_groups
+from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.normal_equations import NormalEquations, Prior, pseudo_inverse
+from pipeline.criticism.selection.score_test import clears
+from pipeline.physics.notation import number_text
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A constant with one value in most captures, and another in `captures`, as a difference with
+    its standard uncertainty [unit]; `gain` is the deviance that it takes, its penalty paid.
+    """
+
+    name: str
+    unit: str
+    value: float
+    difference: float
+    u: float
+    captures: tuple[str, ...]
+    gain: float
+
+    @property
+    def words(self) -> str:
+        """What changed, by how much and where, in a sentence."""
+        sense = "higher" if self.difference * self.value > 0.0 else "lower"
+        share = abs(self.difference / self.value) if self.value else math.inf
+        by = f"{100.0 * share:.3g} % " if math.isfinite(share) else ""
+        size = number_text(abs(self.difference), self.u, self.unit)
+        alone = "; only one capture says so" if len(self.captures) == 1 else ""
+        return (
+            f"{self.name} is {by}{sense} (by {size}) in {', '.join(self.captures)} than in the "
+            f"other captures: it changed between them, with no state of the machine{alone}"
+        )
+
+
+def changed_constant(system: LinearSystem) -> Change | None:
+    """The constant whose change between captures explains most of what is over the floor.
+
+    Parameters
+    ----------
+    system
+        Around a fit that leaves something over the floor.
+
+    Returns
+    -------
+    Change or None
+        None where no change takes half of the power over the floor and is worth its penalty.
+
+    """
+    tried = list(_changes(system))
+    return max(tried, key=lambda change: change.gain, default=None)
+
+
+def _changes(system: LinearSystem) -> Iterator[Change]:
+    """The best change of every constant that passes."""
+    significant = significant_groups(system)
+    units = {constant.name: constant.unit for constant in BASE}
+    units |= {name: p.unit for name, (_, p) in system.fit.model.parameters().items() if p.amplitude}
+    wanted = [n for n in system.own.tolist() if _may_change(system, system.columns[n].name)]
+    before = _End.of(system, np.empty((system.size, 0)))
+    for place in wanted:
+        name = system.columns[place].name
+        cuts = list(_cuts(system, place))
+        ends = [_End.of(system, mask[:, None] * system.matrix[:, [place]]) for _, mask in cuts]
+        if not ends:
+            continue
+        best = min(range(len(ends)), key=lambda n: ends[n].deviance)
+        end, (captures, _) = ends[best], cuts[best]
+        penalty = math.log(system.size) + 2.0 * math.log(len(cuts) * len(wanted))
+        gain = before.deviance - end.deviance - penalty
+        most = clears(system, significant, before.reduced_chi2, end.reduced_chi2)
+        if gain > system.policy.selection.tie and most:
+            own = float(end.step[place])
+            value = system.fit.values[name] + own
+            difference, u = float(end.step[-1]), end.u
+            yield Change(name, units[name], value, difference, u, captures, gain)
+
+
+def _may_change(system: LinearSystem, name: str) -> bool:
+    """Constants of the machine, and amplitudes that handbooks do not tell."""
+    known = system.fit.model.parameters()
+    if name not in known:
+        return name in PHYSICAL
+    _, parameter = known[name]
+    return parameter.amplitude and parameter.usual is None
+
+
+def _cuts(system: LinearSystem, place: int) -> Iterator[tuple[tuple[str, ...], Array]]:
+    """Captures [the fewer] in which a constant may be another, and their rows [R]."""
+    paths = np.array([segment.capture for segment in system.segments])[system.segment]
+    column = system.matrix[:, place]
+    held = [name for name in dict.fromkeys(paths.tolist()) if np.any(column[paths == name])]
+    if len(held) < system.policy.discovery.change_captures:
+        return
+    own = np.stack([np.where(paths == name, column, 0.0) for name in held[1:]], axis=1)
+    apart = _End.of(system, own).step[system.own_count :]
+    order = np.argsort(np.concatenate([[0.0], apart]), kind="stable")
+    for cut in range(1, len(held)):
+        both = [tuple(held[n] for n in part) for part in (order[:cut], order[cut:])]
+        fewer = min(both, key=len)
+        yield tuple(sorted(fewer)), np.isin(paths, fewer).astype(float)
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """Where a fit ends along a system's own columns and further ones."""
+
+    deviance: float
+    reduced_chi2: Array
+    step: Array
+    u: float
+
+    @classmethod
+    def of(cls, system: LinearSystem, further: Array) -> _End:
+        """The best end with further columns [R, k], and the uncertainty of the last of them."""
+        matrix = np.column_stack([system.matrix[:, system.own], further])
+        free = np.zeros(further.shape[1])
+        prior = Prior(
+            np.concatenate([system.prior_precision[system.own], free]),
+            np.concatenate([system.prior_gradient[system.own], free]),
+        )
+        rows = np.column_stack([system.residual, matrix])
+        groups = len(system.labels)
+        known = NormalEquations.of(rows, system.group, groups, prior, system.policy.fit)
+        end = known.best(*system.policy.selection.thorough)
+        weight = system.weights(end.reduced_chi2)
+        normal = (matrix * weight[:, None]).T @ matrix + np.diag(prior.precision)
+        u = math.sqrt(max(float(pseudo_inverse(normal)[-1, -1]), 0.0))
+        return cls(end.deviance, end.reduced_chi2, end.step, u)

@@ -1,0 +1,78 @@
+"""A constant that changed between captures is told as that, with its size and the captures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.discovery.changed_constants import changed_constant
+from pipeline.criticism.machine.model import Model
+from pipeline.criticism.regression.gauss_newton import first_fit, rough_fit
+from tests.unit.criticism.machines import BASE, log, machine
+
+P = 7
+
+
+def captures(changed, **by):
+    """Five logs; in the `changed` ones constants are others by a share, `psi_wb=-0.04`."""
+    made = []
+    for n in range(5):
+        one = replace(log(seed=n, noise=1.0), capture=f"log_{n}")
+        made.append(_moved(one, **by) if n in changed else one)
+    return tuple(made)
+
+
+def _moved(segment, psi_wb=0.0, r_ohm=0.0, b_nm_s_rad=0.0):
+    s = dict(segment.recorded)
+    omega = np.gradient(s["theta_mech_rad"], segment.ts_s)
+    flux, drop = psi_wb * BASE["psi_wb"], r_ohm * BASE["r_ohm"]
+    s["vq_v"] = s["vq_v"] + P * omega * flux + drop * s["iq_a"]
+    s["vd_v"] = s["vd_v"] + drop * s["id_a"]
+    drag = b_nm_s_rad * BASE["b_nm_s_rad"] * omega
+    s["torque_shaft_nm"] = s["torque_shaft_nm"] + 1.5 * P * flux * s["iq_a"] - drag
+    return replace(segment, recorded=s)
+
+
+def change(segments):
+    return changed_constant(first_fit(rough_fit(segments, Model(machine(), ()))))
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "changed"),
+    [
+        ("psi_wb", -0.04, (3, 4)),
+        ("psi_wb", 0.02, (1,)),
+        ("r_ohm", 0.07, (0, 2)),
+        ("b_nm_s_rad", 4.0, (2,)),
+    ],
+)
+def test_the_constant_its_size_and_the_captures_are_told(name, share, changed):
+    found = change(captures(changed, **{name: share}))
+    assert found is not None
+    assert found.name == name
+    assert found.captures == tuple(f"log_{n}" for n in changed)
+    assert found.difference == pytest.approx(share * BASE[name], rel=0.05)
+    assert abs(found.difference - share * BASE[name]) < 4.0 * found.u
+    assert ("only one capture" in found.words) == (len(changed) == 1)
+    assert ("higher" if share > 0.0 else "lower") in found.words
+
+
+def test_captures_that_agree_have_none():
+    assert change(captures(())) is None
+
+
+def test_of_two_captures_that_disagree_nobody_knows_which_is_odd():
+    assert change(captures((1,), psi_wb=-0.04)[:2]) is None
+
+
+def test_an_effect_that_every_capture_has_is_no_change():
+    """A drag that bends with speed, five times: no cut between captures takes most of it."""
+    bent = []
+    for segment in captures(()):
+        s = dict(segment.recorded)
+        omega = np.gradient(s["theta_mech_rad"], segment.ts_s)
+        s["torque_shaft_nm"] = s["torque_shaft_nm"] - 0.02 * omega / (1.0 + (omega / 20.0) ** 2)
+        bent.append(replace(segment, recorded=s))
+    assert change(tuple(bent)) is None
