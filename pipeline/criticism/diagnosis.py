@@ -31,7 +31,7 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
-from pipeline.criticism.selection.requested_model import BaseFit, fit_of
+from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
 from pipeline.criticism.validation.signature import signature
@@ -110,6 +110,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
             *at_ambient(found, last.fit.model),
             *against_stated(last, ladder.held[-1]),
             *hum_notes(ladder.base.hum),
+            *frame_notes(found),
             *end.notes,
             *_together(together, ladder.steps[-1].added),
             *(note for note in ladder.cut.values() if note),

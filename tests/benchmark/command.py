@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from tests.benchmark.table import by_effect, table
 
 ACTIONS = ("run", "table", "sensitivity", "policy")
 SUBSETS = ("small", "full")
-BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
+MARKS = "<!-- {}: begin -->", "<!-- {}: end -->"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,8 @@ class Options:
     of sealed truths and results. `subset`: small, of minutes, or full, of hours. `shard`: which
     part of the cases to work on, i/n with i from 1. `seed`: of every random draw. `docs`: Markdown
     page to put the table into, between its marks. `date`: date to write over the table. `world`:
-    somebody else's plant to record in place of the project's simulator.
+    somebody else's plant to record in place of the project's simulator. `method`: another method
+    to judge on a world in place of `diagnose` (`worlds/rivals.py`).
     """
 
     action: str = "run"
@@ -41,6 +42,7 @@ class Options:
     docs: str = ""
     date: str = ""
     world: str = ""
+    method: str = ""
     fields: str = ""
     count: int = 8
 
@@ -87,31 +89,43 @@ def main(chosen: Options) -> str:
         done = run(own, book, product)
     text = _table(chosen, book, wanted)
     if chosen.docs:
-        _into_page(Path(chosen.docs), text)
+        _into_page(Path(chosen.docs), "table", text)
     return f"{done} cases diagnosed\n\n{text}"
 
 
 def _world(chosen: Options, book: Book) -> str:
     """Diagnoses the cases of somebody else's plant; recorded many at once, so in chunks."""
     from tests.benchmark.worlds.recording import WORLDS, Recorder
+    from tests.benchmark.worlds.rivals import METHODS, judged_by
+    from tests.benchmark.worlds.table import beside
     from tests.benchmark.worlds.table import cases as world_cases
     from tests.benchmark.worlds.table import table as world_table
 
     if chosen.world not in WORLDS:
         raise UsageError(f"no world {chosen.world!r}", f"known are {', '.join(WORLDS)}")
+    if chosen.method and chosen.method not in METHODS:
+        raise UsageError(f"no method {chosen.method!r}", f"known are {', '.join(METHODS)}")
     try:
         drawn = world_cases(chosen.world)
     except ImportError as error:
         remedy = f"install {WORLDS[chosen.world]}: docs/benchmark.md says how"
         raise UsageError(f"world={chosen.world} needs {error.name}", remedy) from error
-    wanted = share_of(drawn, chosen.shard)
-    done = 0
+    books = {name: replace(book, code=f"{book.code}-{name}") for name in METHODS} | {"": book}
+    wanted, own, done = share_of(drawn, chosen.shard), books[chosen.method], 0
     if chosen.action == "run":
-        due = [case for case in wanted if book.document(case) is None]
-        done = run(wanted, book, product, record=Recorder(due))
-    found = [(case, document) for case in drawn if (document := book.document(case)) is not None]
-    heading = f"{len(found)} of {len(drawn)} cases of world {chosen.world}, code {book.code}\n\n"
-    return f"{done} cases diagnosed\n\n{heading}{world_table(found)}"
+        due = [case for case in wanted if own.document(case) is None]
+        judge = judged_by(chosen.method) if chosen.method else product
+        done = run(wanted, own, judge, record=Recorder(due))
+    found = {
+        name or "diagnose": [(c, d) for c in drawn if (d := one.document(c)) is not None]
+        for name, one in books.items()
+    }
+    shown = found[chosen.method or "diagnose"]
+    heading = f"{len(shown)} of {len(drawn)} cases of world `{chosen.world}`, code {own.code}\n\n"
+    text = f"{heading}{world_table(shown)}\n{beside(found)}"
+    if chosen.docs:
+        _into_page(Path(chosen.docs), f"world {chosen.world}", text)
+    return f"{done} cases diagnosed\n\n{text}"
 
 
 def _policy(chosen: Options, some: list[Case], book: Book) -> str:
@@ -139,11 +153,12 @@ def _table(options: Options, book: Book, chosen: list[Case]) -> str:
     return whole
 
 
-def _into_page(page: Path, text: str) -> None:
-    """Puts a table between the marks of a page; raises UsageError where it has none."""
+def _into_page(page: Path, name: str, text: str) -> None:
+    """Puts a table between its marks on a page; raises UsageError where there are none."""
+    begin, end = (mark.format(name) for mark in MARKS)
     words = page.read_text(encoding="utf-8")
-    if BEGIN not in words or END not in words:
-        raise UsageError(f"{page} has no place for the table", f"write {BEGIN} and {END} into it")
-    before, rest = words.split(BEGIN, 1)
-    _, after = rest.split(END, 1)
-    write_whole(page, f"{before}{BEGIN}\n{text}{END}{after}".encode())
+    if begin not in words or end not in words:
+        raise UsageError(f"{page} has no place for the table", f"write {begin} and {end} into it")
+    before, rest = words.split(begin, 1)
+    _, after = rest.split(end, 1)
+    write_whole(page, f"{before}{begin}\n{text}{end}{after}".encode())

@@ -17,7 +17,7 @@ from tests.benchmark import bench
 from tests.benchmark import cases as cases_module
 from tests.benchmark.blind import attempted, blind_process
 from tests.benchmark.cases import Case
-from tests.benchmark.command import BEGIN, END, Options, main, options
+from tests.benchmark.command import MARKS, Options, main, options
 from tests.benchmark.drawing import cases
 from tests.benchmark.running import Book, code_digest, run, share_of
 
@@ -169,7 +169,8 @@ def test_a_document_with_nan_is_a_failure(few: list[Case], tmp_path: Path) -> No
 
 def test_the_command_prints_what_there_is(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
+    begin, end = (mark.format("table") for mark in MARKS)
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
     settings = Options(
         action="table", output=str(tmp_path / "out"), docs=str(page), date="2026-01-01"
     )

@@ -42,12 +42,16 @@ class Sensors:
 class Instrument:
     """What recorded a capture: `name` (drive or bench), how its voltages were sampled (`timing`),
     and the nuisances that are the gains of its voltmeter (`meter`) and of its current sensors.
+
+    `frame`: how long before the middle of its hold the rotor frame of a logged voltage vector is
+    that of [holds], 0 or a half.
     """
 
     name: str
     timing: str
     meter: str = "gain_voltage"
     ammeter: str = "gain_current"
+    frame: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,6 +88,10 @@ def state(
     x = operating(segment, signals, model, values, current, motion)
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
     volts = volts / (1.0 + values[segment.instrument.meter])
+    if segment.instrument.frame:
+        hold_s = _hold_s(segment, model.machine.policy.cutting)
+        turn = model.machine.pole_pairs * motion.omega_rad_s * hold_s
+        volts = volts * np.exp(-1j * segment.instrument.frame * turn)
     return at_true_angle(segment, x.fed(volts_v=volts), model, values)
 
 
@@ -125,7 +129,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     """Rotor-frame voltage [n, V] of vectors that the stationary frame holds as the rotor turns.
 
     A log that is slower than the PWM has the mean of such vectors in the rotor frame. `ripple_edge`
-    and `ripple_shift` are what the log samples otherwise.
+    and `ripple_shift` are what the log samples otherwise. A vector that is held may also be in the
+    frame of the instant from which on it is (`Instrument.frame`).
     """
     period, held = segment.ts_s, segment.instrument.timing == "held"
     difference = forward if held else central
@@ -134,6 +139,8 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     edge, shift = values["ripple_edge"], values["ripple_shift"]
     averaged = 1.0 if segment.instrument.timing != "instant" else 0.0
     mean: Complex = _shortened((averaged / 24.0 + edge) * turn**2) * voltage
+    if segment.instrument.frame:
+        mean = mean * np.exp(1j * segment.instrument.frame * turn)
     if shift:
         psi = ahead(pieces.psi_wb) if held else pieces.psi_wb
         mean = mean - shift * 1j * psi * np.gradient(x.machine.pole_pairs * x.omega_rad_s)

@@ -80,6 +80,16 @@ class WorldCase:
         return "typical" if max(self.effects.values()) == 1.0 else "third"
 
 
+def judged(case: WorldCase, document: Mapping[str, Any]) -> tuple[int, int]:
+    """How many of the hidden effects are named with confidence, and how many names are false."""
+    names = set(document["missing"]) if document.get("verdict") == "missing" else set()
+    ranked = {r["effect"]: set(r["confused_with"]) for r in document.get("ranking", ())}
+    hidden = set() if case.outside else set(case.effects)
+    stands = {h: {n for n in names if n == h or h in ranked.get(n, ())} for h in hidden}
+    false = names - set().union(*stands.values())
+    return sum(bool(found) for found in stands.values()), len(false)
+
+
 def marked(case: WorldCase, document: Mapping[str, Any]) -> Mark:
     """What a diagnosis is worth.
 
@@ -91,12 +101,7 @@ def marked(case: WorldCase, document: Mapping[str, Any]) -> Mark:
     """
     if "failure" in document:
         return "failed"
-    names = set(document["missing"]) if document["verdict"] == "missing" else set()
-    ranked = {r["effect"]: set(r["confused_with"]) for r in document["ranking"]}
-    hidden = set() if case.outside else set(case.effects)
-    stands = {h: {n for n in names if n == h or h in ranked.get(n, ())} for h in hidden}
-    hits = sum(bool(found) for found in stands.values())
-    false = names - set().union(*stands.values())
+    hits, false = judged(case, document)
     left = any(one["matters"] for one in document.get("remainder", ()))
     return _mark(case, hits, bool(false), document["verdict"] == "unknown" or left)
 

@@ -32,7 +32,9 @@ class Lane:
 
     `i_dq` [n, A] is the reference of the current; where `speed` [n, rad/s] is given, it replaces
     the q part. `load` [n, N·m] is what the shaft delivers. `held` is a dynamometer that keeps
-    `omega` [rad/s]; else the shaft starts there and is free.
+    `omega` [rad/s]; else the shaft starts there and is free. Where `ahead`, the firmware logs its
+    voltage behind the turn to the period in which it acts, so that it is in the frame of the
+    sampling instant; else before that turn, in the frame of the middle of that period.
     """
 
     session: Session
@@ -42,10 +44,16 @@ class Lane:
     held: bool
     theta: float
     speed: Array | None = None
+    ahead: bool = False
 
 
 class Stepper(Protocol):
-    """A plant: its state by lane, advanced by one period under a held stationary voltage."""
+    """A plant: its state by lane, advanced by one period under a held stationary voltage.
+
+    `axes` is `dq`, or `q` of one winding: its drive has no voltage along d.
+    """
+
+    axes: str
 
     def current(self) -> Complex:
         """Stator current, stationary frame, amplitude-invariant [A]."""
@@ -120,11 +128,13 @@ class Loop:
     Tuned on the nameplates `motors`, one a lane.
     """
 
-    def __init__(self, motors: Sequence[Motor], period_s: float, speed: Array) -> None:
+    def __init__(
+        self, motors: Sequence[Motor], period_s: float, speed: Array, axes: str = "dq"
+    ) -> None:
         def each(name: str) -> Array:
             return np.array([getattr(m, name) for m in motors], dtype=np.float64)
 
-        self.period_s = period_s
+        self.period_s, self.axes = period_s, axes
         self.poles = each("pole_pairs")
         self.ld, self.lq, self.psi = each("ld_h"), each("lq_h"), each("psi_pm_wb")
         self.ohm, self.limit_v = each("r_phase_ohm"), each("vdc_v") / math.sqrt(3.0)
@@ -162,6 +172,7 @@ class Loop:
         omega_e = self.poles * self.omega
         volts = width * (self.ld * off.real + 1j * self.lq * off.imag) + self.integral
         volts += 1j * omega_e * (self.ld * i_dq.real + self.psi + 1j * self.lq * i_dq.imag)
+        volts = volts if self.axes == "dq" else 1j * volts.imag
         size = np.abs(volts)
         volts *= np.minimum(1.0, self.limit_v / np.maximum(size, 1e-9))
         ahead = self.poles * (theta + 1.5 * self.omega * self.period_s)
@@ -171,8 +182,7 @@ class Loop:
 def run(stepper: Stepper, lanes: Sequence[Lane], period_s: float) -> list[Array]:
     """Rows of `pipeline.simulator.driven.log`, one array [n, 11] a lane.
 
-    The firmware logs the voltage that it asked for, in the frame of the rotor half-way through the
-    period for which the inverter holds it.
+    The firmware logs the voltage that it asked for, in the frame that its lane says.
     """
     n = max(lane.load.size for lane in lanes)
     load = np.stack([_padded(lane.load, n) for lane in lanes], axis=1)
@@ -180,19 +190,20 @@ def run(stepper: Stepper, lanes: Sequence[Lane], period_s: float) -> list[Array]
     none = np.full(1, np.nan)
     speed = np.stack([_padded(none if x.speed is None else x.speed, n) for x in lanes], axis=1)
     motors = [lane.session.motor for lane in lanes]
-    loop = Loop(motors, period_s, np.array([lane.omega for lane in lanes]))
+    loop = Loop(motors, period_s, np.array([lane.omega for lane in lanes]), stepper.axes)
     sensors = _sensors(lanes, n)
     rows = np.zeros((n, len(lanes), 11))
     theta_0 = np.array([lane.theta for lane in lanes])
     v_dq = 1j * loop.poles * loop.omega * loop.psi
     volts = v_dq * np.exp(1j * loop.poles * (theta_0 + 0.5 * loop.omega * period_s))
     held, theta = np.array([lane.held for lane in lanes]), theta_0
+    turned = np.array([lane.ahead for lane in lanes])
     for k in range(n):
         theta = theta + np.angle(np.exp(1j * (stepper.angle() - theta)))
         current, seen = sensors.current(stepper.current(), k), sensors.angle(theta)
         after = loop.command(current, seen, wanted[k], speed[k])
         winding, magnet = stepper.temperatures()
-        logged = v_dq * np.exp(1j * loop.poles * seen)
+        logged = np.where(turned, volts, v_dq * np.exp(1j * loop.poles * seen))
         torque = np.where(held, stepper.shaft_torque(), load[k])
         row = (current.real, current.imag, logged.real, logged.imag, seen, loop.omega)
         rows[k] = np.stack((*row, torque, winding, magnet, theta, stepper.speed()), axis=1)

@@ -165,15 +165,20 @@ class Campaigner:
         }
 
 
-def lanes_of(sessions: Mapping[str, Session], programme: str, axes: str) -> dict[str, Lane]:
-    """The runs of a programme that a converter drives; a log of q alone has no transducer."""
+def lanes_of(
+    sessions: Mapping[str, Session], programme: str, axes: str, ahead: bool
+) -> dict[str, Lane]:
+    """The runs of a programme that a converter drives; a log of q alone has no transducer.
+
+    `ahead` is the frame that the drive's firmware logs its voltages in (`Lane`).
+    """
     found = {}
     for stem, test, how in steps_of(programme, axes):
         if test == "torque_map":
             found[stem] = _map_lane(sessions[stem], how)
         elif test == "drive":
             found[stem] = _drive_lane(sessions[stem], axes == "dq" and bool(how["loaded"]))
-    return found
+    return {stem: replace(lane, ahead=ahead) for stem, lane in found.items()}
 
 
 def _map_lane(session: Session, how: Mapping[str, Any]) -> Lane:

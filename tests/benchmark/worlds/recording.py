@@ -53,7 +53,11 @@ def campaigns(cases: Sequence[WorldCase]) -> list[Campaign]:
     people = [Campaigner(p, c.programme, c.seed) for p, c in zip(plants, cases, strict=True)]
     sessions = [one.sessions() for one in people]
     axes = place.Plant.axes
-    lanes = [lanes_of(s, c.programme, axes) for s, c in zip(sessions, cases, strict=True)]
+    # drives of even numbers log their voltages in the one frame, of odd numbers in the other
+    lanes = [
+        lanes_of(s, c.programme, axes, axes == "dq" and c.seed % 2 == 0)
+        for s, c in zip(sessions, cases, strict=True)
+    ]
     rows = _driven(place, plants, lanes)
     found = []
     for case, plant, own, logged in zip(cases, plants, sessions, rows, strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tests.benchmark.worlds.case import MARKS, WorldCase, marked
+from tests.benchmark.worlds.case import MARKS, WorldCase, judged, marked
 from tests.benchmark.worlds.recording import world
 
 LINES = ("nothing", "typical", "third", "pair", "outside")
@@ -52,3 +52,41 @@ def table(found: Found) -> str:
         verdict = document.get("verdict", "none")
         rows.append(f"| {case.programme} | {case.seed} | {hidden} | {mark} | {verdict} | {named} |")
     return "\n".join(rows) + "\n"
+
+
+def beside(found: Mapping[str, Found]) -> str:
+    """What every method found, named falsely and left open, over the cases that it has answered."""
+    heads = (
+        "method",
+        "cases",
+        "hits",
+        "false names",
+        "abstentions",
+        "nulls quiet",
+        "outside flagged",
+    )
+    rows = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    for method, answers in found.items():
+        if answers:
+            rows.append(f"| `{method}` | {len(answers)} | " + " | ".join(_counts(answers)) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _counts(answers: Found) -> Sequence[str]:
+    """Hits of what is hidden, false names, abstentions, quiet nulls and flagged outsiders."""
+    hits = hidden = false = open_ = 0
+    lines: dict[str, list[str]] = {"nothing": [], "outside": []}
+    for case, document in answers:
+        true, wrong = judged(case, document)
+        hidden += 0 if case.outside else len(case.effects)
+        hits, false = hits + true, false + wrong
+        open_ += document.get("verdict") == "unknown"
+        lines.setdefault(case.line, []).append(marked(case, document))
+    quiet, flagged = lines["nothing"], lines["outside"]
+    return (
+        f"{hits} of {hidden}",
+        str(false),
+        str(open_),
+        f"{quiet.count('right')} of {len(quiet)}",
+        f"{flagged.count('abstained right')} of {len(flagged)}",
+    )

@@ -13,7 +13,8 @@ from tests.benchmark.command import main, options
 from tests.benchmark.worlds.case import WorldCase, marked
 from tests.benchmark.worlds.lanes import Lane, run
 from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner, Hidden
-from tests.benchmark.worlds.table import table
+from tests.benchmark.worlds.rivals import _chosen
+from tests.benchmark.worlds.table import beside, table
 
 NULL = WorldCase("motulator", "laboratory", 1)
 COGGING = WorldCase("motulator", "laboratory", 1, {"cogging": 1.0})
@@ -278,3 +279,55 @@ def test_a_log_of_q_alone_holds_means_around_its_samples(hinge: Any) -> None:
         "omega_mech_rad_s",
         "temp_winding_degc",
     }
+
+
+def test_stepwise_regression_names_the_blocks_that_pay_and_no_other() -> None:
+    random = np.random.default_rng(3)
+    matrix = random.normal(size=(400, 7))
+    target = matrix @ [1.0, 0.5, 0.0, 0.8, 0.0, 0.0, 0.0] + 0.1 * random.normal(size=400)
+    blocks = {
+        "one": [np.array([1])],
+        "none": [np.array([2])],
+        "shaped": [np.array([4, 5]), np.array([3, 6])],
+    }
+    assert set(_chosen(matrix, target, np.array([0]), blocks)) == {"one", "shaped"}
+
+
+def test_methods_stand_beside_each_other_with_hits_false_names_and_abstentions() -> None:
+    ours = [
+        (NULL, answer("adequate")),
+        (PAIR, answer("missing", "cogging")),
+        (OUTSIDE, answer("unknown")),
+    ]
+    other = [(NULL, answer("missing", "windage")), (OUTSIDE, answer("missing", "cogging"))]
+    text = beside({"diagnose": ours, "other": other, "silent": []})
+    assert "| `diagnose` | 3 | 1 of 2 | 0 | 1 | 1 of 1 | 1 of 1 |" in text
+    assert "| `other` | 2 | 0 of 0 | 2 | 0 | 0 of 1 | 0 of 1 |" in text
+    assert "silent" not in text
+
+
+def test_dry_friction_of_a_joint_opposes_motion_not_acceleration() -> None:
+    """MuJoCo's friction loss is a soft constraint: by default its sign is that of the acceleration
+    up to 27 rad/s in a motor that brakes hard.
+    """
+    pytest.importorskip("mujoco", reason="group worlds is not installed")
+    from tests.benchmark.worlds import with_mujoco
+
+    m = with_mujoco.motor(1)
+    rotor = with_mujoco._Rotor(m, Hidden({}), 0.0, 40.0)
+    volts, period = -m.pole_pairs * m.psi_pm_wb * 30.0, 1e-4
+    rows = []
+    for _ in range(600):
+        rows.append((rotor.amps, rotor.theta, rotor.omega))
+        rotor.on(volts, round(period / with_mujoco.STEP_S))
+    amps, theta, omega = np.array(rows).T
+    slope = np.diff(theta, 2) / period**2
+    mean = amps[1:-1] + np.diff(amps, 2) / 6.0
+    torque = 1.5 * m.pole_pairs * m.psi_pm_wb * mean - m.b_visc_nm_s_rad * omega[1:-1]
+    friction = torque - m.j_rotor_kgm2 * slope
+    turning = np.abs(omega[1:-1]) > 0.5
+    turning[:5] = False
+    expected = m.torque_coulomb_nm * np.sign(omega[1:-1])
+    assert (omega[1:-1] < -5.0).any()
+    assert (omega[1:-1] > 5.0).any()
+    assert friction[turning] == pytest.approx(expected[turning], abs=0.02 * m.torque_coulomb_nm)

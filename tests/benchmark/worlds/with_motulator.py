@@ -206,6 +206,8 @@ def _mechanics(motors: Sequence[Motor], hidden: Sequence[Hidden], held: Array) -
 class Converted:
     """Some lanes on motulator's drive, all with compliance or none."""
 
+    axes: ClassVar[str] = "dq"
+
     def __init__(self, lanes: Sequence[Lane], hidden: Sequence[Hidden]) -> None:
         motors = [lane.session.motor for lane in lanes]
         self.held = np.array([lane.held for lane in lanes])

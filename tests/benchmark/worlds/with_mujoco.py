@@ -28,6 +28,9 @@ HELD_KGM2 = 1e5
 """Step of the integrator, and a rotor's inertia that no torque here can move."""
 
 GRAVITY = 9.81
+RIGID = "0 0 0 0 0"
+"""LuGre friction of an actuator that has none."""
+
 SENSOR_EFFECTS = ("angle_eccentricity",)
 PLANT_EFFECTS = (
     "cogging",
@@ -90,7 +93,7 @@ def motor(seed: int) -> Motor:
 def _friction(m: Motor, h: Hidden) -> tuple[float, str]:
     """Dry friction of the joint, or LuGre friction of the actuator in its place."""
     if h["stribeck"] == h["presliding"] == 0.0:
-        return m.torque_coulomb_nm, "0 0 0 0 0"
+        return m.torque_coulomb_nm, RIGID
     static = m.torque_coulomb_nm + h["stribeck"]
     # bristles under Stribeck friction alone are as stiff as the step allows
     travel = h["presliding"] or 2e-4
@@ -123,6 +126,7 @@ def _bodies(m: Motor, h: Hidden, armature: float) -> str:
           diaginertia="1e-7 1e-7 1e-7"/></body>"""
     return f"""<body name="rotor"><joint name="shaft" type="hinge" axis="0 0 1"
       damping="{m.b_visc_nm_s_rad!r}" frictionloss="{dry!r}" armature="{armature!r}"
+      solreffriction="{2.0 * STEP_S!r} 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"
       stiffness="{h["wound_cable"]!r}"/>
       <inertial pos="{arm!r} 0 0" mass="{mass}" diaginertia="{flat!r} {flat!r} {axial!r}"/>
       {inner}</body>"""
@@ -198,6 +202,8 @@ class _Rotor:
 class Converted:
     """Some lanes in MuJoCo, one model each."""
 
+    axes: ClassVar[str] = "q"
+
     def __init__(self, lanes: Sequence[Lane], hidden: Sequence[Hidden]) -> None:
         self.rotors = [
             _Rotor(lane.session.motor, h, lane.theta, lane.omega)
@@ -270,7 +276,10 @@ class Plant:
     def turned(self, theta: Array, omega: Array) -> Array:
         """The torque on a flywheel that turns as it will, from a turn before on."""
         period = float(theta[1] - theta[0]) / float(omega[0])
-        steps = max(1, math.ceil(period / (2.0 * STEP_S)))
+        # bristles alone have a state that moves while the flywheel hardly does
+        _, lugre = _friction(self.motor, self.hidden)
+        longest = 20.0 * STEP_S if lugre == RIGID else 2.0 * STEP_S
+        steps = max(1, math.ceil(period / longest))
         start = float(theta[0]) - 200 * period * float(omega[0])
         rotor = _Rotor(self.motor, self.hidden, start, float(omega[0]), held=True, powered=False)
         rotor.model.opt.timestep = period / steps

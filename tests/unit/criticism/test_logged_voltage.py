@@ -12,6 +12,7 @@ from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.equations.dq import _shortened
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.residuals.residual import residual
+from pipeline.criticism.selection.requested_model import fit_of, frame_notes
 from tests.unit.criticism.machines import BASE, log, machine
 
 EVERY = 60
@@ -67,3 +68,33 @@ def test_what_is_left_of_a_mean_has_one_form_through_zero(turn: float) -> None:
     lost = np.array([turn**2 / 24.0, 0.0, -(turn**2) / 24.0])
     half = turn / 2.0
     assert _shortened(lost) == pytest.approx([math.sin(half) / half, 1.0, math.sinh(half) / half])
+
+
+def held(before_middle: float, noise: float) -> Segment:
+    """A log of vectors that are held from sample to sample, in the rotor frame of an instant
+    `before_middle` of their hold [holds]; its shaft turns through both senses.
+    """
+    plain = log(noise=noise)
+    recorded = dict(plain.recorded)
+    instant = recorded["vd_v"] + 1j * recorded["vq_v"]
+    middle = np.append(0.5 * (instant[:-1] + instant[1:]), instant[-1])
+    turn = np.append(np.diff(PAIRS * recorded["theta_mech_rad"]), 0.0)
+    vector = middle * np.exp(1j * before_middle * turn)
+    recorded |= {"vd_v": vector.real, "vq_v": vector.imag}
+    return replace(plain, recorded=recorded, instrument=replace(plain.instrument, timing="held"))
+
+
+@pytest.mark.parametrize("frame", [0.0, 0.5])
+def test_the_frame_of_held_voltages_is_the_one_that_explains_them(frame: float) -> None:
+    base = fit_of([held(frame, 1.0)], Model(machine(), ()))
+    (segment,) = base.system.segments
+    assert segment.instrument.frame == frame
+    assert bool(frame_notes(base.system.segments)) == bool(frame)
+    assert base.system.fit.values["psi_wb"] == pytest.approx(BASE["psi_wb"], rel=1e-3)
+
+
+def test_only_held_voltages_have_a_frame_to_choose() -> None:
+    late = held(0.5, 1.0)
+    centred = replace(late, instrument=replace(late.instrument, timing="centred"))
+    base = fit_of([centred], Model(machine(), ()))
+    assert base.system.segments[0].instrument.frame == 0.0
