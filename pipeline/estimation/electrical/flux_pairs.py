@@ -208,9 +208,8 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
     """How late the currents are sampled [s], from the torque of d current; 0 where not seen.
 
     A current sampled d late is turned by w_e d against the rotor. The voltages at no d current do
-    not show it, the torque does: T = K (i_q cos a + i_d sin a) with a = w_e d beside the `offset`
-    [rad] of the frame. Without it R d counts as inductance on both axes. Only a delay past four
-    times its own scatter is taken out.
+    not show it, the torque does. Without it R d counts as inductance on both axes. Only a delay
+    past four times its own scatter is taken out.
 
     Parameters
     ----------
@@ -228,7 +227,9 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
 
     Notes
     -----
-    T = K (i_q cos a + i_d sin a) + ..., a = offset + ω_e d: the slope of torque in ω_e i_d is K d.
+    T = K i_q + K_rel i_d i_q of currents that are turned by ω_e d beside the frame's offset: the
+    slope of torque in ω_e (i_d + (i_d² − i_q²) K_rel / K) is K d, with K_rel / K by the same
+    regression.
 
     """
     torque = np.array([p.torque_nm for p in points])
@@ -240,11 +241,16 @@ def current_lag(points: Sequence[Point], pole_pairs: int, offset: float) -> floa
         return 0.0
     rows = [np.array([p.group == g for p in points], dtype=float) for g in groups]
     omega = pole_pairs * np.array([p.omega_mech_rad_s for p in points])
-    shared = [*rows, i_q, i_d * i_q, i_d, i_q**2, i_q**3, i_d * i_q**3, i_d**2 * i_q]
-    found = linear_fit(np.column_stack([*shared, omega * i_d]), torque, np.ones(torque.size))
-    if not found.full_rank or found.dof < 3:
-        return 0.0
-    kt, slope = float(found.coefficients[len(groups)]), float(found.coefficients[-1])
+    shared = [*rows, i_q, i_d * i_q, i_d, i_d**2, i_q**2, i_q**3, i_d * i_q**3, i_d**2 * i_q]
+    ratio, ones = 0.0, np.ones(torque.size)
+    for _ in range(3):
+        turned = omega * (i_d + ratio * (i_d**2 - i_q**2))
+        found = linear_fit(np.column_stack([*shared, turned]), torque, ones)
+        kt, reluctance = (float(found.coefficients[len(groups) + k]) for k in (0, 1))
+        if not found.full_rank or found.dof < 3 or kt == 0.0:
+            return 0.0
+        ratio = reluctance / kt
+    slope = float(found.coefficients[-1])
     u = float(np.sqrt(found.covariance[-1, -1] * found.chi2_dof))
     return slope / (kt * np.cos(offset)) if abs(slope) > policy().evidence.sigmas * u else 0.0
 
