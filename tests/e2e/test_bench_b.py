@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from scipy.special import stdtrit
 from scipy.stats import binomtest
 
 from pipeline.__main__ import main
+from pipeline.records.uncertainty import BETWEEN
 
 BENCH = Path(__file__).parents[3] / "shared" / "data" / "benchB"
 pytestmark = pytest.mark.skipif(not BENCH.is_dir(), reason="../shared/data/benchB is not here")
@@ -37,6 +39,7 @@ class Row(NamedTuple):
     true: float
     inside: bool
     aside: bool
+    doubt: float
 
     def words(self) -> str:
         return f"{self.motor} {self.name}: {self.value:.5g} ± {self.u:.2g}, true {self.true:.5g}"
@@ -76,7 +79,8 @@ def judged(motor: str, constants: dict[str, Any]) -> list[Row]:
         value, u = stated["value"], stated["u"]
         reach = stdtrit(stated["dof"] or 1e9, 0.975) * u
         inside = bool(abs(value - number) <= reach)
-        rows.append(Row(motor, name, value, u, number, inside, name in aside))
+        doubts = [part["u"] for part in stated["budget"] if part["source"].startswith(BETWEEN)]
+        rows.append(Row(motor, name, value, u, number, inside, name in aside, math.hypot(*doubts)))
     return rows
 
 
@@ -109,11 +113,16 @@ def test_95_of_100_lie_inside_their_intervals(rows: list[Row]) -> None:
 
 @pytest.mark.slow
 def test_constants_of_motors_that_hide_nothing_stay_narrow(rows: list[Row]) -> None:
-    """Doubt costs nothing where there is none: the largest u of J, Tc, b stay under 2 %."""
+    """Doubt costs nothing where there is none: regimes and methods add under half a per cent.
+
+    The rest is the bench's: gains of 1 and 1.5 %, and in M0 and M1, whose drives log no magnet
+    temperature, 20 K of 0.11 %/K.
+    """
     plain = [r for r in rows if r.motor in ("L0", "M0", "M1")]
     mechanical = [row for row in plain if row.name in MECHANICAL]
     assert len(mechanical) == 9
-    assert max(row.u / row.true for row in mechanical) < 0.02
+    assert max(row.doubt / row.true for row in mechanical) < 0.005
+    assert max(row.u / row.true for row in mechanical) < math.hypot(0.01, 0.015, 0.022, 0.01)
 
 
 @pytest.mark.slow
