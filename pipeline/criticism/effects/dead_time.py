@@ -5,21 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.effect import Complex, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.inverter import AXES, lost_shares
+from pipeline.criticism.machine.inverter import lost_shares, phases_of, turning, vector_of
 
 
 def _drop(x: Operating, q: Values) -> Complex:
     if not x.inverter:
         return np.zeros(x.omega_rad_s.shape, dtype=complex)
-    before = x.i_a - np.gradient(x.i_a) / x.ts_s * q["lag_s"]
-    eps = x.eps_rad - x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
-    phases = (before * np.exp(1j * eps) * np.conj(AXES)[:, None]).real
+    before, eps = x.i_a, x.eps_rad
+    if q["lag_s"]:
+        before = before - np.gradient(before) / x.ts_s * q["lag_s"]
+        eps = eps - x.machine.pole_pairs * x.omega_rad_s * q["lag_s"]
+    turn = turning(eps)
+    phases = phases_of(before * turn)
     if q["ripple"]:
         shares = lost_shares(x, eps, phases, q["loss_v"], q["width_a"])
     else:
         shares = np.tanh(phases / q["width_a"])
-    rotor: Complex = 2.0 / 3.0 * q["loss_v"] * (AXES @ shares) * np.exp(-1j * eps)
-    return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a
+    rotor: Complex = q["loss_v"] * vector_of(shares) * np.conj(turn)
+    return rotor + q["on_v"] / x.machine.scales["current_a"] * x.i_a if q["on_v"] else rotor
 
 
 EFFECT = Effect(

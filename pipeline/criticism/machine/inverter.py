@@ -12,8 +12,32 @@ _ROUNDS = 3
 time hold each other up."""
 _SHARP = 1e-9
 """Width [A] below which a current's sign is as good as a step."""
-AXES = np.exp(2j * np.pi * np.arange(3) / 3.0)
-"""Directions of the phases a, b, c in the stationary frame."""
+_SIN_120 = 0.5 * 3.0**0.5
+
+
+def turning(eps_rad: Array) -> Complex:
+    """Unit vector [n] of the rotor in the stationary frame: e^{jε} of an angle [n, rad]."""
+    turn = np.empty(eps_rad.shape, dtype=np.complex128)
+    turn.real, turn.imag = np.cos(eps_rad), np.sin(eps_rad)
+    return turn
+
+
+def phases_of(vector: Complex) -> Array:
+    """Components [3, n] along the phases a, b, c of a vector [n] of the stationary frame."""
+    phases = np.empty((3, vector.size))
+    phases[0] = vector.real
+    across = _SIN_120 * vector.imag
+    phases[1] = across - 0.5 * vector.real
+    phases[2] = -across - 0.5 * vector.real
+    return phases
+
+
+def vector_of(phases: Array) -> Complex:
+    """Vector [n] of the stationary frame that phases [3, n] make: 2/3 Σ x_k e^{j2πk/3}."""
+    vector = np.empty(phases.shape[1], dtype=np.complex128)
+    vector.real = 2.0 / 3.0 * (phases[0] - 0.5 * (phases[1] + phases[2]))
+    vector.imag = 2.0 / 3.0 * _SIN_120 * (phases[1] - phases[2])
+    return vector
 
 
 def lost_shares(
@@ -67,8 +91,9 @@ def lost_shares(
         share: Array = np.tanh(current_a / width)
         return share
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
-    winding = _phases(x.base["r_ohm"] * x.i_a + induced, eps_rad)
-    told = None if supply.volts_v is None else _phases(supply.volts_v, eps_rad)
+    turn = turning(eps_rad)
+    winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
+    told = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
     late = keeps = (current_a > 0.0).astype(float)
     per_volt = supply.pwm_s / (2.0 * inductance)
     ramp = 4.0 / 3.0 * loss_v * per_volt
@@ -85,12 +110,6 @@ def lost_shares(
         keeps = _passed(fall + (low_after - 0.5) * ramp, ramp, width)
     lost: Array = late + keeps - 1.0
     return lost
-
-
-def _phases(vector: Complex, eps_rad: Array) -> Array:
-    """Components [3, n] along the phases of a vector [n] of the rotor frame."""
-    phases: Array = (vector * np.exp(1j * eps_rad) * np.conj(AXES)[:, None]).real
-    return phases
 
 
 def _beside(volts: Array, loss_v: float, late: Array, side: float) -> tuple[Array, Array]:

@@ -108,6 +108,44 @@ def linearise(
     )
 
 
+def trial_residuals(
+    segment: Segment,
+    model: Model,
+    values: Values,
+    trials: Sequence[tuple[Effect, Values]],
+    row_weight: Array,
+) -> list[Array]:
+    """Whitened residuals of one segment where effects that are not in the model are.
+
+    Parameters
+    ----------
+    segment
+        With R valid weak samples.
+    model, values
+        What the effects are added to, one at a time.
+    trials
+        Each an effect of a sensor and its parameters by their full names, in their units.
+    row_weight
+        What rows are multiplied by [R], over their unit.
+
+    Returns
+    -------
+    list of arrays [R]
+        One a trial.
+
+    """
+    _, _, valid, _ = row_index(segment)
+    sampler = _Sampler(segment, model, dict(values))
+    sampled = (
+        sampler.there(effect, model.with_effects(effect), {**sampler.values, **moved})
+        for effect, moved in trials
+    )
+    rows = np.stack([projected(segment, one)[valid] for one in sampled], axis=1)
+    rows *= row_weight[:, None]
+    absorb(rows, offsets(segment, valid, row_weight, model.policy.noise_floors))
+    return list(rows.T)
+
+
 def _weak_columns(
     segment: Segment, sampler: _Sampler, columns: Sequence[Column], valid: NDArray[np.bool_]
 ) -> Array:
@@ -214,7 +252,12 @@ class _Sampler:
             return (residual(self.segment, self.model, moved) - self.here) / step
         x = replace(self.x, base=moved)
         pieces = self.pieces
-        if column.name not in _BETWEEN:
+        if column.name == "b_nm_s_rad":
+            pieces = replace(pieces, drag_nm=pieces.drag_nm + step * x.omega_rad_s)
+        elif column.name == "lead_share":
+            lead = step * self.values["r_ohm"] * self.mean.i_a * float(x.inverter)
+            pieces = replace(pieces, drop_v=pieces.drop_v + lead)
+        elif column.name not in _BETWEEN:
             pieces = evaluate(self.model, x, moved)
         there = predicted(self.segment, x, pieces, self.model, moved)
         if column.name == "j_kgm2" and of_acceleration(self.segment, self.segment.channels[-1]):
@@ -251,7 +294,7 @@ class _Sampler:
         if effect.clock is not None:
             gains = [clock_gain(self.recorder, model, values) for values in (start, moved)]
             return self._along_time(column.step) * (gains[1] - gains[0]) / column.step
-        change: Array = (self._there(effect, model, moved) - self.here) / column.step
+        change: Array = (self.there(effect, model, moved) - self.here) / column.step
         return change if np.any(change) else None
 
     def _along_time(self, step: float) -> Array:
@@ -261,7 +304,7 @@ class _Sampler:
             self.paced[step] = (residual(self.segment, self.model, moved) - self.here) / step
         return self.paced[step]
 
-    def _there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
+    def there(self, effect: Effect, model: Model, moved: dict[str, float]) -> Array:
         """The residual where an effect has moved. An error of a voltage or a torque leaves the
         machine's state, and what its hooks gave, as they are.
         """

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Parameter, Values
+from pipeline.criticism.effect import Array, Effect, Machine, Parameter, Values
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.regression.linearise import linearise
-from pipeline.criticism.regression.noise_floors import Floor
+from pipeline.criticism.regression.linearise import trial_residuals
 from pipeline.criticism.regression.normal_equations import Descent
 from pipeline.criticism.regression.parallel import on_each
 from pipeline.criticism.residuals.observability import observes
@@ -33,6 +32,33 @@ from pipeline.criticism.selection.score_test import (
     searched,
     share_of,
 )
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    """A candidate, one of its amplitudes at a `start` in multiples of the parameter's scale."""
+
+    candidate: Candidate
+    parameter: Parameter
+    start: float
+
+    @property
+    def name(self) -> str:
+        """Full name of the amplitude."""
+        return f"{self.candidate.effect.name}.{self.parameter.name}"
+
+    def values(self, machine: Machine) -> dict[str, float]:
+        """The effect's parameters, in their units."""
+        return {**self.candidate.values, self.name: self.start * machine.scale(self.parameter)}
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    """A trial, the system with its residual there, and how well all else is refitted to it."""
+
+    trial: _Trial
+    system: LinearSystem
+    descent: Descent
 
 
 def with_starts(
@@ -53,71 +79,90 @@ def with_starts(
     own = wide.along(wide.own)
     before = Standing.of(own, np.arange(len(own.columns)), own.normal_equations().best(*thorough))
     penalty = searched(offered)
-    for candidate in offered:
-        for parameter in candidate.effect.parameters_of(wide.fit.machine):
-            for score in _tried(own, candidate, parameter, before, significant):
-                known = best.get(candidate.effect.name)
-                if known is None or score.fall > known.fall:
-                    best[candidate.effect.name] = replace(score, penalty=score.penalty + penalty)
+    for end in _best_ends(own, offered):
+        name, score = end.trial.candidate.effect.name, _score(own, end, before, significant)
+        known = best.get(name)
+        if known is None or score.fall > known.fall:
+            best[name] = replace(score, penalty=score.penalty + penalty)
     return tuple(sorted(best.values(), key=lambda s: (-s.fall, s.candidate.effect.name)))
 
 
-def _tried(
-    own: LinearSystem,
-    candidate: Candidate,
-    parameter: Parameter,
-    before: Standing,
-    significant: NDArray[np.bool_],
-) -> tuple[Score, ...]:
-    """The score of the best start of a parameter, none where it has no starts."""
-    if not parameter.starts:
-        return ()
-    name = f"{candidate.effect.name}.{parameter.name}"
-    scale, policy = own.fit.machine.scale(parameter), own.policy.selection
+def _best_ends(own: LinearSystem, offered: Sequence[Candidate]) -> list[_End]:
+    """The best trial of every parameter with starts: of these, then of finer ones beside it."""
+    machine, finer = own.fit.machine, own.policy.selection.finer_starts
+    tried = [(c, p) for c in offered for p in c.effect.parameters_of(machine) if p.starts]
+    nearest = [
+        _least(ends)
+        for ends in _ends(own, [[_Trial(*one, start) for start in one[1].starts] for one in tried])
+    ]
+    beside = _ends(
+        own,
+        [[replace(e.trial, start=factor * e.trial.start) for factor in finer] for e in nearest],
+    )
+    return [_least([first, *more]) for first, more in zip(nearest, beside, strict=True)]
 
-    def at(start: float) -> tuple[float, float, LinearSystem, Descent]:
-        moved = _moved(own, candidate, {name: start * scale})
-        end = moved.normal_equations().best(*policy.thorough)
-        return end.deviance, start, moved, end
 
-    nearest = min((at(start) for start in parameter.starts), key=lambda one: one[:2])
-    beside = [at(factor * nearest[1]) for factor in policy.finer_starts]
-    _, start, moved, end = min([nearest, *beside], key=lambda one: one[:2])
-    places = np.arange(len(own.columns))
-    after = Standing.of(moved, places, end)
+def _least(ends: Sequence[_End]) -> _End:
+    return min(ends, key=lambda end: (end.descent.deviance, end.trial.start))
+
+
+def _ends(own: LinearSystem, trials: Sequence[Sequence[_Trial]]) -> list[list[_End]]:
+    """Where all else, refitted to first order, leaves every trial.
+
+    The columns stay those of where no candidate is, and so does what rows are divided by.
+    """
+    fit = own.fit
+    each = [trial for some in trials for trial in some]
+    asked = tuple((t.candidate.effect, t.values(fit.machine)) for t in each)
+    weights = [own.row_weight[own.segment == n] for n in range(len(own.segments))]
+    arguments = [(fit.model, fit.values, asked, weight) for weight in weights]
+    parts = on_each(_trial_residuals, own.segments, arguments)
+    whole = np.tile(own.residual, (len(each), 1))
+    for number, part in enumerate(parts):
+        rows = np.flatnonzero(own.segment == number)
+        for place, residual in part.items():
+            whole[place, rows] = residual
+    systems = iter([replace(own, residual=residual) for residual in whole])
+    return [[_end(trial, next(systems)) for trial in some] for some in trials]
+
+
+def _end(trial: _Trial, moved: LinearSystem) -> _End:
+    policy = moved.policy.selection
+    return _End(trial, moved, moved.normal_equations().best(*policy.thorough))
+
+
+def _score(own: LinearSystem, end: _End, before: Standing, significant: NDArray[np.bool_]) -> Score:
+    """The score of a trial, without what the search over candidates costs."""
+    trial, machine, policy = end.trial, own.fit.machine, own.policy.selection
+    effect, parameter = trial.candidate.effect, trial.parameter
+    after = Standing.of(end.system, np.arange(len(own.columns)), end.descent)
     found = Score(
-        candidate,
+        trial.candidate,
         before.deviance - after.deviance,
         0.0,
-        {name: start * scale},
-        dict(zip((c.name for c in own.columns), end.step.tolist(), strict=True)),
-        share_of(own, candidate.effect, before, after),
-        abs(start) / parameter.negligible,
+        {trial.name: trial.start * machine.scale(parameter)},
+        dict(zip((c.name for c in own.columns), end.descent.step.tolist(), strict=True)),
+        share_of(own, effect, before, after),
+        abs(trial.start) / parameter.negligible,
         quiet_fall(own, before.reduced_chi2, after.reduced_chi2),
         clears(own, significant, before.reduced_chi2, after.reduced_chi2),
         policy=policy,
     )
-    dof = paid_for(candidate.effect, own.fit.machine, found)
+    dof = paid_for(effect, machine, found)
     search = 2.0 * math.log(len(parameter.starts) + len(policy.finer_starts))
-    return (replace(found, penalty=dof * math.log(own.size) + search),)
+    return replace(found, penalty=dof * math.log(own.size) + search)
 
 
-def _moved(own: LinearSystem, candidate: Candidate, start: Values) -> LinearSystem:
-    """The system with its residual where the candidate's amplitude is at a start, and the columns
-    of where it is not.
-    """
-    fit, effect = own.fit, candidate.effect
-    model = fit.model.with_effects(effect)
-    values = {**fit.values, **candidate.values, **start}
-    segments, floors = fit.segments, fit.floors
-    observed = [number for number, segment in enumerate(segments) if observes(segment, effect)]
-    each = [(model, values, floors[number]) for number in observed]
-    rows = on_each(_residual, [segments[number] for number in observed], each)
-    residual = own.residual.copy()
-    for number, row in zip(observed, rows, strict=True):
-        residual[own.segment == number] = row
-    return replace(own, residual=residual)
-
-
-def _residual(segment: Segment, model: Model, values: Values, floor: Floor) -> Array:
-    return linearise(segment, model, values, (), floor).residual
+def _trial_residuals(
+    segment: Segment,
+    model: Model,
+    values: Values,
+    asked: Sequence[tuple[Effect, Values]],
+    row_weight: Array,
+) -> dict[int, Array]:
+    """Residuals [R] of the trials that a segment observes, by their places."""
+    seen = [n for n, (effect, _) in enumerate(asked) if observes(segment, effect)]
+    if not seen:
+        return {}
+    made = trial_residuals(segment, model, values, [asked[n] for n in seen], row_weight)
+    return dict(zip(seen, made, strict=True))

@@ -221,11 +221,13 @@ def ahead_in(
     if not (steps > 0.0).any():
         return None
     at = np.rint(rows / float(np.median(steps[steps > 0.0])))
+    places = at.astype(np.int64)
 
     def ahead(delay_s: float) -> tuple[Complex, Array, Array]:
         later = at + delay_s / segment.ts_s
         change = {
-            name: between(column, later) - between(column, at) for name, column in log.items()
+            name: between(column, later) - column.take(places, mode="clip")
+            for name, column in log.items()
         }
         zero = np.zeros(at.size)
         current = change.get("id_a", zero) + 1j * change.get("iq_a", zero)

@@ -9,12 +9,13 @@ import pytest
 
 from pipeline.criticism.effect import Supply
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.inverter import AXES, lost_shares
+from pipeline.criticism.machine.inverter import lost_shares
 from pipeline.criticism.machine.model import Model, evaluate
 from pipeline.criticism.regression.noise_floors import steep_drops
 from tests.unit.criticism.machines import BASE, machine, operating
 
 PWM_S, VDC_V, LOSS_V, L_H = 6e-5, 40.0, 0.5, 2.5e-4
+AXES = np.exp(2j * np.pi * np.arange(3) / 3.0)
 TEXTBOOK_V = 4.0 / np.pi * LOSS_V
 STEPS, ROUNDS = 1600, 40
 
