@@ -42,11 +42,15 @@ demo-data: $(READY)
 	rm -rf data/demo/*/
 	$(PY) -m pipeline simulate output=data/demo fleet=demo
 
+# Files in the order of their folders: by default the fullest come first, and a worker ends alone
+# with one long test of a whole campaign.
+SPREAD := -n logical --dist loadfile --no-loadscope-reorder
+
 test: $(READY)
-	$(PY) -m pytest -n logical --dist loadfile
+	$(PY) -m pytest $(SPREAD)
 
 test-slow: $(READY)
-	$(PY) -m pytest -n logical --dist loadfile -m "slow or not slow"
+	$(PY) -m pytest $(SPREAD) -m "slow or not slow"
 
 stories: $(READY)
 	$(PY) -m tests.stories.draw --into docs/images

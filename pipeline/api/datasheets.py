@@ -134,7 +134,8 @@ def check(
     --------
     >>> import pipeline
     >>> import polars as pl
-    >>> sheets = pipeline.check(pipeline.fit(pipeline.read("data/demo", motor="G52-1402")))
+    >>> fits = pipeline.fit(pipeline.read("data/demo", motor="G52-1402"))
+    >>> sheets = pipeline.check(fits, model=None)
     >>> sheets["G52-1402"].status
     'refused'
     >>> sheets.checks.filter(pl.col("status") == "fail")["check"].to_list()

@@ -139,13 +139,13 @@ def test_a_motor_that_breaks_leaves_the_others(
 
 
 def test_an_output_whose_place_a_file_has_taken(
-    bench: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    batch: Batch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit 5 where `datasheets` cannot be made because it is a file."""
-    output = tmp_path / "out"
+    output = batch.output
     output.mkdir()
     (output / "datasheets").write_text("in the way")
-    words = [f"input={bench / 'one'}", f"output={output}", "workers=1"]
+    words = [f"input={batch.input}", f"output={output}", "workers=1", "residual_test=false"]
     assert main(["run", *words, "report=false", "recordings=false"]) == 5
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: cannot write gimbal~2fone.json in ")

@@ -39,12 +39,18 @@ def results(bench: Path, output: Path, workers: int, **environment: str) -> dict
     }
 
 
+SHORT = ("resistance", "lcr", "open_circuit")
+
+
 def two_of_a_test(bench: Path, folder: Path) -> Path:
-    """A folder with two captures of each test of both motors, the first and the last."""
-    for motor in ("one", "two"):
+    """A folder with two captures of a test, the first and the last: of each test of one motor, of
+    three of the other, whose search for missing effects is short.
+    """
+    for motor, tests in (("one", ("",)), ("two", SHORT)):
         by_test: dict[str, list[Path]] = {}
         for path in sorted((bench / motor).iterdir()):
-            by_test.setdefault(path.name.split("_")[0], []).append(path)
+            if path.name.startswith(tests):
+                by_test.setdefault(path.name.split("_")[0], []).append(path)
         (folder / motor).mkdir(parents=True)
         for found in by_test.values():
             for path in {found[0], found[-1]}:
