@@ -138,7 +138,9 @@ def _logged_voltage(segment: Segment, x: Operating, pieces: Pieces, values: Valu
     voltage = (held_voltage if held else rotor_voltage)(pieces, omega, period)
     edge, shift = values["ripple_edge"], values["ripple_shift"]
     averaged = 1.0 if segment.instrument.timing != "instant" else 0.0
-    mean: Complex = _shortened((averaged / 24.0 + edge) * turn**2) * voltage
+    lost = averaged / 24.0 + edge
+    kept = x.once(x.theta_rad, ("shortened", lost), lambda: _shortened(lost * turn**2))
+    mean: Complex = kept * voltage
     if segment.instrument.frame:
         mean = mean * np.exp(1j * segment.instrument.frame * turn)
     if shift:

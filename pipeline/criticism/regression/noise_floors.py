@@ -360,6 +360,7 @@ def offsets(
         return own + made
     if segment.weak is None:
         return []
+    of_one = segment.weak.functions.sum(axis=2)
     for place, channel in enumerate(segment.channels):
         offset = channel_of(segment, channel).offset
         prior = policy.offset * segment.sensors.noise.get(channel, 0.0)
@@ -367,9 +368,9 @@ def offsets(
             prior = math.hypot(prior, policy.terminal_offset * largest_reading(segment, (channel,)))
         if offset == "none" or prior == 0.0:
             continue
-        constant = np.zeros((len(segment.channels), segment.size))
-        constant[place] = prior
-        made.append(projected(segment, constant)[valid] * row_weight)
+        constant = np.zeros((len(segment.channels), *of_one.shape))
+        constant[place] = prior * of_one
+        made.append(constant[valid] * row_weight)
     return made
 
 
