@@ -31,7 +31,8 @@ def results(bench: Path, output: Path, workers: int, **environment: str) -> dict
         capture_output=True,
         text=True,
     )
-    assert done.returncode in (0, 1), done.stderr
+    # 4: a motor of which too little was recorded for any check
+    assert done.returncode in (0, 1, 4), done.stderr
     return {
         path.relative_to(output).as_posix(): path.read_bytes()
         for path in sorted(output.rglob("*"))
