@@ -21,7 +21,8 @@ OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual 
 
 @dataclass(frozen=True, slots=True)
 class ModelWords:
-    """Verdict and residual in `short`, and each by itself; one sentence without a full stop; the
+    """Verdict and residual in `short`, and each by itself; one sentence without a full stop; what
+    the two numbers of noise floors are `over`, where they differ; the
     command that tells more and the one that adds what was found (empty where there is none);
     `rows` of name and text; a number to `sort` by.
     """
@@ -31,6 +32,7 @@ class ModelWords:
     floors: str
     tone: str
     sentence: str
+    over: str
     command: str
     add: str
     rows: tuple[tuple[str, str], ...]
@@ -42,18 +44,29 @@ def model_words(model: ModelVerdict | None, motor_id: str, folder: str = "FOLDER
     """What the residual test of a motor came to; None is a datasheet of before there was one."""
     model = model or OLD
     verdict = " ".join((model.verdict.replace("_", " "), *_names(model)))
-    floors = "" if model.residual is None else f"{number(model.residual)} floors"
+    floors = "" if model.residual is None else f"worst {number(model.residual)} floors"
     return ModelWords(
         short=", ".join(filter(None, (verdict, floors))),
         verdict=verdict,
         floors=floors,
         tone=TONES[model.verdict],
         sentence=sentence(model.headline()),
+        over=_over(model),
         command=model.command(motor_id, folder) if model.tested and not model.passed else "",
         add=model.adding(folder),
         rows=tuple(_rows(model)),
         sort=repr(model.residual or 0.0),
         passed=model.passed,
+    )
+
+
+def _over(model: ModelVerdict) -> str:
+    """That an error of all captures and the largest residual are not the same number."""
+    if model.residual is None or model.held_out is None or not model.missing:
+        return ""
+    return (
+        f"{number(model.held_out)} floors are over all signals of captures held out; the worst "
+        f"signal alone is at {number(model.residual)}."
     )
 
 
@@ -70,8 +83,8 @@ def _rows(model: ModelVerdict) -> list[tuple[str, str]]:
     if model.residual is None or model.held_out is None:
         return []
     rows = [
-        ("largest residual", f"{number(model.residual)} noise floors"),
-        ("error of captures held out", f"{number(model.held_out)} noise floors"),
+        ("worst signal alone", f"{number(model.residual)} noise floors"),
+        ("all signals of captures held out", f"{number(model.held_out)} noise floors"),
     ]
     if model.held_out_with is not None:
         rows.append(("the same with what was found", f"{number(model.held_out_with)} noise floors"))

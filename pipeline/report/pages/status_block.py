@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from pipeline.records.current_status import CurrentStatus
 from pipeline.records.datasheet import Datasheet
+from pipeline.records.model_verdict import MODEL_REASON
 from pipeline.report.pages.link_block import replaced
 from pipeline.report.pages.page import render
+from pipeline.views.model_words import model_words
 from pipeline.views.status_text import status_lines, status_words
 
 BEGIN, END = "<!-- status -->", "<!-- end of status -->"
@@ -22,6 +24,8 @@ def status_block(sheet: Datasheet, current: CurrentStatus) -> str:
         current=current,
         words=status_words(current),
         lines=status_lines(current),
+        model=None if sheet.model is None else model_words(sheet.model, sheet.motor_id),
+        model_reason=MODEL_REASON,
         unverified=sum(c.integrity != "verified" for c in sheet.captures),
     )
     return f"{BEGIN}\n{text.strip()}\n{END}"

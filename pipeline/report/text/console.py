@@ -95,7 +95,7 @@ def nothing_usable(folder: str, *, refused: bool) -> str:
 def _tables(view: FleetView) -> list[str]:
     """Tables no wider than a terminal, units as on the page; one alone for many motors."""
     head = ["motor", "lot", "status", "model", *map(_heading, view.columns)]
-    units = ["", "", "", "[floors]", *(f"[{c.unit}]" if c.unit else "" for c in view.columns)]
+    units = ["", "", "", "[worst floors]", *(f"[{c.unit}]" if c.unit else "" for c in view.columns)]
     rows = [head, units, *map(_row, view.rows)]
     found = blocks(rows, right=range(3, len(head)))
     return [one for n, one in enumerate(found) if n == 0 or len(view.rows) <= FEW]
@@ -113,7 +113,7 @@ def _row(row: MotorRow) -> list[str]:
         _short(printable(sheet.motor_id)),
         _short(printable(sheet.lot or NONE)),
         row.current.status,
-        row.model.short.removesuffix(" floors"),
+        row.model.short.replace("worst ", "").removesuffix(" floors"),
         *(cell.reading.value if cell.reading else NONE for cell in row.cells),
     ]
 

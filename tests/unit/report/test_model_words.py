@@ -10,7 +10,7 @@ from pipeline.io.storage.datasheets import datasheet_of
 from pipeline.records.current_status import current_status
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.ledger import histories
-from pipeline.records.model_verdict import Excess, ModelVerdict
+from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.report.pages.fleet_page import render_fleet
 from pipeline.report.pages.motor_page import render_motor
 from pipeline.report.pages.status_block import END, with_status
@@ -30,7 +30,7 @@ def sheet_with(datasheet: Datasheet, model: ModelVerdict | None, motor_id: str =
 @pytest.mark.parametrize(
     ("model", "said"),
     [
-        (OVER, "missing, 76 floors"),
+        (OVER, "missing, worst 76 floors"),
         (None, "older than the residual test"),
         (ModelVerdict("not_tested", note="residual_test=false"), "residual_test=false"),
         (ModelVerdict("insufficient", note="record a torque map"), "Record a torque map"),
@@ -48,7 +48,7 @@ def test_nothing_was_found_wrong_is_not_said(
 def test_nothing_was_found_wrong_is_said_of_a_test_that_was_passed(datasheet: Datasheet) -> None:
     sheet = sheet_with(datasheet, SOUND)
     assert WRONG in render_motor(sheet, (), ())
-    assert "adequate, 1.1 floors" in render_motor(sheet, (), ())
+    assert "adequate, worst 1.1 floors" in render_motor(sheet, (), ())
     doubted = replace(sheet, checks=datasheet.checks)
     assert WRONG not in render_motor(doubted, (), ()), "a check failed"
 
@@ -58,6 +58,19 @@ def test_the_page_says_where_how_much_and_which_command(datasheet: Datasheet) ->
     assert "vd_v of drive_0.mcap by 76 noise floors, 900 mV beyond the noise" in page
     assert "diagnose input=FOLDER motor=&#39;a &lt;b&gt;&#39;" in page
     assert "<td>31 noise floors</td>" in page
+
+
+def test_above_the_fold_the_model_is_said_once_and_both_numbers_are_told_apart(
+    datasheet: Datasheet,
+) -> None:
+    found = FoundEffect({"cos_84_nm": (0.007, 1e-5, "N·m")}, "cogging torque of 7 mN·m")
+    model = replace(OVER, missing={"cogging": found}, held_out_with=0.6)
+    sheet = sheet_with(replace(datasheet, why=(model.reason("m") or "",)), model)
+    fold = render_motor(sheet, (), ()).split('<section id="constants">')[0]
+    assert fold.count("cogging torque of 7 mN·m") == 1
+    assert '<a href="#model">model: missing cogging</a>' in fold
+    assert "31 floors are over all signals of captures held out" in fold
+    assert "the worst signal alone is at 76." in fold
 
 
 def test_the_terminal_names_the_one_that_misses_most(datasheet: Datasheet) -> None:

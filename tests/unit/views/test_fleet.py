@@ -139,7 +139,7 @@ def test_motors_that_lack_the_same_effect_have_one_reason() -> None:
     assert [(one.text, one.members) for one in view.reasons] == [
         ("the standard model lacks cogging", ("a", "b"))
     ]
-    assert [row.model.short for row in view.rows] == ["missing cogging, 76 floors"] * 2
+    assert [row.model.short for row in view.rows] == ["missing cogging, worst 76 floors"] * 2
     text = summary([lacking("a", "7 mN·m")], (), "out", report=False, folder="in")
     assert "with it, the error falls from 15 to 0.6 noise floors" in text
     assert "`run input=in model.effects=[cogging]` adds what is missing" in text
