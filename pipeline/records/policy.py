@@ -41,17 +41,17 @@ class Entry:
     origin: Origin
 
 
-def derived(value: Number, *, unit: str, meaning: str, source: str) -> Any:
+def derived(value: Number, unit: str, meaning: str, *, source: str) -> Any:
     """A field whose default follows from something else: a formula, a distribution, a standard."""
     return _field(value, unit, meaning, Origin("derived", source))
 
 
-def calibrated(value: Number, *, unit: str, meaning: str, by: str, on: str) -> Any:
+def calibrated(value: Number, unit: str, meaning: str, *, by: str, on: str) -> Any:
     """A field whose default was set `by` a command `on` data."""
     return _field(value, unit, meaning, Origin("calibrated", f"`{by}` on {on}"))
 
 
-def chosen(value: Number, *, unit: str, meaning: str, why: str) -> Any:
+def chosen(value: Number, unit: str, meaning: str, *, why: str) -> Any:
     """A field whose default is a judgement, and why it is that."""
     return _field(value, unit, meaning, Origin("chosen", why))
 

@@ -15,137 +15,97 @@ class Cutting:
     """Windows of logs with a clock, and what a shaft's motion is made of."""
 
     window_s: float = chosen(
-        0.02,
-        unit="s",
-        meaning="length of a weak window",
-        why="5 ms bias J, 80 ms and more blur what moves",
+        0.02, "s", "length of a weak window", why="5 ms bias J, 80 ms and more blur what moves"
     )
     window_samples: int = chosen(
-        40, unit="samples", meaning="fewest samples of a window", why="a bump of fewer is none"
+        40, "samples", "fewest samples of a window", why="a bump of fewer is none"
     )
     least_window: int = derived(
-        8,
-        unit="samples",
-        meaning="samples of a window of a short capture at the least",
+        8, "samples", "samples of a window of a short capture at the least",
         source="its test function vanishes at both ends",
-    )
+    )  # fmt: skip
     step_window_s: float = chosen(
-        0.002,
-        unit="s",
-        meaning="length of a window of a current step",
+        0.002, "s", "length of a window of a current step",
         why="short: all that it shows is over after a few L/R",
-    )
-    windows: int = chosen(48, unit="windows", meaning="windows of a capture at the most", why=COST)
+    )  # fmt: skip
+    windows: int = chosen(48, "windows", "windows of a capture at the most", why=COST)
     windows_drive: int = chosen(
-        32,
-        unit="windows",
-        meaning="windows of a drive's log at the most",
+        32, "windows", "windows of a drive's log at the most",
         why=f"{COST}; a programme has several logs",
-    )
+    )  # fmt: skip
     windows_motion: int = chosen(
-        160, unit="windows", meaning="windows of a shaft's motion at the most", why=COST
+        160, "windows", "windows of a shaft's motion at the most", why=COST
     )
     rough_windows: int = chosen(
-        12,
-        unit="windows",
-        meaning="windows of a segment in a rough fit",
+        12, "windows", "windows of a segment in a rough fit",
         why="enough to meet a sound J to a tenth",
-    )
+    )  # fmt: skip
     temperature_s: float = chosen(
-        0.05,
-        unit="s",
-        meaning="half of the time that a temperature is averaged over",
+        0.05, "s", "half of the time that a temperature is averaged over",
         why="windings warm in seconds",
-    )
+    )  # fmt: skip
     speed_s: float = chosen(
-        0.002,
-        unit="s",
-        meaning="length of the mean that makes a speed, or the turn during a delay, of an angle",
+        0.002, "s",
+        "length of the mean that makes a speed, or the turn during a delay, of an angle",
         why="shorter, and the encoder's rounding is in drags and currents; longer, and a step of "
         "the speed is blurred",
-    )
+    )  # fmt: skip
     reversal_u: float = chosen(
-        6.0,
-        unit="standard deviations of noise",
-        meaning="angle that a shaft must turn back by for a reversal",
+        6.0, "standard deviations of noise", "angle that a shaft must turn back by for a reversal",
         why="noise alone comes to five in a log of 1e6 samples",
-    )
+    )  # fmt: skip
     motion_u: float = derived(
-        2.0,
-        unit="standard deviations of noise",
-        meaning="scatter of an angle about its parabola from which on the shaft itself moves",
+        2.0, "standard deviations of noise",
+        "scatter of an angle about its parabola from which on the shaft itself moves",
         source="a rounding error is √3 of its standard deviation at the most",
-    )
+    )  # fmt: skip
     narrowest: int = derived(
-        5,
-        unit="samples",
-        meaning="samples of the shortest parabola",
+        5, "samples", "samples of the shortest parabola",
         source="the shortest that leaves less noise than there is",
-    )
+    )  # fmt: skip
     change_u: float = chosen(
-        8.0,
-        unit="standard deviations of noise",
-        meaning="change of a terminal's voltage or current from which on it is a step",
+        8.0, "standard deviations of noise",
+        "change of a terminal's voltage or current from which on it is a step",
         why="white noise comes to 6 in a log of 1e5 samples",
-    )
+    )  # fmt: skip
     turning_rad: float = chosen(
-        0.1,
-        unit="rad",
-        meaning="travel of a shaft from which on it turns",
+        0.1, "rad", "travel of a shaft from which on it turns",
         why="a held shaft twists and its encoder is rounded by less",
-    )
+    )  # fmt: skip
     driven_share: float = chosen(
-        0.05,
-        unit="1",
-        meaning="share of a coast from which on the time before it counts as driven",
+        0.05, "1", "share of a coast from which on the time before it counts as driven",
         why="the moment of letting go is shorter",
-    )
+    )  # fmt: skip
     steady_share: float = chosen(
-        2e-3,
-        unit="1",
-        meaning="change of speed within a window of an open-circuit spin that is none",
+        2e-3, "1", "change of speed within a window of an open-circuit spin that is none",
         why="a sample at a kink of the speed belongs to neither side of it",
-    )
+    )  # fmt: skip
     steady_windows: int = chosen(
-        8, unit="windows", meaning="steady windows that are enough", why="fewer, and all count"
+        8, "windows", "steady windows that are enough", why="fewer, and all count"
     )
     slow_samples: int = chosen(
-        24,
-        unit="samples",
-        meaning="samples of a slow turn that a wave of its highest order is averaged to",
+        24, "samples", "samples of a slow turn that a wave of its highest order is averaged to",
         why="averages of a 24th take 0.3 % of a wave away",
-    )
+    )  # fmt: skip
     slower_share: float = chosen(
-        0.75,
-        unit="sample periods",
-        meaning="PWM period below which a log is slower than the PWM",
+        0.75, "sample periods", "PWM period below which a log is slower than the PWM",
         why="a log of every second period is at a half, one of every period at 1",
-    )
+    )  # fmt: skip
     instant_rad: float = chosen(
-        0.2,
-        unit="rad",
-        meaning="turn of the highest order in a coasting sample that is as good as an instant",
+        0.2, "rad", "turn of the highest order in a coasting sample that is as good as an instant",
         why="its mean is off by 0.2 %",
-    )
+    )  # fmt: skip
     least_parts: int = chosen(
-        8,
-        unit="1",
-        meaning="parts that a longer sample is averaged over at least",
+        8, "1", "parts that a longer sample is averaged over at least",
         why="the steps that stand for the triangle are wrong by a third of a percent at most",
-    )
-    part_rad: float = chosen(
-        3.0, unit="rad", meaning="turn of the highest order in one part", why="half a wave"
-    )
-    coast_parts: int = chosen(
-        48, unit="1", meaning="parts of a coasting shaft's sample at the most", why=COST
-    )
-    log_parts: int = chosen(6, unit="1", meaning="parts of a log's sample at the most", why=COST)
+    )  # fmt: skip
+    part_rad: float = chosen(3.0, "rad", "turn of the highest order in one part", why="half a wave")
+    coast_parts: int = chosen(48, "1", "parts of a coasting shaft's sample at the most", why=COST)
+    log_parts: int = chosen(6, "1", "parts of a log's sample at the most", why=COST)
     angle_rounds: int = chosen(
-        2,
-        unit="1",
-        meaning="times that an angle error is looked up at the angle it gives",
+        2, "1", "times that an angle error is looked up at the angle it gives",
         why="each round leaves of the error its own size times its order a turn",
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,78 +113,52 @@ class Tables:
     """Tables without a clock: their levels and what they are known to; currents that hold."""
 
     levels: int = chosen(
-        4,
-        unit="levels",
-        meaning="levels of current from which on they are held out one by one",
+        4, "levels", "levels of current from which on they are held out one by one",
         why="the others show a curve, its slope and scatter",
-    )
+    )  # fmt: skip
     parts: int = chosen(
-        12,
-        unit="1",
-        meaning="parts that a sweep of current is held out in",
+        12, "1", "parts that a sweep of current is held out in",
         why="fewer leave little to fit, more are like their neighbours",
-    )
+    )  # fmt: skip
     reading: float = chosen(
-        1e-4,
-        unit="1",
-        meaning="noise of a column at the least, of its largest reading",
+        1e-4, "1", "noise of a column at the least, of its largest reading",
         why="a few rows may lie on their curve exactly; a meter may read the same at every angle",
-    )
+    )  # fmt: skip
     steady_reading: float = chosen(
-        1e-5,
-        unit="1",
-        meaning="the same of voltages at steady speeds",
-        why="straight lines may fit exactly",
+        1e-5, "1", "the same of voltages at steady speeds", why="straight lines may fit exactly"
     )
     flux_share: float = chosen(
-        1e-3,
-        unit="1",
-        meaning="noise of a column of a flux map, of its range",
+        1e-3, "1", "noise of a column of a flux map, of its range",
         why="a table does not state its own; such tables are good to 0.1 %",
-    )
+    )  # fmt: skip
     other_axis: float = chosen(
-        0.1,
-        unit="1",
-        meaning="range of an axis of a flux map at the least, of the other axis's",
+        0.1, "1", "range of an axis of a flux map at the least, of the other axis's",
         why="an axis that stands still has none, and one instrument reads both",
-    )
+    )  # fmt: skip
     cells: int = chosen(
-        1024,
-        unit="1/turn",
-        meaning="cells of angle that a holding current is averaged in",
+        1024, "1/turn", "cells of angle that a holding current is averaged in",
         why="twelve a wave of the highest cogging orders of small machines (84), and still a few "
         "rows each of a log of some thousand holds",
-    )
+    )  # fmt: skip
     sectors: int = chosen(
-        24,
-        unit="1/turn",
-        meaning="parts of a turn that are held out one by one, and fewest cells of a table",
+        24, "1/turn", "parts of a turn that are held out one by one, and fewest cells of a table",
         why="fewer leave little to fit, more are like their neighbours",
-    )
+    )  # fmt: skip
     cell_rows: int = chosen(
-        4,
-        unit="samples",
-        meaning="rows that a cell must have for their scatter about a line to count",
+        4, "samples", "rows that a cell must have for their scatter about a line to count",
         why="two make a line",
-    )
+    )  # fmt: skip
     cell_share: float = chosen(
-        0.5,
-        unit="1",
-        meaning="share of the cells that must have them",
+        0.5, "1", "share of the cells that must have them",
         why="where a pass turns round, and the rotor stays, it scatters otherwise than elsewhere",
-    )
-    orders: int = chosen(12, unit="1", meaning="orders of a holding current at the most", why=COST)
+    )  # fmt: skip
+    orders: int = chosen(12, "1", "orders of a holding current at the most", why=COST)
     order_u: float = chosen(
-        3.0,
-        unit="standard errors",
-        meaning="mean gain of the sectors by which an order must predict them",
+        3.0, "standard errors", "mean gain of the sectors by which an order must predict them",
         why="at 2, chance brings in one of some dozens that are offered",
-    )
+    )  # fmt: skip
     order_sectors: int = chosen(
-        6,
-        unit="1",
-        meaning="fewest sectors by which orders are found",
-        why="their scatter is known well enough",
+        6, "1", "fewest sectors by which orders are found", why="their scatter is known well enough"
     )
 
 
@@ -233,70 +167,53 @@ class Priors:
     """Standard uncertainties of nuisances, where the station states none of its own."""
 
     ripple_slope: float = chosen(
-        0.3, unit="sample periods", meaning="shift of the mean current", why="a third of a sample"
+        0.3, "sample periods", "shift of the mean current", why="a third of a sample"
     )
     ripple_mean: float = derived(
-        0.04,
-        unit="(ω_e T_s)² ψ/L",
-        meaning="ripple of the current beside its centre, 0.02",
+        0.04, "(ω_e T_s)² ψ/L", "ripple of the current beside its centre, 0.02",
         source="from −1/24 to 1/12, as the log samples between two changes of voltage or at them",
-    )
+    )  # fmt: skip
     ripple_edge: float = derived(
-        0.08,
-        unit="(ω_e T_s)² of the voltage",
-        meaning="what a mean of the voltage misses",
+        0.08, "(ω_e T_s)² of the voltage", "what a mean of the voltage misses",
         source="1/12, of a log that samples at the changes of the voltage",
-    )
+    )  # fmt: skip
     ripple_shift: float = chosen(
-        0.15, unit="T_s dω_e/dt ψ", meaning="angle against voltage", why="a sixth of a sample"
+        0.15, "T_s dω_e/dt ψ", "angle against voltage", why="a sixth of a sample"
     )
     ripple_torque: float = chosen(
-        0.3, unit="sample periods", meaning="current in the torque", why="a third of a sample"
+        0.3, "sample periods", "current in the torque", why="a third of a sample"
     )
     ripple_held: float = derived(
-        0.08,
-        unit="(ω_e T_s)²",
-        meaning="ripple in a held shaft's torque",
-        source="as `priors.ripple_edge`",
+        0.08, "(ω_e T_s)²", "ripple in a held shaft's torque", source="as `priors.ripple_edge`"
     )
     lead_share: float = chosen(
-        5e-3,
-        unit="1",
-        meaning="resistance of inverter and leads over the phase's",
+        5e-3, "1", "resistance of inverter and leads over the phase's",
         why="a few milliohm of switches and leads beside a winding of one ohm",
-    )
+    )  # fmt: skip
     zero_a: float = derived(
-        5e-4,
-        unit="machine scales",
-        meaning="offset of the shunts",
+        5e-4, "machine scales", "offset of the shunts",
         source="half a step of a 12-bit converter of twice the current; what is beyond is an "
         "effect's to name",
-    )
+    )  # fmt: skip
     zero_angle_rad: float = derived(
-        1e-3,
-        unit="rad",
-        meaning="electrical zero of the drive's encoder",
+        1e-3, "rad", "electrical zero of the drive's encoder",
         source="the negligible size of `angle_offset`, which names what is beyond",
-    )
+    )  # fmt: skip
     gain: float = chosen(
-        0.01, unit="1", meaning="gain of a sensor or instrument", why="an instrument of class 1"
+        0.01, "1", "gain of a sensor or instrument", why="an instrument of class 1"
     )
     gain_clock: float = chosen(
-        1e-4, unit="1", meaning="gain of a clock", why="a crystal of 100 ppm, its temperature in it"
+        1e-4, "1", "gain of a clock", why="a crystal of 100 ppm, its temperature in it"
     )
     offset_temp_k: float = chosen(
-        2.0, unit="K", meaning="offset of a thermometer", why="a thermocouple of class 2"
+        2.0, "K", "offset of a thermometer", why="a thermocouple of class 2"
     )
     unlogged_d_share: float = derived(
-        UNLOGGED_D_SHARE,
-        unit="1",
-        meaning="reluctance torque of an unlogged d current over the magnet's",
+        UNLOGGED_D_SHARE, "1", "reluctance torque of an unlogged d current over the magnet's",
         source="a third of the current along d, its field a fifth of the magnet's, axes whose "
         "inductances differ by a third",
-    )
+    )  # fmt: skip
     unlogged_k: float = chosen(
-        UNLOGGED_U_K,
-        unit="K",
-        meaning="winding or magnet over ambient where its temperature was not recorded",
+        UNLOGGED_U_K, "K", "winding or magnet over ambient where its temperature was not recorded",
         why="most motors on a bench lie within twice that of their surroundings",
-    )
+    )  # fmt: skip

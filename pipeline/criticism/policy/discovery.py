@@ -12,176 +12,118 @@ class Discovery:
     """Bases, inputs, matching pursuit, and the description of what was found."""
 
     near_share: float = chosen(
-        0.05,
-        unit="1",
-        meaning="share of the best input's evidence that another may be short of and do as well",
+        0.05, "1", "share of the best input's evidence that another may be short of and do as well",
         why="at 0 noise chooses the variable, at 0.5 most inputs are named",
-    )
+    )  # fmt: skip
     prior_size: float = chosen(
-        1.0,
-        unit="machine scales",
-        meaning="standard deviation of a coefficient of an input's curve",
+        1.0, "machine scales", "standard deviation of a coefficient of an input's curve",
         why="no curve is larger",
-    )
+    )  # fmt: skip
     parts: int = chosen(
-        12,
-        unit="1",
-        meaning="parts that a capture without a second one is held out in",
+        12, "1", "parts that a capture without a second one is held out in",
         why="as many as drive logs are held out in",
-    )
+    )  # fmt: skip
     change_captures: int = chosen(
-        3,
-        unit="1",
-        meaning="fewest captures that hold a constant which changed between some of them",
+        3, "1", "fewest captures that hold a constant which changed between some of them",
         why="of two that disagree nobody knows which one is odd",
-    )
+    )  # fmt: skip
     knot_exponent: float = chosen(
-        1.6,
-        unit="1",
-        meaning="exponent that crowds the knots of a curve near zero, where friction bends most",
+        1.6, "1", "exponent that crowds the knots of a curve near zero, where friction bends most",
         why="at 1 they are even, at 3 the upper half of the range has two",
-    )
+    )  # fmt: skip
     knots: int = chosen(
-        8,
-        unit="1",
-        meaning="knots of the smooth curve of one sign",
+        8, "1", "knots of the smooth curve of one sign",
         why="fewer miss a bump, each one more costs",
-    )
+    )  # fmt: skip
     hats: int = chosen(
-        40,
-        unit="1",
-        meaning="narrow hats of one sign in which formulas are fitted",
+        40, "1", "narrow hats of one sign in which formulas are fitted",
         why="wide hats round a formula off, and the cost goes with their number",
-    )
+    )  # fmt: skip
     turn_hats: int = chosen(
-        48,
-        unit="1",
-        meaning="narrow hats of a turn, 7.5° each",
+        48, "1", "narrow hats of a turn, 7.5° each",
         why="wide hats round a formula off, and the cost goes with their number",
-    )
+    )  # fmt: skip
     warm_knots_k: tuple[float, ...] = chosen(
-        (-15.0, 0.0, 10.0, 20.0, 35.0, 55.0, 80.0, 110.0),
-        unit="K",
-        meaning="knots of a curve of a temperature, over 25 °C",
+        (-15.0, 0.0, 10.0, 20.0, 35.0, 55.0, 80.0, 110.0), "K",
+        "knots of a curve of a temperature, over 25 °C",
         why="from a cold hall to a hot winding, closer where most recordings are",
-    )
+    )  # fmt: skip
     orders: int = chosen(
-        8,
-        unit="1",
-        meaning="lowest orders a turn that are offered on every machine, from 1 on",
+        8, "1", "lowest orders a turn that are offered on every machine, from 1 on",
         why="eccentricity and what couplings and few poles do",
-    )
+    )  # fmt: skip
     most_groups: int = chosen(
-        4,
-        unit="1",
-        meaning="groups of terms of a formula at the most",
+        4, "1", "groups of terms of a formula at the most",
         why="a longer formula is the curve once more, and says nothing",
-    )
+    )  # fmt: skip
     least_gain: float = chosen(
-        0.01,
-        unit="1",
-        meaning="share of the whole gain that a group of terms must add",
+        0.01, "1", "share of the whole gain that a group of terms must add",
         why="a longer formula is the curve once more, and says nothing",
-    )
+    )  # fmt: skip
     refined: int = chosen(
-        6,
-        unit="1",
-        meaning="groups whose scales are refined at each step",
-        why="each costs a search",
+        6, "1", "groups whose scales are refined at each step", why="each costs a search"
     )
     scales: int = chosen(
-        18,
-        unit="1",
-        meaning="trial scales of a shape, from a hundredth to twice the range",
+        18, "1", "trial scales of a shape, from a hundredth to twice the range",
         why="a third apart: refining goes on from there",
-    )
+    )  # fmt: skip
     centres: int = chosen(
-        24,
-        unit="1",
-        meaning="places a turn at which a bump is tried",
-        why="neighbours overlap",
+        24, "1", "places a turn at which a bump is tried", why="neighbours overlap"
     )
     widths_rad: tuple[float, ...] = chosen(
-        (0.15, 0.3, 0.6, 1.2),
-        unit="rad",
-        meaning="widths of a bump of the angle that are tried",
+        (0.15, 0.3, 0.6, 1.2), "rad", "widths of a bump of the angle that are tried",
         why="neighbours overlap",
-    )
+    )  # fmt: skip
     humps: tuple[float, ...] = chosen(
-        (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9),
-        unit="1",
-        meaning="places in its range at which a variable may have a hump",
+        (0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.6, 0.7, 0.8, 0.9), "1",
+        "places in its range at which a variable may have a hump",
         why="a tenth of the range apart: refining goes on from there",
-    )
+    )  # fmt: skip
     hump_widths: tuple[float, ...] = chosen(
-        (0.03, 0.06, 0.12, 0.25),
-        unit="1",
-        meaning="widths of a hump as shares of the range",
+        (0.03, 0.06, 0.12, 0.25), "1", "widths of a hump as shares of the range",
         why="an octave apart: refining goes on from there",
-    )
+    )  # fmt: skip
     refining_reach: float = chosen(
-        1.2,
-        unit="1",
-        meaning="logarithm of how far refining moves a scale [of an angle: rad]",
+        1.2, "1", "logarithm of how far refining moves a scale [of an angle: rad]",
         why="four trial scales to either side",
-    )
+    )  # fmt: skip
     most_rounds: int = chosen(
-        12,
-        unit="1",
-        meaning="renewals of the weights at the most while a formula is fitted",
+        12, "1", "renewals of the weights at the most while a formula is fitted",
         why="a bound of the cost: most end before, by `fit.settled`",
-    )
+    )  # fmt: skip
     sure_u: float = derived(
-        1.96,
-        unit="standard uncertainties",
-        meaning="half width of the band about a reported curve",
+        1.96, "standard uncertainties", "half width of the band about a reported curve",
         source="95 % of a normal distribution",
-    )
+    )  # fmt: skip
     parity_share: float = chosen(
-        0.1,
-        unit="1",
-        meaning="share of its size that a curve may miss its mirror image by to be odd or even",
+        0.1, "1", "share of its size that a curve may miss its mirror image by to be odd or even",
         why="it chooses words and nothing else",
-    )
+    )  # fmt: skip
     jump_share: float = chosen(
-        0.05,
-        unit="1",
-        meaning="part of the range around zero in which parity is not judged",
+        0.05, "1", "part of the range around zero in which parity is not judged",
         why="friction jumps there",
-    )
+    )  # fmt: skip
     inside_share: float = chosen(
-        0.97,
-        unit="1",
-        meaning="part of the range up to which a maximum lies inside it",
+        0.97, "1", "part of the range up to which a maximum lies inside it",
         why="it chooses words and nothing else",
-    )
+    )  # fmt: skip
     tail_share: float = chosen(
-        0.1,
-        unit="1",
-        meaning="last part of a range, in which a curve is level or still grows",
+        0.1, "1", "last part of a range, in which a curve is level or still grows",
         why="it chooses words and nothing else",
-    )
+    )  # fmt: skip
     level_share: float = chosen(
-        0.02,
-        unit="1",
-        meaning="change over that part, as a share, that is none",
+        0.02, "1", "change over that part, as a share, that is none",
         why="it chooses words and nothing else",
-    )
+    )  # fmt: skip
     visited_share: float = chosen(
-        1e-3,
-        unit="1",
-        meaning="share of the best visited hat's size from which on a place counts as visited",
+        1e-3, "1", "share of the best visited hat's size from which on a place counts as visited",
         why="a curve is not reported where captures hardly were",
-    )
+    )  # fmt: skip
     bounds_factor: float = chosen(
-        30.0,
-        unit="1",
-        meaning="bounds of a parameter in the written effect, over the value found",
+        30.0, "1", "bounds of a parameter in the written effect, over the value found",
         why="wide enough for a user's own form",
-    )
+    )  # fmt: skip
     negligible_share: float = chosen(
-        0.01,
-        unit="1",
-        meaning="negligible size of a parameter in the written effect, over the value found",
+        0.01, "1", "negligible size of a parameter in the written effect, over the value found",
         why="a hundredth of a drag is nobody's concern",
-    )
+    )  # fmt: skip

@@ -12,23 +12,23 @@ class BackEmf:
     """When a spinning rotor's voltage is a steady speed's."""
 
     least_cycles: int = chosen(
-        3, unit="1", meaning="fewest electrical cycles of a steady stretch",
+        3, "1", "fewest electrical cycles of a steady stretch",
         why="two ends and one between: fewer leave no speed beside its change",
     )  # fmt: skip
     least_share: float = chosen(
-        0.2, unit="1", meaning="least share of the spinning rows that steady stretches hold",
+        0.2, "1", "least share of the spinning rows that steady stretches hold",
         why="below it the speed is taken as it comes, or a whole log would be thrown away",
     )  # fmt: skip
     widened: float = chosen(
-        5.0, unit="1", meaning="factor by which the change of speed is widened then",
+        5.0, "1", "factor by which the change of speed is widened then",
         why="once before any change is taken",
     )  # fmt: skip
     standing_sigmas: float = derived(
-        6.0, unit="1", meaning="noise of the voltage below which the rotor counts as standing",
+        6.0, "1", "noise of the voltage below which the rotor counts as standing",
         source="a sample in 500 million of a normal deviate",
     )  # fmt: skip
     standing_share: float = chosen(
-        0.02, unit="1", meaning="of the largest voltage, below which the rotor counts as standing",
+        0.02, "1", "of the largest voltage, below which the rotor counts as standing",
         why="at a fiftieth of the speed the signal is a fiftieth of the fastest one",
     )  # fmt: skip
 
@@ -38,35 +38,35 @@ class Steps:
     """How a step on a locked rotor is read."""
 
     most_bins: int = chosen(
-        3000, unit="1", meaning="groups of samples that a step is averaged to",
+        3000, "1", "groups of samples that a step is averaged to",
         why="the time of the fit goes with it",
     )  # fmt: skip
     most_cells: int = chosen(
-        1500, unit="1", meaning="cells of a voltage that no supply describes",
+        1500, "1", "cells of a voltage that no supply describes",
         why="the time of the fit goes with it; the integral is kept",
     )  # fmt: skip
     most_edges: int = chosen(
-        12, unit="1", meaning="edges of a voltage that a supply makes",
+        12, "1", "edges of a voltage that a supply makes",
         why="more are an inverter's, not a bench's",
     )  # fmt: skip
     edge_reach: float = chosen(
-        4.0, unit="samples", meaning="how far an edge may move in the fit",
+        4.0, "samples", "how far an edge may move in the fit",
         why="a scope's channels are apart by less than that",
     )  # fmt: skip
     spike_sigmas: float = derived(
-        8.0, unit="1", meaning="noise from the median of five beyond which a sample is a spike",
+        8.0, "1", "noise from the median of five beyond which a sample is a spike",
         source="never by chance: 1 in 10^15 of a normal deviate",
     )  # fmt: skip
     most_apart: float = chosen(
-        100.0, unit="1", meaning="most that saliency and iron part the inductances of one rotor",
+        100.0, "1", "most that saliency and iron part the inductances of one rotor",
         why="a clock or a current in another unit is off by a thousand",
     )  # fmt: skip
     unseen_share: float = chosen(
-        0.1, unit="1", meaning="of a channel's scatter, below which its rounding is left out",
+        0.1, "1", "of a channel's scatter, below which its rounding is left out",
         why="a tenth in quadrature is half a per cent of the scatter",
     )  # fmt: skip
     drop_knee_share: float = chosen(
-        0.02, unit="1", meaning="of the largest current, below which an inverter's drop fades",
+        0.02, "1", "of the largest current, below which an inverter's drop fades",
         why="a corner would break the integration; the drop is known no better there",
     )  # fmt: skip
 
@@ -76,35 +76,35 @@ class Points:
     """When a dynamometer test is settled, and which of its points are alike."""
 
     whole_share: float = chosen(
-        0.8, unit="1", meaning="least share of a point's rows that whole turns may leave",
+        0.8, "1", "least share of a point's rows that whole turns may leave",
         why="whole turns, or cycles, are kept where they cost no more than a fifth of the rows",
     )  # fmt: skip
     step_share: float = derived(
-        0.03, unit="1", meaning="of a signal's span, above which a change is a step",
+        0.03, "1", "of a signal's span, above which a change is a step",
         source="ten levels a side step by a twentieth of the span; less than this is ripple",
     )  # fmt: skip
     drift_share: float = chosen(
-        0.02, unit="1", meaning="of a signal's span that the halves of a point may differ by",
+        0.02, "1", "of a signal's span that the halves of a point may differ by",
         why="below the least step, above what a loop leaves when it has settled",
     )  # fmt: skip
     drift_sigmas: float = derived(
-        6.0, unit="1", meaning="noise of the halves' means that they may differ by instead",
+        6.0, "1", "noise of the halves' means that they may differ by instead",
         source="a point in 500 million by chance",
     )  # fmt: skip
     same_speed: float = chosen(
-        0.02, unit="1", meaning="relative difference of speeds that share one drag",
+        0.02, "1", "relative difference of speeds that share one drag",
         why="a speed loop holds better, and drag changes by less than itself times that",
     )  # fmt: skip
     still_turn: float = derived(
-        0.01, unit="turn", meaning="least travel within a point of a shaft that turns",
+        0.01, "turn", "least travel within a point of a shaft that turns",
         source="a sensor's noise makes some thousandths of a turn of a held shaft",
     )  # fmt: skip
     still_capture_turn: float = derived(
-        0.1, unit="turn", meaning="least travel within a capture of a shaft that turns",
+        0.1, "turn", "least travel within a capture of a shaft that turns",
         source="less averages none of the ripple",
     )  # fmt: skip
     same_angle_turn: float = derived(
-        0.001, unit="turn", meaning="distance of angles at which cogging is one constant",
+        0.001, "turn", "distance of angles at which cogging is one constant",
         source="a twelfth of a cogging period of 84 a turn",
     )  # fmt: skip
 
@@ -114,7 +114,7 @@ class FluxPairs:
     """Which currents are alike."""
 
     same_current: float = derived(
-        0.03, unit="1", meaning="of the largest current, within which two currents are alike",
+        0.03, "1", "of the largest current, within which two currents are alike",
         source="ten levels a side are a tenth apart; a current loop holds to a hundredth",
     )  # fmt: skip
 
@@ -124,11 +124,11 @@ class MeterTable:
     """When an LCR meter's table over angle parts the axes."""
 
     most_condition: float = chosen(
-        20.0, unit="1", meaning="condition number beyond which the angles do not part the swing",
+        20.0, "1", "condition number beyond which the angles do not part the swing",
         why="errors of mean and swing would be twenty times the readings'",
     )  # fmt: skip
     exchanged_deg: float = chosen(
-        35.0, unit="deg", meaning="offset of the angle beyond which the axes may be exchanged",
+        35.0, "deg", "offset of the angle beyond which the axes may be exchanged",
         why="at 45 degrees d and q change places",
     )  # fmt: skip
 
@@ -138,15 +138,15 @@ class Inverter:
     """What an inverter does to a drive's voltage."""
 
     shortest_window_s: float = chosen(
-        0.03, unit="s", meaning="shortest window of the weak form of the voltage",
+        0.03, "s", "shortest window of the weak form of the voltage",
         why="some periods of a current loop",
     )  # fmt: skip
     longest_window_s: float = chosen(
-        0.1, unit="s", meaning="longest window of the weak form of the voltage",
+        0.1, "s", "longest window of the weak form of the voltage",
         why="slower logs have too few samples for the current's derivative anyway",
     )  # fmt: skip
     latest_periods: float = derived(
-        2.0, unit="samples", meaning="latest that a drive's voltage is against its angle",
+        2.0, "samples", "latest that a drive's voltage is against its angle",
         source="a period of computing and half a one of holding (Bae and Sul, IEEE Trans. Ind. "
         "Appl. 39(3), 2003); the row of its log may be another half",
     )  # fmt: skip
@@ -157,6 +157,6 @@ class Aligned:
     """What torque tells of a current's delay."""
 
     least_d_share: float = chosen(
-        0.1, unit="1", meaning="of the span of q current that the d current moves by to count",
+        0.1, "1", "of the span of q current that the d current moves by to count",
         why="below it reluctance torque is lost in saturation of the q current's",
     )  # fmt: skip

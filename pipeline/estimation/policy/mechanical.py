@@ -15,34 +15,37 @@ class ShaftRows:
     """Windows of the equation of motion."""
 
     drive_windows_s: tuple[float, ...] = chosen(
-        (0.02, 0.04, 0.08), unit="s", meaning="windows of a drive, of which the shortest that is "
-        "quiet is taken",
+        (0.02, 0.04, 0.08), "s", "windows of a drive, of which the shortest that is quiet is taken",
         why="as torque changes in them",
     )  # fmt: skip
     quiet_share: float = derived(
-        0.02, unit="1", meaning="of the acceleration, below which a window's noise is quiet",
+        0.02, "1", "of the acceleration, below which a window's noise is quiet",
         source="a fiftieth adds 0.02 % to its scatter",
     )  # fmt: skip
     coast_share: float = calibrated(
-        0.05, unit="1", meaning="of a coast-down, that a window takes", by=TRIED,
+        0.05, "1", "of a coast-down, that a window takes",
+        by=TRIED,
         on="coasts only slow down: half or twice of it moved T_c and B by a ninth of their u",
     )  # fmt: skip
     longest_coast_window_s: float = calibrated(
-        0.5, unit="s", meaning="longest window of a coast-down", by=TRIED,
+        0.5, "s", "longest window of a coast-down",
+        by=TRIED,
         on="coasts, where half or twice of it moved nothing",
     )  # fmt: skip
     slowest_share: float = calibrated(
-        0.01, unit="1", meaning="of the highest speed, below which the shaft may stand", by=TRIED,
-        on="drives and coasts: twice of it moved T_c and B by an eighth of their u, where there is "
-        "a Stribeck's excess to lose, half of it nothing",
+        0.01, "1", "of the highest speed, below which the shaft may stand",
+        by=TRIED,
+        on="drives and coasts: twice of it moved T_c and B by an eighth of their u, where there "
+        "is a Stribeck's excess to lose, half of it nothing",
     )  # fmt: skip
     resolved_periods: float = calibrated(
-        2.0, unit="samples", meaning="shortest time constant that is parted from a delay",
-        by=TRIED, on="simulated logs of voltage and angle: at one sample and less kA came out up "
-        "to ten times too large, at two and more its intervals held",
+        2.0, "samples", "shortest time constant that is parted from a delay",
+        by=TRIED,
+        on="simulated logs of voltage and angle: at one sample and less kA came out up to ten "
+        "times too large, at two and more its intervals held",
     )  # fmt: skip
     overlap: float = derived(
-        0.5, unit="1", meaning="share of its samples that a window has in common with the next",
+        0.5, "1", "share of its samples that a window has in common with the next",
         source="as in Welch's spectra: no sample counts less than another, more only repeats",
     )  # fmt: skip
 
@@ -52,36 +55,39 @@ class Drag:
     """When drag has another form than Coulomb and viscous, and how much data it takes."""
 
     most_nuisances: int = calibrated(
-        14, unit="1", meaning="nuisances that may join the equation of motion", by=TRIED,
+        14, "1", "nuisances that may join the equation of motion",
+        by=TRIED,
         on="ten simulated campaigns: half or twice of it moved no constant by a twentieth of its u",
     )  # fmt: skip
     material_share: float = derived(
-        0.02, unit="1", meaning="of the drag, that two numbers may leave and stand for it still",
-        source="a square root of speed beside them would then have moved T_c by 20 %, B by 56 %, a "
-        "cube by 6 and 25 %: they are the law's constants; half or twice chose no other form",
+        0.02, "1", "of the drag, that two numbers may leave and stand for it still",
+        source="a square root of speed beside them would then have moved T_c by 20 %, B by 56 %, "
+        "a cube by 6 and 25 %: they are the law's constants; half or twice chose no other form",
     )  # fmt: skip
     enough_coasting_rows: int = derived(
-        12, unit="1", meaning="windows of coasts that decide on the form of drag",
+        12, "1", "windows of coasts that decide on the form of drag",
         source="six that share no sample, thrice what the two constants need; one coast makes 39",
     )  # fmt: skip
     rows_a_column: int = calibrated(
-        10, unit="1", meaning="windows that share no sample which a nuisance takes", by=TRIED,
+        10, "1", "windows that share no sample which a nuisance takes",
+        by=TRIED,
         on="drives of 0.3 to 0.8 s of two motors, 60 each: 3 to 10 gave J alike within a fifth of "
         "u, at 15 a nuisance was left out that then stood in J",
     )  # fmt: skip
     least_freedom: int = derived(
-        8, unit="1", meaning="fewest degrees of freedom of an inertia's scatter",
+        8, "1", "fewest degrees of freedom of an inertia's scatter",
         source="the scatter of v degrees is known to 1/sqrt(2 v): a quarter (JCGM 100:2008, E.4.3)",
     )  # fmt: skip
     unexplained_share: float = calibrated(
-        0.02, unit="1", meaning="of the acceleration, squared, that may follow no logged torque",
+        0.02, "1", "of the acceleration, squared, that may follow no logged torque",
         by=TRIED,
         on="loads of a third of rated torque, which left 0.38 to 0.6 in drives of three motors; "
         "none, on a real bench, 0.006. It is twice what a transducer of unstated gain leaves open",
     )  # fmt: skip
     speed_share: float = chosen(
-        0.02, unit="1", meaning="relative standard uncertainty of J, T_c and B where a bench's own "
-        "speed is the only record of the motion",
+        0.02, "1",
+        "relative standard uncertainty of J, T_c and B where a bench's own speed is the only "
+        "record of the motion",
         why="what smooths or delays a speed does so to the acceleration, and does not say how much",
     )  # fmt: skip
 
@@ -91,19 +97,18 @@ class CoastDown:
     """How a coast-down is fitted."""
 
     most_samples: int = chosen(
-        4000, unit="1", meaning="block means that a coast is thinned to",
-        why="the time of the fit goes with it",
-    )  # fmt: skip
+        4000, "1", "block means that a coast is thinned to", why="the time of the fit goes with it"
+    )
     explained: float = chosen(
-        1.05, unit="1", meaning="residual over the encoder's noise, below which nothing is missing",
+        1.05, "1", "residual over the encoder's noise, below which nothing is missing",
         why="a twentieth is what the noise itself is not known to",
     )  # fmt: skip
     unexplained: float = chosen(
-        3.0, unit="1", meaning="residual over the encoder's noise, above which drag's form is open",
+        3.0, "1", "residual over the encoder's noise, above which drag's form is open",
         why="the halves of the coasts then say how far",
     )  # fmt: skip
     most_additions: int = chosen(
-        3, unit="1", meaning="terms that may join a coast-down at a time",
+        3, "1", "terms that may join a coast-down at a time",
         why="one of drag and two of an eccentric encoder",
     )  # fmt: skip
 
@@ -113,17 +118,17 @@ class TorqueMap:
     """What a torque map tells of drag."""
 
     untested_form_share: float = chosen(
-        0.1, unit="1", meaning="of the drag at the slowest speed that may have another form",
+        0.1, "1", "of the drag at the slowest speed that may have another form",
         why="Stribeck's, iron's or windage, where no speed is left over to test it",
     )  # fmt: skip
     unlogged_d_share: float = chosen(
-        UNLOGGED_D_SHARE, unit="1", meaning="relative standard uncertainty of Kt where the d "
-        "current was not logged",
+        UNLOGGED_D_SHARE, "1",
+        "relative standard uncertainty of Kt where the d current was not logged",
         why="a third of the current along d, where its field is a fifth of the magnet's and the "
         "axes' inductances differ by a third",
     )  # fmt: skip
     level: float = derived(
-        0.01, unit="1", meaning="chance of offsets to count as beyond their scatter",
+        0.01, "1", "chance of offsets to count as beyond their scatter",
         source="beyond the 99 % interval",
     )  # fmt: skip
 
@@ -133,11 +138,11 @@ class TorqueSlope:
     """The slope of torque at small current."""
 
     level: float = derived(
-        0.01, unit="1", meaning="chance of a further odd power to join where torque is straight",
+        0.01, "1", "chance of a further odd power to join where torque is straight",
         source="beyond the 99 % interval",
     )  # fmt: skip
     highest_power: int = chosen(
-        7, unit="1", meaning="highest odd power of q current",
+        7, "1", "highest odd power of q current",
         why="four terms bend as iron does; eight levels would be needed for the next",
     )  # fmt: skip
 
@@ -147,13 +152,12 @@ class Ripple:
     """Back-EMF harmonics of a winding that is sold as sinusoidal."""
 
     usual_6: float = chosen(
-        0.03, unit="1", meaning="usual size of each of the harmonics 5 and 7 over the fundamental",
+        0.03, "1", "usual size of each of the harmonics 5 and 7 over the fundamental",
         why="such a winding keeps them to a few per cent",
     )  # fmt: skip
     usual_12: float = chosen(
-        0.01, unit="1", meaning="usual size of each of the harmonics 11 and 13",
-        why="smaller by the order",
-    )  # fmt: skip
+        0.01, "1", "usual size of each of the harmonics 11 and 13", why="smaller by the order"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,19 +165,18 @@ class Cogging:
     """Which orders of torque against angle are a motor's."""
 
     stranger_level: float = chosen(
-        1e-6, unit="1", meaning="chance below which an order that no tooth makes counts",
+        1e-6, "1", "chance below which an order that no tooth makes counts",
         why="over a turn its crest meets the others somewhere: a false one adds its whole height",
     )  # fmt: skip
     friction_level: float = derived(
-        0.01, unit="1", meaning="chance of turns' means to scatter beyond the noise",
+        0.01, "1", "chance of turns' means to scatter beyond the noise",
         source="beyond the 99 % interval",
     )  # fmt: skip
     sectors: int = derived(
-        61, unit="1", meaning="sectors of a turn, half of which are held out",
+        61, "1", "sectors of a turn, half of which are held out",
         source="a prime, of whose squares the pattern has a flat spectrum (Schroeder, Number "
         "Theory in Science and Communication, 15)",
     )  # fmt: skip
     replicates: int = chosen(
-        200, unit="1", meaning="draws of a bootstrap",
-        why="its standard deviation is then known to a twentieth",
-    )  # fmt: skip
+        200, "1", "draws of a bootstrap", why="its standard deviation is then known to a twentieth"
+    )
