@@ -27,8 +27,6 @@ RECORDERS = ("log", "open", "shaft", "step")
 (coasts and slow turns), steps of a locked rotor."""
 
 _NEIGHBOURS = 2
-_HIGHEST_COGGING = 400
-"""Order a turn beyond which slots and poles cog next to nothing together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,7 @@ class Machine:
         Reference: Zhu & Howe, IEEE Trans. Energy Convers. 15 (2000): its torque falls with it.
         """
         order = math.lcm(self.slots, 2 * self.pole_pairs) if self.slots else 0
-        return order if 0 < order <= _HIGHEST_COGGING else None
+        return order if 0 < order <= self.policy.cutting.highest_order else None
 
     def scale(self, parameter: Parameter) -> float:
         """Size [parameter.unit] of one relative unit of a parameter."""

@@ -21,6 +21,8 @@ IN_POLICY = (
     "equations",
     "signals",
     "residuals",
+    "data",
+    "machine",
 )
 ARITHMETIC = {
     "discovery/bases.py": {"TURN_RAD", "_EDGE"},  # a turn; beside zero and not at it
@@ -28,6 +30,8 @@ ARITHMETIC = {
     "discovery/dictionary.py": {"SHAPES", "_ABOVE_DEGC"},  # formulas; the model's temperature
     "discovery/matching_pursuit.py": {"_RIDGE"},  # against rounding
     "discovery/residual_inputs.py": {"_WIDE"},  # no bound
+    "machine/inverter.py": {"AXES", "_OTHERS", "_ROUNDS", "_SHARP"},  # three legs; an iteration
+    "machine/model.py": {"BASE", "_STEP"},  # a centre of ±1/12; a complex step
     "regression/bounds.py": {"_AT"},  # rounding
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
@@ -40,6 +44,9 @@ ARITHMETIC = {
     # cells of a picture, when its waves are laid over each other; a turn
     "validation/signature.py": {"_CELLS", "_FEWEST", "_TURN", "_MANY_WAVES", "_FINE"},
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
+    "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
+    "data/segment.py": {"PAIR_RAD", "_REFERENCE_DEGC"},  # a turn; the model's temperature
+    "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},
     "equations/holding.py": {"_CRAWL"},  # beside zero and not at it
     "equations/lcr.py": {"_PROBE"},  # differences

@@ -8,25 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.captures import Cutting
 
-_SCATTER = 0.5
-"""Scatter of the stamps [periods] from which on a stamp does not tell the number of its sample."""
-_MISSING = 1.6
-"""Distance of two stamps [periods] from which on a sample may be missing between them. By
-judgement: at 1 the scatter alone passes for missing samples, at 2 it hides half of them."""
-_SURELY = 2.0
-"""Ratio of roughnesses that decides. By judgement: at 1 noise decides."""
 _REACH = 2
 """Samples at either side that a cubic goes through; it needs four."""
 
 
-def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
+def counted(time: Array, policy: Cutting) -> tuple[float, NDArray[np.int64]] | None:
     """The even clock behind stamps that scatter.
 
     Parameters
     ----------
     time
         Stamps [n, s], rising.
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -41,14 +37,14 @@ def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
 
     Examples
     --------
-    >>> period, numbers = counted(np.array([0.0, 1.0, 2.0, 4.0, 5.0]))
+    >>> period, numbers = counted(np.array([0.0, 1.0, 2.0, 4.0, 5.0]), Cutting())
     >>> round(period, 9), numbers.tolist()
     (1.0, [0, 1, 2, 4, 5])
 
     """
     since = time - time[0]
     steps = np.diff(since) / np.median(np.diff(since))
-    gaps = np.where(steps > _MISSING, np.rint(steps), 1.0)
+    gaps = np.where(steps > policy.clock_missing, np.rint(steps), 1.0)
     ends = []
     for counts in (np.ones(steps.size), gaps):
         number = np.concatenate([[0.0], np.cumsum(counts)])
@@ -56,10 +52,12 @@ def counted(time: Array) -> tuple[float, NDArray[np.int64]] | None:
         scatter = float(np.std(since - first - period * number)) / period
         ends.append((scatter, float(period), number.astype(np.int64)))
     scatter, period, number = min(ends, key=lambda end: end[0])
-    return None if scatter > _SCATTER else (period, number)
+    return None if scatter > policy.clock_scatter else (period, number)
 
 
-def sampled_unevenly(time: Array, number: NDArray[np.int64], columns: Iterable[Array]) -> bool:
+def sampled_unevenly(
+    time: Array, number: NDArray[np.int64], columns: Iterable[Array], policy: Cutting
+) -> bool:
     """Whether the samples came unevenly, and not only their stamps.
 
     Parameters
@@ -70,11 +68,14 @@ def sampled_unevenly(time: Array, number: NDArray[np.int64], columns: Iterable[A
         Number of each sample on the even clock [n].
     columns
         Signals [n each, any unit].
+    policy
+        Constants of judgement.
 
     Returns
     -------
     bool
-        Where the signal that shows most runs `_SURELY` times more smoothly over the stamps.
+        Where the signal that shows most runs `policy.clock_ratio` times more smoothly over the
+        stamps.
 
     Notes
     -----
@@ -85,7 +86,7 @@ def sampled_unevenly(time: Array, number: NDArray[np.int64], columns: Iterable[A
     """
     ratios = [_roughness(c, number.astype(float)) / _roughness(c, time) for c in columns]
     clearest = max(ratios, key=lambda ratio: max(ratio, 1.0 / ratio), default=1.0)
-    return clearest > _SURELY
+    return clearest > policy.clock_ratio
 
 
 def _roughness(signal: Array, at: Array) -> float:

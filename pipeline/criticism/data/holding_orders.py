@@ -15,7 +15,7 @@ from pipeline.records.capture import Capture
 
 
 def holding_orders(
-    captures: Iterable[Capture], bases: tuple[int, ...], policy: Tables, highest: int = 400
+    captures: Iterable[Capture], bases: tuple[int, ...], policy: Tables, highest: int
 ) -> tuple[int, ...]:
     """Orders that a holding current repeats in parts of the turn they were not fitted to.
 

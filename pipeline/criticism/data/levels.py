@@ -8,20 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
-
-_ROWS_A_LEVEL = 3
-"""Rows a level on the average: two make a straight line, a third its scatter."""
-_CLEAR_OF_NOISE = 2.0
-"""Widths of the widest level that levels must be apart. By judgement: at 1 noise parts a level."""
+from pipeline.criticism.policy.captures import Tables
 
 
-def set_levels(current: Array) -> NDArray[np.int64]:
+def set_levels(current: Array, policy: Tables) -> NDArray[np.int64]:
     """The level that was set for each current, noise and all.
 
     Parameters
     ----------
     current
         [n, A]
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -39,10 +37,10 @@ def set_levels(current: Array) -> NDArray[np.int64]:
     for least in np.unique(np.append(gaps, 0.0)):
         levels = levels_of(current, float(least))
         count = int(levels.max(initial=0)) + 1
-        if current.size < _ROWS_A_LEVEL * count:
+        if current.size < policy.level_rows * count:
             continue
         widest = max(float(np.ptp(current[levels == k])) for k in range(count))
-        if gaps[gaps > least].min(initial=math.inf) > _CLEAR_OF_NOISE * widest:
+        if gaps[gaps > least].min(initial=math.inf) > policy.level_widths * widest:
             return levels
     return np.zeros(current.size, dtype=np.int64)
 

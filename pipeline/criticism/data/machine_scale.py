@@ -28,12 +28,6 @@ _SHAFT_ALONE = ("spin_down", "cogging")
 """Tests without a current, of which a winding's pole pairs say nothing."""
 _TURNING = ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s")
 _LINES_A = ("ia_a", "ib_a", "ic_a")
-# orders a turn that a slow turn is searched for, and harmonics of the cogging order
-_HIGHEST = 400
-_HARMONICS = 3
-_SAME_STEP = 0.02
-"""Share by which two logs may differ on the encoder's step, by judgement: the next encoder has half
-of it or twice."""
 
 
 PAIRLESS = (
@@ -98,9 +92,10 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         "flux_wb": psi,
     }
     bases = tuple(int(str(n)) for n in (pole_pairs, slots) if n)
-    highest = _HARMONICS * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
-    orders = torque_orders(campaign.of("cogging"), max(highest, _HIGHEST)) or holding_orders(
-        campaign.of("holding_current"), bases, policy.tables
+    harmonics, usual = policy.cutting.harmonics, policy.cutting.highest_order
+    highest = harmonics * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
+    orders = torque_orders(campaign.of("cogging"), max(highest, usual), usual) or holding_orders(
+        campaign.of("holding_current"), bases, policy.tables, usual
     )
     return Machine(
         pole_pairs,
@@ -108,7 +103,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         scales,
         orders,
         stated,
-        encoder_step(campaign),
+        encoder_step(campaign, policy.cutting.encoder_share),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
         stated=known,
         policy=policy,
@@ -129,13 +124,15 @@ def _travel_turns(capture: Capture) -> float:
     return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
 
 
-def encoder_step(campaign: Campaign) -> float:
+def encoder_step(campaign: Campaign, same: float) -> float:
     """The step of the encoder in drive logs.
 
     Parameters
     ----------
     campaign
         All captures of one motor.
+    same
+        Share by which logs may differ on it.
 
     Returns
     -------
@@ -151,7 +148,7 @@ def encoder_step(campaign: Campaign) -> float:
     logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
     found = [rounding_step(c.arrays("theta_mech_rad")["theta_mech_rad"]) for c in logs]
     step = float(np.median(found)) if found else 0.0
-    agree = all(abs(one - step) <= _SAME_STEP * step for one in found)
+    agree = all(abs(one - step) <= same * step for one in found)
     return step if agree else 0.0
 
 
@@ -238,7 +235,7 @@ def _period(capture: Capture) -> float:
     return float(np.median(np.diff(capture.arrays("t_s")["t_s"])))
 
 
-def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple[int, ...]:
+def torque_orders(captures: Iterable[Capture], highest: int, usual: int) -> tuple[int, ...]:
     """Orders that stand out of every slow turn's torque spectrum.
 
     Parameters
@@ -246,7 +243,9 @@ def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple
     captures
         Slow turns.
     highest
-        Highest order [1/turn]; 400 where samples are too few for that.
+        Highest order [1/turn].
+    usual
+        The same [1/turn] where samples are too few for that.
 
     Returns
     -------
@@ -267,8 +266,8 @@ def torque_orders(captures: Iterable[Capture], highest: int = _HIGHEST) -> tuple
         signals = capture.arrays("theta_mech_rad", "torque_shaft_nm")
         both = signals["theta_mech_rad"], signals["torque_shaft_nm"]
         here = _standing_out(*both, highest)
-        if here is None and highest > _HIGHEST:
-            here = _standing_out(*both, _HIGHEST)
+        if here is None and highest > usual:
+            here = _standing_out(*both, usual)
         if here is not None:
             found = here if found is None else found & here
     return tuple(sorted(found or ()))

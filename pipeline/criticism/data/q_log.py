@@ -42,7 +42,7 @@ def q_log(capture: Capture, machine: Machine) -> QLog | None:
     if capture.has("vd_v", "vq_v", "id_a", "iq_a") or not moving:
         return None
     there = tuple(name for name in _ELECTRICAL if capture.has(name))
-    period, found, keep = even_clock(capture, (*there, *moving))
+    period, found, keep = even_clock(capture, (*there, *moving), machine.policy.cutting)
     keep &= _on_time(capture, period, keep.size)
     speed = found.get("omega_mech_rad_s")
     shaft_angle(found, period, machine)

@@ -66,7 +66,7 @@ def _has_values(table: pl.DataFrame, name: str, home: pl.DataFrame) -> bool:
 
 
 def even_clock(
-    capture: Capture, names: tuple[str, ...]
+    capture: Capture, names: tuple[str, ...], policy: Cutting
 ) -> tuple[float, dict[str, Array], NDArray[np.bool_]]:
     """Columns of a capture on an even clock.
 
@@ -76,6 +76,8 @@ def even_clock(
         With `t_s`.
     names
         Columns that are wanted, on one clock.
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -103,9 +105,9 @@ def even_clock(
         if not good.all() and good.any():
             found[name] = np.interp(time, time[good], column[good])
             keep &= good
-    uneven = np.abs(np.diff(time) - period).max() > 1e-3 * period
-    clock = counted(time) if uneven else None
-    if clock is not None and not sampled_unevenly(time, clock[1], found.values()):
+    uneven = np.abs(np.diff(time) - period).max() > policy.clock_even * period
+    clock = counted(time, policy) if uneven else None
+    if clock is not None and not sampled_unevenly(time, clock[1], found.values(), policy):
         period, number = clock
         even = np.arange(number[-1] + 1)
         recorded = np.zeros(even.size, dtype=bool)
@@ -115,7 +117,11 @@ def even_clock(
     elif uneven:
         even = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
         after = np.clip(np.searchsorted(time, even), 1, time.size - 1)
-        near = (time[after] - time[after - 1] < 1.5 * period) & keep[after] & keep[after - 1]
+        near = (
+            (time[after] - time[after - 1] < policy.clock_gap * period)
+            & keep[after]
+            & keep[after - 1]
+        )
         found = {name: np.interp(even, time, column) for name, column in found.items()}
         keep = near
     keep[:1] = keep[-1:] = False

@@ -56,7 +56,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     torque = capture.has("torque_shaft_nm") and turning and angle
     names += ["torque_shaft_nm"] if torque else []
     policy = machine.policy.cutting
-    period, found, keep = even_clock(capture, tuple(names))
+    period, found, keep = even_clock(capture, tuple(names), policy)
     shaft_angle(found, period, machine)
     turned = float(np.ptp(found["theta_mech_rad"]))
     channels: tuple[str, ...] = ("vd_v", "vq_v")

@@ -48,12 +48,12 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         if not capture.has("torque_shaft_nm"):
             return None
         names = [*names, "torque_shaft_nm"]
-    period, found, keep = even_clock(capture, tuple(names))
+    policy = machine.policy.cutting
+    period, found, keep = even_clock(capture, tuple(names), policy)
     shaft_angle(found, period, machine)
     channel = TORQUE if TORQUE in found else SPEED
     if capture.meta.test == "cogging":
         return _slow_turn(capture, machine, period, found, keep, channel)
-    policy = machine.policy.cutting
     window = window_of(period, keep.size, policy)
     keep = keep & _coasts(found["theta_mech_rad"], window, policy.driven_share)
     sensors = prepared(found, period, policy)

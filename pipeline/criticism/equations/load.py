@@ -46,9 +46,10 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if capture.has(*_BOTH_AXES) or not angle:
         return None
     others = [name for name in ("id_a", *SMOOTHED) if capture.has(name)]
-    period, found, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle))
+    policy = machine.policy.cutting
+    period, found, keep = even_clock(capture, ("iq_a", TORQUE, *others, *angle), policy)
     shaft_angle(found, period, machine)
-    policy, size = machine.policy.cutting, keep.size
+    size = keep.size
     window = window_of(period, size, policy)
     sensors = evened(capture, found, prepared(found, period, policy), machine, window)
     found["t_s"] = period * np.arange(size, dtype=np.float64)

@@ -44,9 +44,9 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     if not ANGLES.intersection(names):
         # where the magnet stands at first is another in every spin, and no speed tells it
         return None
-    period, found, keep = even_clock(capture, tuple(names))
-    shaft_angle(found, period, machine)
     policy = machine.policy.cutting
+    period, found, keep = even_clock(capture, tuple(names), policy)
+    shaft_angle(found, period, machine)
     window = window_of(period, keep.size, policy)
     sensors = prepared(found, period, policy)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)

@@ -29,10 +29,10 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         return None
     sign = 1.0 if current[1] == pair[0] else -1.0
     extra = ["temp_winding_degc"] if capture.has("temp_winding_degc") else []
-    period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra))
+    policy = machine.policy.cutting
+    period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra), policy)
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    policy = machine.policy.cutting
     sensors = prepared(found, period, policy)
     fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":

@@ -32,28 +32,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array
-
-_BLOCKS_S = (0.5e-3, 1e-3, 2e-3, 4e-3)
-"""Lengths of a block [s], of which the first serves that keeps noise small against the torque:
-what a gap does is short."""
-_SURE, _FINE = 5.0, 0.08
-"""Standard deviations of its noise from which on a torque is surely one, and the share of the
-torque's own scatter that these may come to. By judgement: lower, and blocks in which the gap is
-open count as closed; a larger share, and few blocks are closed."""
-_WINDOW_S, _SHORTEST, _LEAST = 0.03, 12, 10
-"""Length of a window [s], and blocks that it has, and in which torque is passed on, at the least.
-By judgement: in a longer one an unrecorded load is no constant, and a parabola and three columns
-leave little of a shorter one."""
-_RANGE, _MOVES = 10.0, 0.5
-"""How far the torque must move in a window: times what is surely a torque, and as a share of its
-scatter in the log. By judgement: under an even torque a twist is a constant."""
-_STARTS_RAD = (0.0, 3e-4, 1e-3, 3e-3, 1e-2)
-"""Gaps [rad] that a fit is begun with: a factor of three apart over what couplings have."""
-_ROUNDS, _SETTLED = 40, 1e-3
-"""Renewals of the weights at the most, and the relative change that ends them."""
-_USUAL, _ODD = 0.25, 25.0
-"""Quantile of the turning windows' χ²/n up to which a window counts in full, and the most that it
-may be. By judgement: a higher one lets windows in which a load jumps decide."""
+from pipeline.criticism.policy.machine import Torsion
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,13 +86,15 @@ class _Window:
     turns: bool
 
 
-def law_of_twist(shafts: Iterable[Shaft]) -> Law | None:
+def law_of_twist(shafts: Iterable[Shaft], policy: Torsion) -> Law | None:
     """Softness and gap of a coupling that explain the angle best.
 
     Parameters
     ----------
     shafts
         Whole captures of one shaft.
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -125,11 +106,11 @@ def law_of_twist(shafts: Iterable[Shaft]) -> Law | None:
     inertia = 0.0
     for shaft in shafts:
         inertia = shaft.inertia_kgm2
-        told += _windows(shaft)
+        told += _windows(shaft, policy)
     turning = [one.power for one in told if one.turns]
     if not turning:
         return None
-    found, spread = _fitted(told, inertia)
+    found, spread = _fitted(told, inertia, policy)
     return Law(
         float(found[1]),
         math.sqrt(spread[1, 1]),
@@ -140,19 +121,19 @@ def law_of_twist(shafts: Iterable[Shaft]) -> Law | None:
     )
 
 
-def _windows(shaft: Shaft) -> Iterable[_Window]:
+def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:
     """Every window, half overlapping, in which the torque moves enough to tell of the twist."""
-    block, theta, through, turned, least = _smoothed(shaft)
-    size = max(round(_WINDOW_S / (block * shaft.ts_s)), _SHORTEST)
+    block, theta, through, turned, least = _smoothed(shaft, policy)
+    size = max(round(policy.window_s / (block * shaft.ts_s)), policy.window_blocks)
     closed = _closed(through, least)
     kept = np.asarray(sliding_window_view(shaft.kept, 3 * block).all(axis=1))
     closed &= kept[::block][: closed.size]
     noise = _Noise.of(shaft, block, size)
-    moves = max(_RANGE * least, _MOVES * float(np.std(through)))
+    moves = max(policy.torque_range * least, policy.torque_moves * float(np.std(through)))
     for first in range(0, theta.size - size + 1, size // 2):
         here = np.flatnonzero(closed[first : first + size])
         pressed = through[first : first + size][here]
-        if pressed.size < _LEAST or np.ptp(pressed) < moves:
+        if pressed.size < policy.closed_blocks or np.ptp(pressed) < moves:
             continue
         side = np.sign(pressed)
         own = [x[first : first + size][here] - x[first] for x in (turned, theta)]
@@ -170,7 +151,7 @@ def _windows(shaft: Shaft) -> Iterable[_Window]:
         )
 
 
-def _smoothed(shaft: Shaft) -> tuple[int, Array, Array, Array, float]:
+def _smoothed(shaft: Shaft, policy: Torsion) -> tuple[int, Array, Array, Array, float]:
     """Samples a block; angle, torque passed on and momentum twice integrated, a block apart [n];
     and the size from which on a torque is no noise.
 
@@ -179,7 +160,7 @@ def _smoothed(shaft: Shaft) -> tuple[int, Array, Array, Array, float]:
     shortest in which noise is small against the torque, since what a gap does is short.
     """
     whole = np.cumsum(np.cumsum(shaft.momentum_nm) - 0.5 * shaft.momentum_nm) * shaft.ts_s**2
-    for length in _BLOCKS_S:
+    for length in policy.blocks_s:
         block = max(round(length / shaft.ts_s), 1)
         period = block * shaft.ts_s
         box, kernel = _kernel(block)
@@ -192,8 +173,9 @@ def _smoothed(shaft: Shaft) -> tuple[int, Array, Array, Array, float]:
         bend = np.diff(means, 2)[: theta.size] / period**2
         through = through[: bend.size] - shaft.near_kgm2 * bend
         bent = shaft.near_kgm2 * shaft.u_theta_rad * math.sqrt(6.0 / block) / period**2
-        least = _SURE * math.hypot(bent, shaft.u_through_nm * float(np.linalg.norm(kernel)))
-        if least < _FINE * float(np.std(through)):
+        noise = math.hypot(bent, shaft.u_through_nm * float(np.linalg.norm(kernel)))
+        least = policy.torque_u * noise
+        if least < policy.noise_share * float(np.std(through)):
             break
     return block, theta[: bend.size], through, turned[: bend.size], least
 
@@ -261,7 +243,7 @@ class _Noise:
         return added
 
 
-def _fitted(told: Sequence[_Window], inertia: float) -> tuple[Array, Array]:
+def _fitted(told: Sequence[_Window], inertia: float, policy: Torsion) -> tuple[Array, Array]:
     """Coefficients [3] of the columns, and their covariance [3, 3].
 
     Noise is little beside what the coupling's damping does, for which there is no column. So a
@@ -280,15 +262,15 @@ def _fitted(told: Sequence[_Window], inertia: float) -> tuple[Array, Array]:
     clean = normal - noise[:, :, :3] / np.outer(size, size)
     pull = slope - noise[:, :, 3] / size
     ends = []
-    for gap in _STARTS_RAD:
+    for gap in policy.starts_rad:
         found = size * np.array([1.0 / inertia, 0.0, 0.5 * gap])
-        for _ in range(_ROUNDS):
+        for _ in range(policy.rounds):
             spreads = _spreads(normal, slope, power, count, found)
-            usual = float(np.clip(np.quantile(spreads[turns], _USUAL), 1.0, _ODD))
+            usual = float(np.clip(np.quantile(spreads[turns], policy.usual), 1.0, policy.odd))
             weight = np.maximum(spreads / usual, 1.0) ** -2.0
             inverse = np.linalg.pinv(np.einsum("i,ijk->jk", weight, clean), hermitian=True)
             before, found = found, inverse @ (weight @ pull)
-            if np.abs(found - before).max() < _SETTLED * np.abs(found).max():
+            if np.abs(found - before).max() < policy.settled * np.abs(found).max():
                 break
         spreads = np.maximum(_spreads(normal, slope, power, count, found), 1.0)
         score = weight[:, None] * (pull - clean @ found)

@@ -282,7 +282,8 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     between, share = q["between"] > 0.0, q["share"]
     if share <= 0.0 or not logs:
         return None
-    law = law_of_twist(_shaft(one, between, share) for one in logs)
+    policy = logs[0].x.machine.policy.torsion
+    law = law_of_twist((_shaft(one, between, share) for one in logs), policy)
     if law is None or law.windows < _FEW:
         return None
     part = 1.0 if between else share

@@ -12,7 +12,7 @@ COST = "a bound of the cost, which goes with them"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cutting:
-    """Windows of logs with a clock, and what a shaft's motion is made of."""
+    """Clocks, windows of logs, orders, and what a shaft's motion is made of."""
 
     window_s: float = chosen(
         0.02, "s", "length of a weak window", why="5 ms bias J, 80 ms and more blur what moves"
@@ -87,6 +87,36 @@ class Cutting:
         24, "samples", "samples of a slow turn that a wave of its highest order is averaged to",
         why="averages of a 24th take 0.3 % of a wave away",
     )  # fmt: skip
+    clock_scatter: float = chosen(
+        0.5, "periods", "scatter of stamps from which on a stamp does not number its sample",
+        why="at half a period it may be its neighbour's",
+    )  # fmt: skip
+    clock_missing: float = chosen(
+        1.6, "periods", "distance of two stamps from which on a sample may be missing between them",
+        why="at 1 the scatter alone passes for missing samples, at 2 it hides half of them",
+    )  # fmt: skip
+    clock_ratio: float = chosen(
+        2.0, "1", "ratio of roughnesses from which on samples came unevenly, and not only stamps",
+        why="at 1 noise decides",
+    )  # fmt: skip
+    clock_even: float = chosen(
+        1e-3, "periods", "scatter of a clock that is taken as even", why="a stamp's own digits"
+    )
+    clock_gap: float = chosen(
+        1.5, "periods", "distance of two samples that nothing is interpolated across",
+        why="one sample is missing there",
+    )  # fmt: skip
+    encoder_share: float = chosen(
+        0.02, "1", "share by which two logs may differ on the encoder's step",
+        why="the next encoder has half of it or twice",
+    )  # fmt: skip
+    highest_order: int = chosen(
+        400, "1/turn", "highest order that a slow turn or a held rotor is searched for",
+        why="slots and poles that meet more often cog next to nothing together",
+    )  # fmt: skip
+    harmonics: int = chosen(
+        3, "1", "harmonics of the cogging order that are searched for", why="the next are smaller"
+    )
     slower_share: float = chosen(
         0.75, "sample periods", "PWM period below which a log is slower than the PWM",
         why="a log of every second period is at a half, one of every period at 1",
@@ -115,6 +145,14 @@ class Tables:
     levels: int = chosen(
         4, "levels", "levels of current from which on they are held out one by one",
         why="the others show a curve, its slope and scatter",
+    )  # fmt: skip
+    level_rows: int = derived(
+        3, "samples", "rows a level on the average",
+        source="two make a straight line, a third its scatter",
+    )  # fmt: skip
+    level_widths: float = chosen(
+        2.0, "1", "widths of the widest level that levels must be apart",
+        why="at 1 noise parts a level",
     )  # fmt: skip
     parts: int = chosen(
         12, "1", "parts that a sweep of current is held out in",

@@ -9,6 +9,7 @@ from typing import Any
 from pipeline.criticism.policy.captures import Cutting, Priors, Tables
 from pipeline.criticism.policy.design import Design
 from pipeline.criticism.policy.discovery import Discovery
+from pipeline.criticism.policy.machine import Torsion
 from pipeline.criticism.policy.regression import GaussNewton, Goodness, MainsHum, NoiseFloors
 from pipeline.criticism.policy.selection import OrderScan, Selection
 from pipeline.criticism.policy.validation import Validation
@@ -31,6 +32,7 @@ class Policy:
     cutting: Cutting = section(Cutting)
     tables: Tables = section(Tables)
     priors: Priors = section(Priors)
+    torsion: Torsion = section(Torsion)
 
 
 DEFAULT = Policy()

@@ -8,7 +8,10 @@ import pytest
 
 from pipeline.criticism.data.clocks import counted
 from pipeline.criticism.data.traces import even_clock
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.capture import Capture, CaptureMeta
+
+CUTTING = DEFAULT.cutting
 
 PERIOD = 1e-4
 
@@ -34,7 +37,7 @@ def test_samples_of_an_even_clock_are_taken_as_they_are_whatever_their_stamps(sc
     even, stamps = instants(scatter=scatter)
     for start_s in (0.0, 1.79e9):
         capture = log(start_s + stamps, angle(even))
-        period, found, keep = even_clock(capture, ("theta_mech_rad",))
+        period, found, keep = even_clock(capture, ("theta_mech_rad",), CUTTING)
         assert period == pytest.approx(PERIOD, rel=1e-5)
         assert np.array_equal(found["theta_mech_rad"], angle(even))
         assert keep[1:-1].all()
@@ -44,7 +47,7 @@ def test_samples_of_an_even_clock_are_taken_as_they_are_whatever_their_stamps(sc
 def test_samples_that_came_unevenly_are_interpolated(scatter):
     """Counted, they would be out by the speed times the scatter."""
     _, stamps = instants(scatter=scatter)
-    period, found, keep = even_clock(log(stamps, angle(stamps)), ("theta_mech_rad",))
+    period, found, keep = even_clock(log(stamps, angle(stamps)), ("theta_mech_rad",), CUTTING)
     at = stamps[0] + period * np.arange(found["theta_mech_rad"].size)
     error = found["theta_mech_rad"] - angle(at)
     assert np.abs(error[keep]).max() < 0.1 * 40.0 * PERIOD * scatter
@@ -56,7 +59,7 @@ def test_samples_that_are_missing_leave_their_numbers_out():
     there = np.ones(even.size, dtype=bool)
     there[[700, 1500, 1501, 1502, 3000]] = False
     capture = log(stamps[there], angle(even)[there])
-    period, found, keep = even_clock(capture, ("theta_mech_rad",))
+    period, found, keep = even_clock(capture, ("theta_mech_rad",), CUTTING)
     assert period == pytest.approx(PERIOD, rel=1e-5)
     assert np.array_equal(keep[1:-1], there[1:-1])
     assert found["theta_mech_rad"][keep] == pytest.approx(angle(even)[keep], abs=1e-12)
@@ -68,7 +71,7 @@ def test_a_gap_of_samples_that_came_unevenly_is_bridged_and_not_kept(missing):
     there = np.ones(even.size, dtype=bool)
     there[1500 : 1500 + missing] = False
     capture = log(stamps[there], angle(stamps[there]))
-    period, found, keep = even_clock(capture, ("theta_mech_rad",))
+    period, found, keep = even_clock(capture, ("theta_mech_rad",), CUTTING)
     at = stamps[0] + period * np.arange(found["theta_mech_rad"].size)
     inside = (at > stamps[1499]) & (at < stamps[1500 + missing])
     assert inside.sum() >= missing
@@ -78,4 +81,4 @@ def test_a_gap_of_samples_that_came_unevenly_is_bridged_and_not_kept(missing):
 
 def test_a_clock_that_runs_by_fits_and_starts_cannot_be_counted():
     steps = np.random.default_rng(3).choice([0.2, 1.0, 7.0], 4000, p=[0.3, 0.5, 0.2])
-    assert counted(PERIOD * np.cumsum(steps)) is None
+    assert counted(PERIOD * np.cumsum(steps), CUTTING) is None

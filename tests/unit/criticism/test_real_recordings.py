@@ -105,7 +105,7 @@ def test_cross_saturation_is_named_after_saturation():
 
 def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
     captures = campaign("laas_solo").of("holding_current")
-    orders = holding_orders(captures, (12, 18), TABLES)
+    orders = holding_orders(captures, (12, 18), TABLES, 400)
     assert {12, 18, 24, 72} <= set(orders)
     assert len(orders) <= 10
     assert sector_errors(captures, (), TABLES)[0] == pytest.approx(0.138, abs=0.001)

@@ -74,8 +74,8 @@ def test_cells_of_a_row_or_two_have_the_noise_of_their_neighbours(every):
 
 def test_orders_that_repeat_are_found_and_noise_adds_none():
     true = {5: 0.01, 12: 0.02, 30: 0.1}
-    assert holding_orders([held(true, 0.01)], (5, 6), DEFAULT.tables) == (5, 12, 30)
-    assert holding_orders([held({}, 0.01)], (5, 6), DEFAULT.tables) == ()
+    assert holding_orders([held(true, 0.01)], (5, 6), DEFAULT.tables, 400) == (5, 12, 30)
+    assert holding_orders([held({}, 0.01)], (5, 6), DEFAULT.tables, 400) == ()
 
 
 @pytest.mark.parametrize("sectors", [1, 2, 5])
@@ -85,7 +85,7 @@ def test_a_small_part_of_a_turn_tells_of_no_order(sectors):
     current = 0.05 + np.random.default_rng(1).normal(0.0, 0.01, theta.size)
     part = capture("holding_current", theta_mech_rad=theta, iq_a=current)
     assert set(cut("standing", part).blocks.tolist()) == set(range(sectors))
-    assert holding_orders([part], (5, 6), DEFAULT.tables) == ()
+    assert holding_orders([part], (5, 6), DEFAULT.tables, 400) == ()
 
 
 def test_held_out_sectors_expose_orders_that_only_fit():
@@ -122,7 +122,7 @@ def test_one_level_with_noise_is_one_level(set_a):
     current = set_a + random.normal(0.0, 0.02, 30)
     speed = np.linspace(50.0, 300.0, 30)
     assert levels_of(current).max() > 10
-    assert set_levels(current).max() == 0
+    assert set_levels(current, DEFAULT.tables).max() == 0
     volts = 0.05 * speed + random.normal(0.0, 1e-3, 30)
     table = capture("flux_map", id_a=current, omega_mech_rad_s=speed, vq_v=volts)
     assert cut("steady", table).disturbances.offsets.shape == (1, 30)
@@ -134,7 +134,7 @@ def test_levels_that_were_set_are_told_through_their_noise(noise):
     levels = np.repeat([0, 1, 2, 3], [3, 6, 4, 7])
     current = np.array([-20.0, -8.0, -6.0, 0.0])[levels]
     current = current + np.random.default_rng(6).normal(0.0, noise, current.size)
-    assert set_levels(current).tolist() == levels.tolist()
+    assert set_levels(current, DEFAULT.tables).tolist() == levels.tolist()
 
 
 @pytest.mark.parametrize("last_digit", [0.0, 1e-5])

@@ -15,6 +15,7 @@ from pipeline.criticism.library.registry import effects
 from pipeline.criticism.machine.model import Model
 from pipeline.criticism.machine.torsion import Law, Shaft, law_of_twist
 from pipeline.criticism.machine.two_masses import discriminator, side_of
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.linearise import effect_columns
 from pipeline.criticism.selection.discrimination import settled
 from tests.unit.criticism.machines import BASE, machine, operating
@@ -143,7 +144,7 @@ def test_bad_samples_are_not_looked_at():
     good = np.ones(theta.size, dtype=bool)
     good[9000:13000] = False
     args = (TS, theta, through, through, 0.0, FAR, one.u_theta_rad, U_TORQUE_NM, U_TORQUE_NM, good)
-    law = law_of_twist([Shaft(*args)])
+    law = law_of_twist([Shaft(*args)], DEFAULT.torsion)
     assert law is not None
     assert law.gap_rad == pytest.approx(0.003, rel=0.1)
 

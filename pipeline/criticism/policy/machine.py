@@ -1,0 +1,60 @@
+"""Constants of judgement of `machine`: the twist of a shaft in two parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.records.policy import chosen, derived
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Torsion:
+    """Windows in which a coupling's twist is looked at, and the fit of its law."""
+
+    blocks_s: tuple[float, ...] = chosen(
+        (0.5e-3, 1e-3, 2e-3, 4e-3), "s", "lengths of a block, the first that keeps noise small",
+        why="what a gap does is short",
+    )  # fmt: skip
+    torque_u: float = chosen(
+        5.0, "standard deviations of noise", "torque that surely is one",
+        why="lower, and blocks in which the gap is open count as closed",
+    )  # fmt: skip
+    noise_share: float = chosen(
+        0.08, "1", "what surely is a torque, as a share of the torque's scatter, at the most",
+        why="with a larger one few blocks are closed",
+    )  # fmt: skip
+    window_s: float = chosen(
+        0.03, "s", "length of a window", why="in a longer one an unrecorded load is no constant"
+    )
+    window_blocks: int = chosen(
+        12, "blocks", "blocks of a window at the least",
+        why="a parabola and three columns leave little of a shorter one",
+    )  # fmt: skip
+    closed_blocks: int = chosen(
+        10, "blocks", "blocks of a window that pass torque on, at the least",
+        why="a parabola and three columns leave little of fewer",
+    )  # fmt: skip
+    torque_range: float = chosen(
+        10.0, "1", "range of the torque in a window over what surely is a torque",
+        why="under an even torque a twist is a constant",
+    )  # fmt: skip
+    torque_moves: float = chosen(
+        0.5, "1", "range of the torque in a window over its scatter in the log",
+        why="under an even torque a twist is a constant",
+    )  # fmt: skip
+    starts_rad: tuple[float, ...] = chosen(
+        (0.0, 3e-4, 1e-3, 3e-3, 1e-2), "rad", "gaps that a fit is begun with",
+        why="a factor of three apart over what couplings have",
+    )  # fmt: skip
+    rounds: int = chosen(40, "1", "renewals of the weights at the most", why="a bound of the cost")
+    settled: float = chosen(
+        1e-3, "1", "relative change that ends the renewals", why="far below any uncertainty"
+    )
+    usual: float = derived(
+        0.25, "1", "quantile of the turning windows' χ²/n up to which a window counts in full",
+        source="the lower quartile; a higher one lets windows in which a load jumps decide",
+    )  # fmt: skip
+    odd: float = chosen(
+        25.0, "1", "the most that this χ²/n may be",
+        why="where most windows miss the equation by more, none is usual",
+    )  # fmt: skip
