@@ -46,6 +46,18 @@ ARITHMETIC = {
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
     "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
     "data/segment.py": {"PAIR_RAD", "_REFERENCE_DEGC"},  # a turn; the model's temperature
+    # the grid of a search for a step; rounding
+    "data/sensor_noise.py": {
+        "_LOOKED_AT",
+        "_STEPS",
+        "_FIRST_WINDOW",
+        "_WIDER",
+        "_PLACES",
+        "_SPACING",
+        "_FINEST",
+        "_REACH",
+        "_FLOATING",
+    },
     "data/traces.py": {"PAD", "_SHORTEST"},  # samples kept; three windows of eight
     "design/experiments.py": {"_SEED"},
     "equations/holding.py": {"_CRAWL"},  # beside zero and not at it

@@ -32,11 +32,11 @@ def holding() -> str:
         left.add("line", theta[mine], told[0, mine], colour)
     right = Panel("Error against the number of orders", "orders in the model", "rms [A]", log=True)
     captures = found.of("holding_current")
-    tables, strongest = DEFAULT.tables, (72, 18, 12, 144, 24, 36, 48, 216)
-    chosen = [k for k in strongest if k in holding_orders(captures, (12, 18), tables, 400)]
-    steps = [(n, *sector_errors(captures, chosen[:n], tables)) for n in range(len(chosen) + 1)]
+    strongest = (72, 18, 12, 144, 24, 36, 48, 216)
+    chosen = [k for k in strongest if k in holding_orders(captures, (12, 18), DEFAULT, 400)]
+    steps = [(n, *sector_errors(captures, chosen[:n], DEFAULT)) for n in range(len(chosen) + 1)]
     steps += [
-        (n, *sector_errors(captures, range(1, n + 1), tables)) for n in (19, 39, 79, 119, 159)
+        (n, *sector_errors(captures, range(1, n + 1), DEFAULT)) for n in (19, 39, 79, 119, 159)
     ]
     count = [n for n, _, _ in steps]
     for place, (colour, name) in enumerate(((BLUE, "fitted"), (RED, "held out")), start=1):

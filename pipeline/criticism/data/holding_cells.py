@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.captures import Tables
+from pipeline.criticism.policy.policy import Policy
 from pipeline.numerics.orders import TURN_RAD, passes
 from pipeline.records.capture import Capture
 
@@ -28,7 +29,7 @@ class Cells:
     noise_a: float
 
 
-def holding_cells(capture: Capture, policy: Tables) -> Cells | None:
+def holding_cells(capture: Capture, policy: Policy) -> Cells | None:
     """A holding current averaged in cells of angle and sense.
 
     Parameters
@@ -41,7 +42,7 @@ def holding_cells(capture: Capture, policy: Tables) -> Cells | None:
     Returns
     -------
     Cells or None
-        None where there are fewer cells than `policy.sectors`.
+        None where there are fewer cells than `policy.tables.sectors`.
 
     Notes
     -----
@@ -57,14 +58,14 @@ def holding_cells(capture: Capture, policy: Tables) -> Cells | None:
     theta, current = found["theta_mech_rad"][fine], found["iq_a"][fine]
     rows, spread = [], []
     for part, sense in passes(theta):
-        cells, left = _cells(theta[part], current[part], policy)
+        cells, left = _cells(theta[part], current[part], policy.tables)
         rows.append(np.column_stack([cells, np.full(cells.shape[0], float(sense))]))
         spread += left
-    if not rows or sum(len(r) for r in rows) < policy.sectors:
+    if not rows or sum(len(r) for r in rows) < policy.tables.sectors:
         return None
     table = np.concatenate(rows)
     noise = _noise(spread, [cells[:, 1] for cells in rows], policy)
-    sector = _sectors_of(table[:, 0], policy.sectors)
+    sector = _sectors_of(table[:, 0], policy.tables.sectors)
     return Cells(table[:, 0], table[:, 1], table[:, 2], sector, noise)
 
 
@@ -89,13 +90,13 @@ def _about_a_line(theta: Array, current: Array) -> Array:
     return rest
 
 
-def _noise(spread: list[Array], means: list[Array], policy: Tables) -> float:
+def _noise(spread: list[Array], means: list[Array], policy: Policy) -> float:
     """Standard deviation [A] of a cell's mean, of cells' `means` pass by pass and of their rows'
     scatter; never below a ten-thousandth of the largest.
     """
-    least = max(policy.reading * max(float(np.abs(one).max()) for one in means), 1e-12)
-    if len(spread) < policy.cell_share * sum(one.size for one in means):
-        return max(*(sensor_noise(one) for one in means), least)
+    least = max(policy.tables.reading * max(float(np.abs(one).max()) for one in means), 1e-12)
+    if len(spread) < policy.tables.cell_share * sum(one.size for one in means):
+        return max(*(sensor_noise(one, policy.sensor_noise) for one in means), least)
     power = sum(float(s @ s) for s in spread)
     n = sum(s.size for s in spread)
     after = sum(float(s[1:] @ s[:-1]) for s in spread)

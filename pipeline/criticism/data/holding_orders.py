@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.data.holding_cells import holding_cells
 from pipeline.criticism.effect import Array
-from pipeline.criticism.policy.captures import Tables
+from pipeline.criticism.policy.policy import Policy
 from pipeline.records.capture import Capture
 
 
 def holding_orders(
-    captures: Iterable[Capture], bases: tuple[int, ...], policy: Tables, highest: int
+    captures: Iterable[Capture], bases: tuple[int, ...], policy: Policy, highest: int
 ) -> tuple[int, ...]:
     """Orders that a holding current repeats in parts of the turn they were not fitted to.
 
@@ -39,7 +39,7 @@ def holding_orders(
     -----
     Forward selection: the order that takes most of the square of what is left joins, as long as the
     sectors of the turn, each predicted from all others, gain on average by more than
-    `policy.order_u` standard errors. An order too many makes held-out sectors worse at once,
+    `policy.tables.order_u` standard errors. An order too many makes held-out sectors worse at once,
     however well the rest is fitted.
 
     References
@@ -53,20 +53,20 @@ def holding_orders(
     if joined is None or not bases:
         return ()
     theta, current, design, sector = joined
-    if np.unique(sector).size < policy.order_sectors:
+    if np.unique(sector).size < policy.tables.order_sectors:
         return ()
     cells = 2.0 * math.pi / float(np.median(np.abs(np.diff(np.unique(np.mod(theta, 2 * math.pi))))))
     top = min(highest, int(cells / 8))
     offered = [k for k in range(1, top + 1) if any(k % base == 0 for base in bases)]
     chosen: list[int] = []
     error = _held_out(design, current, sector)
-    while offered and len(chosen) < policy.orders:
+    while offered and len(chosen) < policy.tables.orders:
         best = _strongest(design, current, theta, offered)
         offered.remove(best)
         tried = np.column_stack([design, np.cos(best * theta), np.sin(best * theta)])
         now = _held_out(tried, current, sector)
         gain = error - now
-        if gain.mean() <= policy.order_u * float(gain.std(ddof=1)) / math.sqrt(gain.size):
+        if gain.mean() <= policy.tables.order_u * float(gain.std(ddof=1)) / math.sqrt(gain.size):
             break
         design, error = tried, now
         chosen.append(best)
@@ -74,7 +74,7 @@ def holding_orders(
 
 
 def sector_errors(
-    captures: Iterable[Capture], orders: Sequence[int], policy: Tables
+    captures: Iterable[Capture], orders: Sequence[int], policy: Policy
 ) -> tuple[float, float]:
     """What orders, and an offset a sense, leave of a holding current.
 
@@ -118,7 +118,7 @@ def _strongest(design: Array, current: Array, theta: Array, offered: Sequence[in
 
 
 def _joined(
-    captures: Iterable[Capture], policy: Tables
+    captures: Iterable[Capture], policy: Policy
 ) -> tuple[Array, Array, Array, NDArray[np.int64]] | None:
     """Angle, current, an offset a capture and sense, and the sector, of all cells."""
     each = (holding_cells(capture, policy) for capture in captures)

@@ -95,7 +95,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     harmonics, usual = policy.cutting.harmonics, policy.cutting.highest_order
     highest = harmonics * math.lcm(int(str(slots)), 2 * pole_pairs) if slots else 0
     orders = torque_orders(campaign.of("cogging"), max(highest, usual), usual) or holding_orders(
-        campaign.of("holding_current"), bases, policy.tables, usual
+        campaign.of("holding_current"), bases, policy, usual
     )
     return Machine(
         pole_pairs,
@@ -103,7 +103,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         scales,
         orders,
         stated,
-        encoder_step(campaign, policy.cutting.encoder_share),
+        encoder_step(campaign, policy),
         travel_turns=max(map(_travel_turns, campaign.captures), default=0.0),
         stated=known,
         policy=policy,
@@ -124,15 +124,15 @@ def _travel_turns(capture: Capture) -> float:
     return math.inf if any(capture.has(name) for name in _TURNING) else 0.0
 
 
-def encoder_step(campaign: Campaign, same: float) -> float:
+def encoder_step(campaign: Campaign, policy: Policy) -> float:
     """The step of the encoder in drive logs.
 
     Parameters
     ----------
     campaign
         All captures of one motor.
-    same
-        Share by which logs may differ on it.
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -146,9 +146,10 @@ def encoder_step(campaign: Campaign, same: float) -> float:
 
     """
     logs = [c for c in campaign.of("drive") if c.has("theta_mech_rad")]
-    found = [rounding_step(c.arrays("theta_mech_rad")["theta_mech_rad"]) for c in logs]
+    angles = [c.arrays("theta_mech_rad")["theta_mech_rad"] for c in logs]
+    found = [rounding_step(angle, policy.sensor_noise) for angle in angles]
     step = float(np.median(found)) if found else 0.0
-    agree = all(abs(one - step) <= same * step for one in found)
+    agree = all(abs(one - step) <= policy.cutting.encoder_share * step for one in found)
     return step if agree else 0.0
 
 

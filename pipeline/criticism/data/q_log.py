@@ -48,7 +48,7 @@ def q_log(capture: Capture, machine: Machine) -> QLog | None:
     shaft_angle(found, period, machine)
     if speed is not None:
         found["omega_mech_rad_s"] = speed
-    sensors = prepared(found, period, machine.policy.cutting)
+    sensors = prepared(found, period, machine.policy)
     angle = any("theta" in name for name in moving)
     return QLog(period, found, keep, sensors, speed is not None, angle)
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.projection import Projection
 from pipeline.records.capture import Capture
@@ -29,13 +28,13 @@ class Sensors:
     columns that are rounded too coarsely for their noise to dither, so that the rounding error
     follows the signal. `runs_rad`: angles turned between the reversals that stand out of the
     angle's noise; the column `run` numbers the one at hand. `angle_step_rad`: resolution of an
-    angle whose noise is its rounding.
+    angle whose noise is its rounding; None before anybody looked (`residuals.segments`).
     """
 
     noise: Mapping[str, float]
     steps: Mapping[str, float] = field(default_factory=dict)
     runs_rad: Array | None = None
-    angle_step_rad: float = 0.0
+    angle_step_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +130,6 @@ def segment_of(
     if pwm_hz:
         fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}
     meter = "gain_commanded" if capture.meta.voltage_kind == "commanded" else "gain_voltage"
-    theta = found.get("theta_mech_rad")
     return Segment(
         capture=capture.path,
         test=capture.meta.test,
@@ -142,9 +140,7 @@ def segment_of(
         weak=weak,
         instrument=Instrument(instrument, capture.meta.voltage_timing, meter),
         sensors=replace(
-            sensors,
-            steps={name: step for name, step in sensors.steps.items() if name in found},
-            angle_step_rad=0.0 if theta is None else rounding_step(theta),
+            sensors, steps={name: step for name, step in sensors.steps.items() if name in found}
         ),
         fixed={"ambient_k": ambient, **fixed},
         disturbances=Disturbances(offsets),

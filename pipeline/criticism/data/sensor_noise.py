@@ -7,33 +7,13 @@ import math
 import numpy as np
 
 from pipeline.criticism.effect import Array
+from pipeline.criticism.policy.sensors import SensorNoise
 
-_BLOCK = 48
-"""Samples of a block of third differences. By judgement: shorter ones scatter more, longer ones
-are seldom free of steps and bursts."""
-_QUIET, _STEADY = (0.3, -0.5244), (0.6, 0.2533)
-"""Quantile over the blocks, and the normal variable's value there: a low one, since steps and
-bursts only add; of an angle a higher one, since its rounding comes and goes."""
-_SMOOTH = 21
-"""Samples of the mean of a rounded signal that is rounded anew. By judgement: of a few it still is
-a stair, of many its bends are lost."""
-_BURST = 12.0
-"""Times the median third difference, above which one is a jump and not the rounding."""
 _LOOKED_AT = 2000
 """Third differences, or samples of a part, that are looked at: enough for a mean to 2 %."""
 _STEPS = 600
 """Trial steps, from a quarter to twice the rms third difference, which is 1.3 steps of rounding
 alone: 0.35 % apart."""
-_TOGETHER = 0.5
-"""Coherence of the phase below which there is no step; noise of 0.04 steps, added after the
-rounding, comes to it."""
-_HIGH = 0.9
-"""Share of the highest coherence that a larger step needs to be preferred: a peak at 1.5 steps has
-0.82 at a slow steady speed."""
-_SNAP, _AS_GOOD = 0.06, 0.01
-"""A whole number of steps a turn is taken within so many octaves, and if it loses no more of the
-coherence. The first is 4 %, by judgement; 2000 counts are 0.034 from 2048, so that the coherence
-has to tell them apart."""
 _FIRST_WINDOW, _WIDER = 32, 4
 _PLACES = 16
 _SPACING, _FINEST = 0.2, 0.02
@@ -44,23 +24,17 @@ phase over a part; how many spacings they reach around the step before. A lobe o
 a turn wide: a wider spacing misses it, a finer one costs time."""
 _FLOATING = 1e-9
 """Share of a signal's size that is rounding of floating-point numbers."""
-_WHOLE, _MOSTLY = 0.05, 0.95
-"""How near to a whole number [steps], and what share of all distances must be so, for a signal to
-have a resolution. By judgement: distances of no step come so near one time in ten."""
-_UNDITHERED = (0.45**2 + 1.0 / 12.0) ** -0.5
-"""Steps over noise, rounding in it, where the noise itself is 0.45 steps."""
-_MOVING, _IN_STEP = 16.0, 0.9
-"""Steps that an angle must move by, and coherence that it then needs, to be in such steps. By
-judgement: one that stands still is in step with anything."""
 
 
-def sensor_noise(signal: Array, steady: bool = False) -> float:
+def sensor_noise(signal: Array, policy: SensorNoise, steady: bool = False) -> float:
     """Standard deviation of a signal's white sensor noise.
 
     Parameters
     ----------
     signal
         Samples [n, any unit], finite.
+    policy
+        Constants of judgement.
     steady
         Whether it is an angle, whose rounding comes and goes with its speed.
 
@@ -86,30 +60,32 @@ def sensor_noise(signal: Array, steady: bool = False) -> float:
     third = np.diff(signal, 3)
     if third.size == 0:
         return 0.0
-    width = min(_BLOCK, third.size)
+    width = min(policy.block, third.size)
     blocks = third[: third.size // width * width].reshape(-1, width)
     # Wilson and Hilferty's quantile of chi-square with the samples that third differences leave
     spread = 2.0 / (9.0 * width / 2.2)
-    quantile, deviate = _STEADY if steady else _QUIET
+    quantile, deviate = policy.steady if steady else policy.quiet
     share = (1.0 - spread + deviate * math.sqrt(spread)) ** 3
     power = float(np.quantile((blocks**2).mean(axis=1), quantile))
     level = math.sqrt(power / (20.0 * share))
     return max(level, _rounding(third) / math.sqrt(12.0))
 
 
-def resolution(signal: Array) -> float:
+def resolution(signal: Array, policy: SensorNoise) -> float:
     """The step that a signal's values are whole multiples of.
 
     Parameters
     ----------
     signal
         Samples [n, any unit].
+    policy
+        Constants of judgement.
 
     Returns
     -------
     float
-        The least distance of two values, where `_MOSTLY` of all distances are whole multiples of
-        it; else 0.
+        The least distance of two values, where `policy.mostly` of all distances are whole
+        multiples of it; else 0.
 
     """
     gaps = np.diff(np.unique(signal))
@@ -118,11 +94,11 @@ def resolution(signal: Array) -> float:
     if gaps.size == 0:
         return 0.0
     steps = gaps / gaps.min()
-    whole = np.abs(steps - np.round(steps)) < _WHOLE
-    return float(gaps.min()) if whole.mean() > _MOSTLY else 0.0
+    whole = np.abs(steps - np.round(steps)) < policy.whole
+    return float(gaps.min()) if whole.mean() > policy.mostly else 0.0
 
 
-def coarse_step(signal: Array, sigma: float) -> float:
+def coarse_step(signal: Array, sigma: float, policy: SensorNoise) -> float:
     """The resolution of a signal that its noise does not dither.
 
     Parameters
@@ -131,6 +107,8 @@ def coarse_step(signal: Array, sigma: float) -> float:
         Samples [n, any unit].
     sigma
         Standard deviation of its noise, that of rounding among it [same unit].
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -147,8 +125,9 @@ def coarse_step(signal: Array, sigma: float) -> float:
     Widrow and Kollar, Quantization Noise, Cambridge University Press, 2008, ch. 19.
 
     """
-    step = resolution(signal)
-    return step if step > _UNDITHERED * sigma else 0.0
+    step = resolution(signal, policy)
+    dithered = (policy.undithered**2 + 1.0 / 12.0) ** -0.5
+    return step if step > dithered * sigma else 0.0
 
 
 def unrounded(signal: Array, step: float) -> Array:
@@ -180,7 +159,7 @@ def unrounded(signal: Array, step: float) -> Array:
     return found
 
 
-def rounding_error(signal: Array, step: float, shift: float) -> Array:
+def rounding_error(signal: Array, step: float, shift: float, smooth: int) -> Array:
     """What rounding does to a signal like this one.
 
     Parameters
@@ -191,6 +170,8 @@ def rounding_error(signal: Array, step: float, shift: float) -> Array:
         Of the rounding [same unit].
     shift
         By which the smoothed signal is moved before it is rounded anew [steps].
+    smooth
+        Samples of the mean that smooths it, odd.
 
     Returns
     -------
@@ -199,20 +180,22 @@ def rounding_error(signal: Array, step: float, shift: float) -> Array:
         whose beat with the sampling may fall on any order.
 
     """
-    kernel = np.full(_SMOOTH, 1.0 / _SMOOTH)
-    padded = np.pad(signal / step, _SMOOTH // 2, mode="reflect", reflect_type="odd")
-    smooth = np.convolve(padded, kernel, mode="valid") + shift
-    error: Array = (np.round(smooth) - smooth) * step
+    kernel = np.full(smooth, 1.0 / smooth)
+    padded = np.pad(signal / step, smooth // 2, mode="reflect", reflect_type="odd")
+    even = np.convolve(padded, kernel, mode="valid") + shift
+    error: Array = (np.round(even) - even) * step
     return error
 
 
-def rounding_step(signal: Array) -> float:
+def rounding_step(signal: Array, policy: SensorNoise) -> float:
     """The step of a signal whose noise is mostly its rounding.
 
     Parameters
     ----------
     signal
         Samples [n, rad]; an encoder of 2^n steps a turn, or of whole lines, is taken as such.
+    policy
+        Constants of judgement.
 
     Returns
     -------
@@ -228,10 +211,10 @@ def rounding_step(signal: Array) -> float:
     """
     signal = signal[np.isfinite(signal)]
     third = np.diff(signal, 3)
-    if third.size < _BLOCK:
+    if third.size < policy.block:
         return 0.0
-    third = third[np.abs(third) < _BURST * np.median(np.abs(third)) + 1e-300]
-    spread = float(np.sqrt((third**2).mean())) if third.size >= _BLOCK else 0.0
+    third = third[np.abs(third) < policy.burst * np.median(np.abs(third)) + 1e-300]
+    spread = float(np.sqrt((third**2).mean())) if third.size >= policy.block else 0.0
     if spread <= _FLOATING * float(np.abs(signal).max()):
         return 0.0
     sample = third[:: max(third.size // _LOOKED_AT, 1)]
@@ -241,22 +224,23 @@ def rounding_step(signal: Array) -> float:
     together = np.hypot(np.cos(phase).mean(axis=1), np.sin(phase).mean(axis=1))
     inner = together[1:-1]
     peaks = 1 + np.flatnonzero((inner >= together[:-2]) & (inner >= together[2:]))
-    high = [n for n in peaks if together[n] >= max(_HIGH * together[peaks].max(), _TOGETHER)]
+    least = max(policy.high * together[peaks].max(initial=0.0), policy.together)
+    high = [n for n in peaks if together[n] >= least]
     if not high:
         return 0.0
-    step, parts = _sharpened(signal, float(steps[high[-1]]))
+    step, parts = _sharpened(signal, float(steps[high[-1]]), policy.together)
     # an encoder has 2^n steps a turn, or 4 times its lines
     bits = math.log2(2.0 * math.pi / step)
     for count in (2.0 ** round(bits), float(round(2.0**bits))):
         whole = 2.0 * math.pi / max(count, 1.0)
-        if abs(math.log2(max(count, 1.0)) - bits) < _SNAP:
+        if abs(math.log2(max(count, 1.0)) - bits) < policy.snap_octaves:
             both = _coherence(parts, np.array([step, whole]))
-            if both[1] >= both[0] - _AS_GOOD:
+            if both[1] >= both[0] - policy.snap_loss:
                 return whole
     return step
 
 
-def _sharpened(signal: Array, step: float) -> tuple[float, Array]:
+def _sharpened(signal: Array, step: float, together: float) -> tuple[float, Array]:
     """The step near a rough one of which long parts of the record are whole multiples, and the
     longest parts [parts, samples] that are.
 
@@ -270,7 +254,7 @@ def _sharpened(signal: Array, step: float) -> tuple[float, Array]:
         wider = _parts(signal, length)
         lobe = step**2 / max(float(np.ptp(wider, axis=1).max()), step)
         found = _best_step(wider, step, known, _SPACING * lobe)
-        if float(_coherence(wider, np.array([found]))[0]) < _TOGETHER:
+        if float(_coherence(wider, np.array([found]))[0]) < together:
             break
         step, parts, known = found, wider, min(known, _REACH * _SPACING * lobe)
         if length >= signal.size:
@@ -308,11 +292,11 @@ def _coherence(parts: Array, steps: Array) -> Array:
     return found
 
 
-def is_rounded(signal: Array, step: float) -> bool:
+def is_rounded(signal: Array, step: float, policy: SensorNoise) -> bool:
     """Whether a moving signal's values are whole multiples of a step, but for a common offset."""
-    if step <= 0.0 or float(np.ptp(signal)) < _MOVING * step:
+    if step <= 0.0 or float(np.ptp(signal)) < policy.moving * step:
         return False
-    return abs(complex(np.exp(2j * np.pi / step * signal).mean())) > _IN_STEP
+    return abs(complex(np.exp(2j * np.pi / step * signal).mean())) > policy.in_step
 
 
 def _rounding(third: Array) -> float:

@@ -15,6 +15,8 @@ from pipeline.criticism.data.segment import UNSMOOTHED, Sensors
 from pipeline.criticism.data.sensor_noise import coarse_step, sensor_noise
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.policy.captures import Cutting
+from pipeline.criticism.policy.policy import Policy
+from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.numerics.projection import window_starts
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Capture
@@ -316,27 +318,32 @@ def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> Non
         found["theta_mech_rad"] = np.zeros(next(iter(found.values())).size)
 
 
-def prepared(found: dict[str, Array], period: float, policy: Cutting) -> Sensors:
+def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
     """Noise, coarse steps and runs of columns; smooths the temperatures and adds the travel since a
     reversal.
     """
-    noise = {n: sensor_noise(column, n.startswith("theta")) for n, column in found.items()}
-    steps = coarse_steps(found, noise)
-    width = max(2 * round(policy.temperature_s / period) + 1, 51)
+    noise, steps = noise_and_steps(found, policy.sensor_noise)
+    width = max(2 * round(policy.cutting.temperature_s / period) + 1, 51)
     for name in SMOOTHED:
         if name in found:
             found[name] = smoothed(found[name], width)
             noise[name] /= math.sqrt(width)
     runs = np.array([math.inf])
     if "theta_mech_rad" in found:
-        runs = with_travel(found, noise, policy)
+        runs = with_travel(found, noise, policy.cutting)
     return Sensors(noise, steps, runs)
 
 
-def coarse_steps(found: Mapping[str, Array], noise: Mapping[str, float]) -> dict[str, float]:
-    """Steps of the columns that are rounded too coarsely for their noise; an angle has its own."""
-    steps = {n: coarse_step(c, noise[n]) for n, c in found.items() if not n.startswith("theta")}
-    return {name: step for name, step in steps.items() if step > 0.0}
+def noise_and_steps(
+    found: Mapping[str, Array], policy: SensorNoise
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Noise of columns, and the steps of those that are rounded too coarsely for it; an angle has
+    its own.
+    """
+    angles = {name: name.startswith("theta") for name in found}
+    noise = {n: sensor_noise(column, policy, angles[n]) for n, column in found.items()}
+    steps = {n: coarse_step(c, noise[n], policy) for n, c in found.items() if not angles[n]}
+    return noise, {name: step for name, step in steps.items() if step > 0.0}
 
 
 def even_angle(

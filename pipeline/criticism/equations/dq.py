@@ -65,7 +65,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     size = found["vd_v"].size
     window = window_of(period, size, policy)
     orders = electrical_orders(machine) if angle and turned > policy.turning_rad else ()
-    sensors = evened(capture, found, prepared(found, period, policy), machine, window)
+    sensors = evened(capture, found, prepared(found, period, machine.policy), machine, window)
     most = policy.windows if capture.meta.test == "torque_map" else policy.windows_drive
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     logged = capture.meta.test == "drive" and len(channels) > 2

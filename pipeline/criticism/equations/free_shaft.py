@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import Segment, Sensors, segment_of, slow_orders
-from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.data.traces import (
-    coarse_steps,
     decimated,
     even_clock,
+    noise_and_steps,
     prepared,
     shaft_angle,
     smoothed,
@@ -56,7 +55,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         return _slow_turn(capture, machine, period, found, keep, channel)
     window = window_of(period, keep.size, policy)
     keep = keep & _coasts(found["theta_mech_rad"], window, policy.driven_share)
-    sensors = prepared(found, period, policy)
+    sensors = prepared(found, period, machine.policy)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, policy.windows)
     weak = projection(found["theta_mech_rad"], starts, window, ())
@@ -107,8 +106,7 @@ def _slow_turn(
     factor = max(int(theta.size / turns / (policy.slow_samples * max(orders))), 1)
     if theta.size // factor < policy.least_window + 2:
         return None
-    noise = {n: sensor_noise(c, n.startswith("theta")) for n, c in found.items()}
-    steps = coarse_steps(found, noise)
+    noise, steps = noise_and_steps(found, machine.policy.sensor_noise)
     noise = {n: sigma / math.sqrt(factor) for n, sigma in noise.items()}
     found = {name: decimated(column, factor) for name, column in found.items()}
     sensors = Sensors(noise, steps, with_travel(found, noise, policy))

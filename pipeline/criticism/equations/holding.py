@@ -27,7 +27,7 @@ _CRAWL = 1e-9
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Mean angle, current and sense of arrival of every cell; sectors are held out one by one."""
-    cells = holding_cells(capture, machine.policy.tables)
+    cells = holding_cells(capture, machine.policy)
     if cells is None:
         return None
     return segment_of(

@@ -35,12 +35,14 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     basis = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
     if angle.size < 6:
         return None
-    noise = {}
+    noise, policy = {}, machine.policy
     for name in names[1:]:
         fit = basis @ np.linalg.lstsq(basis, found[name], rcond=None)[0]
         scatter = math.sqrt(float(((found[name] - fit) ** 2).sum()) / (angle.size - 3))
-        least = machine.policy.tables.reading * float(np.abs(found[name]).max())
-        noise[name] = max(scatter, resolution(found[name]) / math.sqrt(12), least)
+        least = policy.tables.reading * float(np.abs(found[name]).max())
+        noise[name] = max(
+            scatter, resolution(found[name], machine.policy.sensor_noise) / math.sqrt(12), least
+        )
     channels = tuple(n for n in ("lab_h", "rab_ohm") if n in found)
     return segment_of(
         capture,

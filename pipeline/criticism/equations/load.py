@@ -51,7 +51,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     shaft_angle(found, period, machine)
     size = keep.size
     window = window_of(period, size, policy)
-    sensors = evened(capture, found, prepared(found, period, policy), machine, window)
+    sensors = evened(capture, found, prepared(found, period, machine.policy), machine, window)
     found["t_s"] = period * np.arange(size, dtype=np.float64)
     found["row"] = np.arange(size, dtype=np.float64)
     cut_out, starts = thinned(found, keep, window, policy.windows)

@@ -48,7 +48,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, tuple(names), policy)
     shaft_angle(found, period, machine)
     window = window_of(period, keep.size, policy)
-    sensors = prepared(found, period, policy)
+    sensors = prepared(found, period, machine.policy)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, policy.windows)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))

@@ -33,7 +33,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     period, found, keep = even_clock(capture, (f"v{pair}_v", current, *extra), policy)
     volts, amps = found.pop(f"v{pair}_v"), sign * found.pop(current)
     found = {"v_pair_v": volts, "i_pair_a": amps, **found}
-    sensors = prepared(found, period, policy)
+    sensors = prepared(found, period, machine.policy)
     fixed = {"pair_rad": PAIR_RAD[pair], "phase": float("abc".index(current[1]))}
     if capture.meta.test == "current_step":
         if capture.meta.theta_elec_deg is None:

@@ -33,21 +33,6 @@ from pipeline.criticism.effect import (
 )
 from pipeline.criticism.machine.torsion import Shaft, law_of_twist
 
-_BLOCK_S = 0.5e-3
-"""Length of a running mean [s]: a ringing of 290 Hz passes to one per cent (docs/criticism.md).
-Longer means take a part of it, shorter ones leave the encoder's rounding."""
-_MOST = 7
-"""Samples of a running mean at the most: six of them and a difference stay within the samples
-that are kept around a window."""
-_SURE = 3.5
-"""Standard uncertainties that a gap or softness must be away from what it is held against. By
-judgement: chance passes it once in four thousand."""
-_FEW = 6
-"""Windows with torque of both signs that a look needs: their scatter is the uncertainty, and of
-fewer it is not known. By judgement."""
-_NO_GAP_RAD = 2e-4
-"""Gap [rad] below which none matters: the negligible size of `backlash`, by judgement."""
-
 
 def passed_on(x: Operating, share: float) -> Array:
     """Torque that the motor's side of a coupling passes on, drags left out, which change slowly.
@@ -80,7 +65,8 @@ def passed_on(x: Operating, share: float) -> Array:
 
 def _smoothed(x: Operating, inner: Array) -> Array:
     """A signal without its first and last sample [n − 2], as `passed_on` smooths it [n]."""
-    block = max(min(round(_BLOCK_S / x.ts_s), _MOST), 1)
+    policy = x.machine.policy.torsion
+    block = max(min(round(policy.mean_s / x.ts_s), policy.mean_samples), 1)
     block -= 1 - block % 2
     box = np.full(block, 1.0 / block)
     smooth = np.convolve(np.convolve(box, box), box)
@@ -275,7 +261,7 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
     -------
     Discrimination or None
         A gap if it is surely there, and wider than the spring's twist at the torque passed on; a
-        spring if such a gap is surely not there; else None. Surely is `_SURE` standard
+        spring if such a gap is surely not there; else None. Surely is `sure_u` standard
         uncertainties.
 
     """
@@ -284,18 +270,18 @@ def discriminator(logs: Sequence[FullLog], q: Values) -> Discrimination | None:
         return None
     policy = logs[0].x.machine.policy.torsion
     law = law_of_twist((_shaft(one, between, share) for one in logs), policy)
-    if law is None or law.windows < _FEW:
+    if law is None or law.windows < policy.windows:
         return None
     part = 1.0 if between else share
     gap, u_gap = law.gap_rad / part, law.u_gap_rad / part
     torque = logs[0].x.machine.scales["torque_nm"] / part
     values = {"twist_rad": (torque * law.softness, torque * law.u_softness)}
-    if law.softness < _SURE * law.u_softness:
+    if law.softness < policy.sure_u * law.u_softness:
         values.clear()
-    matters = max(_NO_GAP_RAD, law.softness / part * law.torque_nm)
-    if gap > max(matters, _SURE * u_gap):
+    matters = max(policy.no_gap_rad, law.softness / part * law.torque_nm)
+    if gap > max(matters, policy.sure_u * u_gap):
         return Discrimination("backlash", {**values, "gap_rad": (gap, u_gap)})
-    return Discrimination("compliance", {}) if gap + _SURE * u_gap < matters else None
+    return Discrimination("compliance", {}) if gap + policy.sure_u * u_gap < matters else None
 
 
 def _shaft(one: FullLog, between: bool, share: float) -> Shaft:

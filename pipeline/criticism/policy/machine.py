@@ -54,6 +54,26 @@ class Torsion:
         0.25, "1", "quantile of the turning windows' χ²/n up to which a window counts in full",
         source="the lower quartile; a higher one lets windows in which a load jumps decide",
     )  # fmt: skip
+    mean_s: float = chosen(
+        0.5e-3, "s", "length of a running mean of the torque that a coupling passes on",
+        why="a ringing of 290 Hz passes to one per cent; longer means take a part of it, shorter "
+        "ones leave the encoder's rounding",
+    )  # fmt: skip
+    mean_samples: int = derived(
+        7, "samples", "samples of that mean at the most",
+        source="six of them and a difference stay within the samples kept around a window",
+    )  # fmt: skip
+    sure_u: float = chosen(
+        3.5, "standard uncertainties", "distance of a gap or softness from what it is held against",
+        why="chance passes it once in four thousand",
+    )  # fmt: skip
+    windows: int = chosen(
+        6, "windows", "windows with torque of both signs that a look needs",
+        why="their scatter is the uncertainty, and of fewer it is not known",
+    )  # fmt: skip
+    no_gap_rad: float = derived(
+        2e-4, "rad", "gap below which none matters", source="the negligible size of `backlash`"
+    )
     odd: float = chosen(
         25.0, "1", "the most that this χ²/n may be",
         why="where most windows miss the equation by more, none is usual",

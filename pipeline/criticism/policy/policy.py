@@ -12,6 +12,7 @@ from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.policy.machine import Torsion
 from pipeline.criticism.policy.regression import GaussNewton, Goodness, MainsHum, NoiseFloors
 from pipeline.criticism.policy.selection import OrderScan, Selection
+from pipeline.criticism.policy.sensors import SensorNoise
 from pipeline.criticism.policy.validation import Validation
 from pipeline.records.policy import Overrides, overrides, section, with_overrides
 
@@ -33,6 +34,7 @@ class Policy:
     tables: Tables = section(Tables)
     priors: Priors = section(Priors)
     torsion: Torsion = section(Torsion)
+    sensor_noise: SensorNoise = section(SensorNoise)
 
 
 DEFAULT = Policy()

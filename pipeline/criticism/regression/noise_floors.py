@@ -71,7 +71,7 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
     what that changes in the residual counts too: it may have been noise or motion.
 
     """
-    policy = model.policy.noise_floors
+    policy, even = model.policy.noise_floors, model.policy.sensor_noise.smooth
     group, _, valid, groups = row_index(segment)
     plain = projected(segment, residual(segment, model, values))
     total, count = np.zeros(len(groups)), np.zeros(len(groups))
@@ -89,11 +89,11 @@ def noise_floor(segment: Segment, model: Model, values: Values, seed: int) -> Ar
             for name, column in segment.recorded.items()
         }
         for name, step in sensors.steps.items():
-            noisy[name] += rounding_error(smooth[name], step, shifts[name][replicate])
+            noisy[name] += rounding_error(smooth[name], step, shifts[name][replicate], even)
         if sensors.angle_step_rad:
             theta = segment.recorded["theta_mech_rad"]
-            shift = generator.uniform(-0.5, 0.5)
-            noisy["theta_mech_rad"] = theta + rounding_error(theta, sensors.angle_step_rad, shift)
+            step, shift = sensors.angle_step_rad, generator.uniform(-0.5, 0.5)
+            noisy["theta_mech_rad"] = theta + rounding_error(theta, step, shift, even)
         change = projected(segment, residual(segment, model, values, noisy)) - plain
         np.add.at(total, group[valid], change[valid] ** 2)
         np.add.at(count, group[valid], 1.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.segment import Segment, with_lines
-from pipeline.criticism.data.sensor_noise import is_rounded
+from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
 from pipeline.criticism.data.traces import PAD, tellable
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.equation import Equation
@@ -28,7 +28,7 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
         capture = tellable(recorded) if recorded.meta.test in known_tests() else None
         if capture is not None:
             own = gains[recorded.path]
-            cut = (_by_encoder(s, machine.encoder_rad) for s in _cut(capture, machine))
+            cut = (_by_encoder(s, machine) for s in _cut(capture, machine))
             made += [_by_instruments(segment, own) for segment in cut]
     kinds = {segment.kind for segment in made}
     # a table that other captures can predict is held out as a whole
@@ -68,16 +68,20 @@ def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:
     return replace(segment, instrument=replace(segment.instrument, meter=volts, ammeter=amps))
 
 
-def _by_encoder(segment: Segment, step: float) -> Segment:
-    """The segment with the encoder step that drive logs show, if its angle is in such steps.
+def _by_encoder(segment: Segment, machine: Machine) -> Segment:
+    """The segment with the step of its angle: that of the drive's encoder, if it is in such steps,
+    else its own.
 
     A shaft that turns by nearly whole steps a sample does not show the step itself, and its
     rounding is then periodic in the angle, as an electrical order is.
     """
-    theta = segment.recorded.get("theta_mech_rad")
-    known = theta is not None and is_rounded(theta, step)
-    if not known:
+    theta, step = segment.recorded.get("theta_mech_rad"), machine.encoder_rad
+    if theta is None:
         return segment
+    policy = machine.policy.sensor_noise
+    if not is_rounded(theta, step, policy):
+        known = segment.sensors.angle_step_rad
+        step = rounding_step(theta, policy) if known is None else known
     return replace(segment, sensors=replace(segment.sensors, angle_step_rad=step))
 
 

@@ -13,8 +13,6 @@ from pipeline.execution.tasks.start import start_constants
 from pipeline.records.comparison import ModelSpec
 from tests.stories.fits import REAL, campaign, fit
 
-TABLES = DEFAULT.tables
-
 pytestmark = pytest.mark.skipif(not REAL.is_dir(), reason="shared real recordings are not here")
 IDEAL = ModelSpec("ideal")
 
@@ -105,15 +103,15 @@ def test_cross_saturation_is_named_after_saturation():
 
 def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
     captures = campaign("laas_solo").of("holding_current")
-    orders = holding_orders(captures, (12, 18), TABLES, 400)
+    orders = holding_orders(captures, (12, 18), DEFAULT, 400)
     assert {12, 18, 24, 72} <= set(orders)
     assert len(orders) <= 10
-    assert sector_errors(captures, (), TABLES)[0] == pytest.approx(0.138, abs=0.001)
-    assert sector_errors(captures, (72,), TABLES) == pytest.approx((0.048, 0.0486), abs=0.001)
-    fitted, held = sector_errors(captures, orders, TABLES)
+    assert sector_errors(captures, (), DEFAULT)[0] == pytest.approx(0.138, abs=0.001)
+    assert sector_errors(captures, (72,), DEFAULT) == pytest.approx((0.048, 0.0486), abs=0.001)
+    fitted, held = sector_errors(captures, orders, DEFAULT)
     assert fitted < 0.0225
     assert held < 0.0235
-    fitted, held = sector_errors(captures, range(1, 160), TABLES)
+    fitted, held = sector_errors(captures, range(1, 160), DEFAULT)
     assert fitted < 0.0185
     assert held > 0.14
 

@@ -170,14 +170,14 @@ def test_the_level_of_white_noise_is_found_under_a_moving_signal():
     t = np.arange(20000) * 1e-4
     rng = np.random.default_rng(8)
     signal = 5 * np.sin(30 * t) + np.where(t > 1.0, 3.0, 0.0) + rng.normal(0, 0.02, t.size)
-    assert sensor_noise(signal) == pytest.approx(0.02, rel=0.06)
+    assert sensor_noise(signal, DEFAULT.sensor_noise) == pytest.approx(0.02, rel=0.06)
 
 
 def test_a_quantised_ramp_has_its_rounding_noise():
     step = 2 * np.pi / 2**14
     ramp = np.round(np.linspace(0, 9.123, 20011) / step) * step
-    assert sensor_noise(ramp) == pytest.approx(step / np.sqrt(12), rel=0.3)
-    assert sensor_noise(np.linspace(0.0, 9.123, 20011)) < 1e-12
+    assert sensor_noise(ramp, DEFAULT.sensor_noise) == pytest.approx(step / np.sqrt(12), rel=0.3)
+    assert sensor_noise(np.linspace(0.0, 9.123, 20011), DEFAULT.sensor_noise) < 1e-12
 
 
 def test_a_jump_of_voltage_is_known_to_a_quarter_of_a_sample():

@@ -16,11 +16,14 @@ from pipeline.criticism.data.sensor_noise import (
     sensor_noise,
 )
 from pipeline.criticism.machine.model import Model
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.fit import Fit, floors, floors_grown
 from pipeline.criticism.regression.linear_system import linear_system
 from pipeline.criticism.regression.noise_floors import noise_floor
 from pipeline.criticism.selection.stepwise import _shrunk
 from tests.unit.criticism.machines import BASE, coasting, log, machine
+
+SENSORS = DEFAULT.sensor_noise
 
 
 def rounded(step, sigma, seed=3, n=6000):
@@ -32,13 +35,13 @@ def rounded(step, sigma, seed=3, n=6000):
 
 @pytest.mark.parametrize("step", [2.0**-7, 0.01, 1.0 / 3.0])
 def test_the_resolution_of_a_signal_is_the_step_of_its_values(step):
-    assert resolution(rounded(step, 0.3)) == pytest.approx(step, rel=1e-6)
+    assert resolution(rounded(step, 0.3), SENSORS) == pytest.approx(step, rel=1e-6)
 
 
 def test_numbers_of_no_step_have_no_resolution():
     random = np.random.default_rng(1)
-    assert resolution(np.full(100, 3.0)) == 0.0
-    assert resolution(random.choice([0.0, 1.0, np.pi, np.e * 3, 7.3], 200)) == 0.0
+    assert resolution(np.full(100, 3.0), SENSORS) == 0.0
+    assert resolution(random.choice([0.0, 1.0, np.pi, np.e * 3, 7.3], 200), SENSORS) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -46,7 +49,9 @@ def test_numbers_of_no_step_have_no_resolution():
 )
 def test_a_signal_is_coarse_where_its_noise_does_not_dither_it(share, coarse):
     signal = rounded(0.02, 0.02 * share)
-    assert coarse_step(signal, sensor_noise(signal)) == pytest.approx(0.02 if coarse else 0.0)
+    assert coarse_step(signal, sensor_noise(signal, SENSORS), SENSORS) == pytest.approx(
+        0.02 if coarse else 0.0
+    )
 
 
 @pytest.mark.parametrize("file_step", [0.0, 2.0**-18])
@@ -59,14 +64,14 @@ def test_an_encoder_s_counts_a_turn_are_told_whether_powers_of_two_or_not(counts
     moved = 48.0 * np.sin(2.5 * t) + noise * step * random.normal(size=t.size)
     theta = np.round(moved / step) * step
     theta = np.round(theta / file_step) * file_step if file_step else theta
-    told = rounding_step(theta)
+    told = rounding_step(theta, SENSORS)
     assert 2.0 * np.pi / told == pytest.approx(counts, rel=1e-9)
-    assert is_rounded(theta, told)
+    assert is_rounded(theta, told, SENSORS)
 
 
 def test_a_noisy_angle_has_no_step():
     theta = np.linspace(0.0, 9.0, 8000) + np.random.default_rng(2).normal(0.0, 1e-3, 8000)
-    assert rounding_step(theta) == 0.0
+    assert rounding_step(theta, SENSORS) == 0.0
 
 
 def test_the_floor_holds_what_coarse_rounding_really_does():

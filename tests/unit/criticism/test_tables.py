@@ -74,8 +74,8 @@ def test_cells_of_a_row_or_two_have_the_noise_of_their_neighbours(every):
 
 def test_orders_that_repeat_are_found_and_noise_adds_none():
     true = {5: 0.01, 12: 0.02, 30: 0.1}
-    assert holding_orders([held(true, 0.01)], (5, 6), DEFAULT.tables, 400) == (5, 12, 30)
-    assert holding_orders([held({}, 0.01)], (5, 6), DEFAULT.tables, 400) == ()
+    assert holding_orders([held(true, 0.01)], (5, 6), DEFAULT, 400) == (5, 12, 30)
+    assert holding_orders([held({}, 0.01)], (5, 6), DEFAULT, 400) == ()
 
 
 @pytest.mark.parametrize("sectors", [1, 2, 5])
@@ -85,13 +85,13 @@ def test_a_small_part_of_a_turn_tells_of_no_order(sectors):
     current = 0.05 + np.random.default_rng(1).normal(0.0, 0.01, theta.size)
     part = capture("holding_current", theta_mech_rad=theta, iq_a=current)
     assert set(cut("standing", part).blocks.tolist()) == set(range(sectors))
-    assert holding_orders([part], (5, 6), DEFAULT.tables, 400) == ()
+    assert holding_orders([part], (5, 6), DEFAULT, 400) == ()
 
 
 def test_held_out_sectors_expose_orders_that_only_fit():
     some = [held({30: 0.1}, 0.01)]
-    fitted, out = sector_errors(some, (30,), DEFAULT.tables)
-    many, trap = sector_errors(some, range(1, 200), DEFAULT.tables)
+    fitted, out = sector_errors(some, (30,), DEFAULT)
+    many, trap = sector_errors(some, range(1, 200), DEFAULT)
     assert out < 1.05 * fitted
     assert many < fitted
     assert trap > 3 * fitted

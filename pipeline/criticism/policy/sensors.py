@@ -1,0 +1,66 @@
+"""Constants of judgement of how noisy and how coarse a sensor is, from its own recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.records.policy import chosen, derived
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorNoise:
+    """White noise by third differences, and the step of a rounding."""
+
+    block: int = chosen(
+        48, "samples", "length of a block of third differences",
+        why="shorter ones scatter more, longer ones are seldom free of steps and bursts",
+    )  # fmt: skip
+    quiet: tuple[float, ...] = chosen(
+        (0.3, -0.5244), "1", "quantile over the blocks, and the normal variable's value there",
+        why="a low one, since steps and bursts only add",
+    )  # fmt: skip
+    steady: tuple[float, ...] = chosen(
+        (0.6, 0.2533), "1", "the same of an angle", why="its rounding comes and goes"
+    )
+    smooth: int = chosen(
+        21, "samples", "mean of a rounded signal that is rounded anew",
+        why="of a few it still is a stair, of many its bends are lost",
+    )  # fmt: skip
+    burst: float = chosen(
+        12.0, "1", "third difference over the median one that is a jump and not the rounding",
+        why="rounding alone comes to four",
+    )  # fmt: skip
+    together: float = derived(
+        0.5, "1", "coherence of the phase below which there is no step",
+        source="noise of 0.04 steps, added after the rounding, comes to it",
+    )  # fmt: skip
+    high: float = derived(
+        0.9, "1", "share of the highest coherence that a larger step needs to be preferred",
+        source="a peak at 1.5 steps has 0.82 at a slow steady speed",
+    )  # fmt: skip
+    snap_octaves: float = chosen(
+        0.06, "octaves", "distance within which a whole number of steps a turn is taken",
+        why="4 %; 2000 counts are 0.034 from 2048, which the coherence tells apart",
+    )  # fmt: skip
+    snap_loss: float = chosen(
+        0.01, "1", "coherence that it may lose", why="less than two neighbours differ by"
+    )
+    whole: float = chosen(
+        0.05, "steps", "distance from a whole number of steps that is none",
+        why="distances of no step come so near one time in ten",
+    )  # fmt: skip
+    mostly: float = chosen(
+        0.95, "1", "share of all distances that must be whole for a signal to have a resolution",
+        why="a few readings are averages",
+    )  # fmt: skip
+    undithered: float = derived(
+        0.45, "steps", "noise below which a rounding error follows the signal",
+        source="Widrow and Kollar, ch. 19: half a step makes it white",
+    )  # fmt: skip
+    moving: float = chosen(
+        16.0, "steps", "travel of an angle that may be in steps",
+        why="one that stands still is in step with anything",
+    )  # fmt: skip
+    in_step: float = chosen(
+        0.9, "1", "coherence that it then needs", why="noise of 0.07 steps comes to it"
+    )
