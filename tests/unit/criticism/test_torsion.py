@@ -99,7 +99,8 @@ def told(gap: float, softness: float, between: bool, seed: int = 1) -> Law | Non
                 U_TORQUE_NM,
                 one.good,
             )
-        ]
+        ],
+        DEFAULT.torsion,
     )
 
 
