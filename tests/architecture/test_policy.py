@@ -32,6 +32,7 @@ ARITHMETIC = {
     "discovery/residual_inputs.py": {"_WIDE"},  # no bound
     "machine/inverter.py": {"AXES", "_OTHERS", "_ROUNDS", "_SHARP"},  # three legs; an iteration
     "machine/model.py": {"BASE", "_STEP"},  # a centre of ±1/12; a complex step
+    "machine/two_masses.py": {"LINEAR_COUPLING"},  # sizes that an effect states for itself
     "regression/bounds.py": {"_AT"},  # rounding
     "regression/fit.py": {"_SEED"},
     "regression/goodness.py": {"_MOST_BLOCKS"},  # numbers that are apart
