@@ -8,6 +8,7 @@ from pipeline.api.models import Comparisons as Comparisons
 from pipeline.api.models import Diagnoses as Diagnoses
 from pipeline.api.models import compare as compare
 from pipeline.api.models import diagnose as diagnose
+from pipeline.api.performance import operate as operate
 from pipeline.api.recordings import Recordings as Recordings
 from pipeline.api.recordings import read as read
 from pipeline.api.simulated import simulate as simulate
@@ -24,6 +25,7 @@ __all__ = [
     "diagnose",
     "fit",
     "load",
+    "operate",
     "read",
     "simulate",
 ]

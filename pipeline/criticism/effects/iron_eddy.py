@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.criticism.effect import Array, Complex, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.iron import loss_current
+from pipeline.criticism.machine.iron import PARALLEL, loss_current
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -34,15 +34,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("drag_nm", "N·m", 0.02, 0.002, "torque_nm", low=0.0, high=1.0),
         Parameter("excess_nm", "N·m", 0.01, 0.002, "torque_nm", low=0.0, high=1.0, optional=1),
-        Parameter(
-            "parallel",
-            "1",
-            1.0,
-            0.0,
-            scan=(1.0, 0.0),
-            choice=True,
-            words="1: the winding feeds the loss, 0: the shaft alone does",
-        ),
+        PARALLEL,
     ),
     signals=("torque_shaft_nm",),
     rivals={

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.criticism.effect import Array, Complex, Operating
+from pipeline.criticism.effect import Array, Complex, Operating, Parameter
+
+PARALLEL = Parameter(
+    "parallel",
+    "1",
+    1.0,
+    0.0,
+    scan=(1.0, 0.0),
+    choice=True,
+    words="1: the winding feeds the loss, 0: the shaft alone does",
+)
+"""Parameter of an iron loss by which `loss_current` counts."""
 
 
 def loss_current(x: Operating, drag_nm: Array) -> Complex:

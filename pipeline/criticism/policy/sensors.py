@@ -40,7 +40,7 @@ class SensorNoise:
     )  # fmt: skip
     snap_octaves: float = chosen(
         0.06, "octaves", "distance within which a whole number of steps a turn is taken",
-        why="4 %; 2000 counts are 0.034 from 2048, which the coherence tells apart",
+        why="4 %; 2000 counts are 0.034 from 2048, which the coherence separates",
     )  # fmt: skip
     snap_loss: float = chosen(
         0.01, "1", "coherence that it may lose", why="less than two neighbours differ by"
