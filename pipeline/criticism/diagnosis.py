@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from scipy.special import gammaincc
@@ -22,6 +22,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
     HeldOut,
     over_floor,
+    predicted_chi2,
 )
 from pipeline.criticism.regression.identifiability import against_stated, reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -31,6 +32,7 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
 from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
+from pipeline.criticism.selection.one_capture import only_capture
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
@@ -58,6 +60,10 @@ TOO_LITTLE = (
 _STATELESS = (
     "no state of the machine predicts what is left in captures it was not fitted to: see the "
     "remainder, and whether anything was changed between the captures"
+)
+_ALONE = (
+    "{} rests on {} alone: predicted from the others, the other captures that it moves do not gain "
+    "with it; record that test once more"
 )
 _AGAINST = "captures speak against it: see the note"
 _GUESS = "takes some of what is left, but too little to be named beside what nothing explains"
@@ -114,6 +120,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
             *end.notes,
             *_together(together, ladder.steps[-1].added),
             *(note for note in ladder.cut.values() if note),
+            *_rests_on_one(ladder),
             *((_STATELESS,) if stateless else ()),
             *ladder.held[0].notes,
         ),
@@ -136,6 +143,20 @@ def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[Ladd
         replace(one, signature=shown)
         for one, shown in zip(records, [None, *signatures], strict=True)
     )
+
+
+def _rests_on_one(ladder: Ladder) -> Iterator[str]:
+    """Notes of the effects that one capture alone asks for, of those that others could show."""
+    for n in range(1, len(ladder.steps)):
+        before, step = ladder.steps[n - 1].system, ladder.steps[n]
+        without, after = (
+            predicted_chi2(system, held)
+            for system, held in ((before, ladder.held[n - 1]), (step.system, ladder.held[n]))
+        )
+        capture = only_capture(step.system, without, after)
+        name = step.fit.model.effects[-1].name
+        if capture is not None and name in ladder.steps[-1].added:
+            yield _ALONE.format(name, capture)
 
 
 def _together(known: Sequence[KnownCombination], added: Sequence[str]) -> tuple[str, ...]:

@@ -1,0 +1,65 @@
+"""Whether an effect is confirmed by more than the one capture that asks for it.
+
+A capture held out in turn is predicted by an effect that the others have fitted. One capture may
+gain so much that the sum gains, while every other that the effect moves is predicted worse or as
+before: such an effect takes up what that capture alone has.
+
+Reference: Stone, J. R. Stat. Soc. B 36 (1974) 111, doi:10.1111/j.2517-6161.1974.tb00994.x
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.linear_system import LinearSystem
+
+
+def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None:
+    """The capture that alone asks for the newest effect, though others could show it.
+
+    Parameters
+    ----------
+    tried
+        Around the fit with the effect.
+    before, after
+        χ²/n [G] of captures predicted from the others, without and with it.
+
+    Returns
+    -------
+    str or None
+        Its path, if of the captures that the effect moves by more than a `tie` of deviance those
+        beside the one that gains most do not gain in sum, in the groups that it acts on. An effect
+        that moves no other capture cannot be confirmed there: None.
+
+    Notes
+    -----
+    What an effect moves is its part of the residual that the other parameters do not absorb.
+
+    """
+    fit = tried.fit
+    name = f"{fit.model.effects[-1].name}."
+    known = fit.model.parameters()
+    own = [n for n, c in enumerate(tried.columns) if c.name.startswith(name)]
+    own = [n for n in own if known[tried.columns[n].name][1].amplitude]
+    others = np.setdiff1d(tried.own, own)
+    size = np.array([fit.values[tried.columns[n].name] for n in own])
+    weight = np.sqrt(tried.weights(np.maximum(before, after)))
+    moved = weight * (tried.matrix[:, own] @ size)
+    beside = tried.matrix[:, others] * weight[:, None]
+    scale = np.maximum(np.sqrt((beside**2).sum(axis=0)), 1e-300)
+    moved = moved - beside / scale @ np.linalg.lstsq(beside / scale, moved, rcond=1e-9)[0]
+    paths = [segment.capture for segment in tried.segments]
+    names = list(dict.fromkeys(paths))
+    of_group = np.array([names.index(paths[number]) for number, _, _ in tried.labels])
+    power = np.bincount(of_group[tried.group], moved**2, len(names))
+    was, now = (
+        tried.counts * (np.log(np.maximum(q, 1.0)) + np.minimum(q, 1.0)) for q in (before, after)
+    )
+    acts = np.bincount(tried.group, np.any(tried.matrix[:, own], axis=1), len(tried.labels)) > 0
+    gain = np.bincount(of_group[acts], (was - now)[acts], len(names))
+    could = power > fit.policy.selection.tie
+    most = int(np.argmax(gain))
+    could[most] = False
+    alone = bool(could.any()) and float(gain[could].sum()) <= 0.0
+    return names[most] if alone else None

@@ -1,0 +1,63 @@
+"""An effect that one capture alone asks for, where others could show it, and which one that is."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.policy.policy import DEFAULT
+from pipeline.criticism.selection.one_capture import only_capture
+
+ROWS = 40
+
+
+def system(moves, absorbed=False):
+    """Four captures of one group each; the effect moves each by that many noises a row, and if
+    `absorbed`, as another parameter does.
+    """
+    rng = np.random.default_rng(3)
+    group = np.repeat(np.arange(4), ROWS)
+    shape = rng.choice([-1.0, 1.0], group.size)
+    column = shape * np.array(moves, dtype=float)[group]
+    other = column * 2.0 if absorbed else rng.normal(size=group.size)
+    known = {"windage.drag_nm": (None, SimpleNamespace(amplitude=True))}
+    model = SimpleNamespace(effects=[SimpleNamespace(name="windage")], parameters=lambda: known)
+    names = ("b_nm_s_rad", "windage.drag_nm")
+    return SimpleNamespace(
+        fit=SimpleNamespace(model=model, values={"windage.drag_nm": 0.5}, policy=DEFAULT),
+        columns=[SimpleNamespace(name=name) for name in names],
+        matrix=np.column_stack([other, column / 0.5]),
+        own=np.arange(2),
+        group=group,
+        labels=[(n, "torque_shaft_nm", 0) for n in range(4)],
+        segments=[SimpleNamespace(capture=f"drive_{n}") for n in range(4)],
+        counts=np.full(4, float(ROWS)),
+        weights=lambda chi2: (1.0 / np.maximum(chi2, 1.0))[group],
+    )
+
+
+LARGE = np.array([40.0, 2.0, 2.0, 1.0])
+
+
+@pytest.mark.parametrize("others", [(2.0, 2.0), (2.3, 2.1), (2.4, 1.9)])
+def test_one_capture_gains_and_the_others_do_not(others):
+    after = np.array([4.0, *others, 1.0])
+    assert only_capture(system([3.0, 1.5, 1.5, 0.0]), LARGE, after) == "drive_0"
+
+
+@pytest.mark.parametrize("others", [(1.2, 2.0), (1.4, 2.1)])
+def test_another_capture_confirms_it(others):
+    after = np.array([4.0, *others, 1.0])
+    assert only_capture(system([3.0, 1.5, 1.5, 0.0]), LARGE, after) is None
+
+
+def test_no_other_capture_could_show_it():
+    after = np.array([4.0, 2.1, 2.1, 1.0])
+    assert only_capture(system([3.0, 0.0, 0.05, 0.0]), LARGE, after) is None
+
+
+def test_what_another_parameter_absorbs_moves_nothing():
+    after = np.array([4.0, 2.1, 2.1, 1.0])
+    assert only_capture(system([3.0, 1.5, 1.5, 0.0], absorbed=True), LARGE, after) is None
