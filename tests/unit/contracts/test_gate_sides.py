@@ -18,7 +18,7 @@ from pipeline.contracts.validate import _slow_columns
 from pipeline.physics.glossary import COLUMNS, METADATA
 from pipeline.records.capture import Campaign, CaptureMeta
 from pipeline.records.errors import CaptureError
-from tests.unit.contracts.test_gate_limits import GATES, TURN, capture, said, step
+from tests.unit.contracts.test_gate_limits import GATES, TURN, capture, noise, said, step
 
 OPTIONS = {name: GATES[name].options for name in GATES}
 
@@ -208,6 +208,23 @@ def test_the_coldest_twentieth_is_left_aside(share: float, expected: str) -> Non
     values = np.where(np.arange(2000) < round(share * 2000), 20.0, 290.0)
     made = capture("resistance", temp_winding_degc=values, meta={"ambient_degc": 20.0})
     assert said("temperature_unit", made) == expected
+
+
+@pytest.mark.parametrize(("rise", "expected"), [(4.9, "warned"), (5.1, "")])
+def test_a_rise_is_counted_less_two_of_the_thermometers_noise(rise: float, expected: str) -> None:
+    ramp, low, high = np.linspace(0.0, 1.0, 1000), 0.0, 20.0
+
+    def counted(values: np.ndarray) -> float:
+        return float(np.ptp(values)) - 2.0 * waveform.noise_of(values)
+
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        values = 0.5 * noise(1000) + middle * ramp
+        low, high = (middle, high) if counted(values) < rise else (low, middle)
+    assert counted(values) == pytest.approx(rise, abs=1e-4)
+    assert waveform.noise_of(values) == pytest.approx(0.5, rel=0.02)
+    made = capture("heat_run", iq_a=5.0, id_a=0.0, temp_winding_degc=25.0 + values)
+    assert said("current_coverage", made) == expected
 
 
 @pytest.mark.parametrize(
