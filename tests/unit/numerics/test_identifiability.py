@@ -173,3 +173,16 @@ def test_a_walk_moves_nothing_that_is_left_out_of_its_direction():
     ratios = known_combinations(found, COAST, [0, 1, 2], [0])
     up, down = (there for _, there in walked(found, COAST, ratios, math.log(3.0)))
     assert up * down == pytest.approx(COAST**2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("slope", "sizes", "size"), [
+    (2.0, (1.0, 10.0), 20.0), (0.5, (3.0, 4.0), 3.0), (-2.0, (1.0, 1.0), 2.0),
+])  # fmt: skip
+def test_a_sum_matters_at_the_larger_of_its_terms(slope, sizes, size):
+    """Only x + w y is seen: its size is that of x, or w times that of y."""
+    found = identify(np.array([[1.0, slope], [2.0, 2.0 * slope]]), np.array(sizes))
+    (one,) = known_combinations(found, np.array([0.3, 0.2]), [0, 1], [])
+    assert (one.product, one.weights) == (False, ((0, 1.0), (1, pytest.approx(slope))))
+    assert one.size == pytest.approx(size)
+    assert one.value == pytest.approx(0.3 + 0.2 * slope)
+    assert one.u == pytest.approx(1.0 / math.sqrt(5.0))
