@@ -106,12 +106,12 @@ PACKAGES = {
         ),
         Package("records", ("pipeline/records/*.py",), ("tests/unit/records",)),
         Package("export", ("pipeline/export/**/*.py",), ("tests/unit/export",)),
-        Package("report", ("pipeline/report/*.py",), ("tests/unit/report",)),
-        Package("views", ("pipeline/views/*.py",), ("tests/unit/views", "tests/unit/report")),
+        Package("report", ("pipeline/report/**/*.py",), ("tests/unit/report",)),
+        Package("views", ("pipeline/views/**/*.py",), ("tests/unit/views", "tests/unit/report")),
         Package("simulator", ("pipeline/simulator/*.py",), ("tests/unit/simulator",)),
         Package("api", ("pipeline/api/*.py",), ("tests/unit/api",)),
         Package("calculators", ("pipeline/calculators/*.py",), ("tests/unit/stages/test_calc.py",)),
-        Package("execution", ("pipeline/execution/*.py",), ("tests/unit/stages",)),
+        Package("execution", ("pipeline/execution/**/*.py",), ("tests/unit/stages",)),
         Package("stages", ("pipeline/stages/**/*.py",), ("tests/unit/stages", "tests/unit/cli")),
     )
 }
