@@ -37,9 +37,13 @@ class QLog:
 
 
 def q_log(capture: Capture, machine: Machine) -> QLog | None:
-    """The log of a drive that lacks a voltage or the d current; None of any other."""
+    """The log of a drive that lacks a voltage or the d current; None of any other.
+
+    A heat run without a record of its motion is at rest.
+    """
     moving = [name for name in _MOTION if capture.has(name)]
-    if capture.has("vd_v", "vq_v", "id_a", "iq_a") or not moving:
+    unknown = not moving and capture.meta.test != "heat_run"
+    if capture.has("vd_v", "vq_v", "id_a", "iq_a") or unknown:
         return None
     there = tuple(name for name in _ELECTRICAL if capture.has(name))
     period, found, keep = even_clock(capture, (*there, *moving), machine.policy.cutting)

@@ -100,7 +100,7 @@ def _recorded_speed(segment: Segment, x: Operating, model: Model, values: Values
 EQUATION = Equation(
     name="q",
     words="v_q = Im(R i + drops + dψ/dt + j ω_e ψ)",
-    tests=("drive",),
+    tests=("drive", "heat_run"),
     columns=("t_s", "vq_v", "iq_a"),
     channels=(Channel("vq_v", "voltage_v"), Channel(SPEED, "speed_rad_s")),
     cut=cut,

@@ -102,3 +102,17 @@ def test_coasts_ask_for_no_pole_pairs():
     assert holds(together[f"{DRY_NAME}/j_kgm2"], DRY / J)
     turned = recorded(("drive", {}), keep=("iq_a", "vq_v", "theta_mech_rad"))
     assert "pole pairs" in compared(turned).notes[0]
+
+
+def test_a_heat_run_of_one_axis_has_the_resistance_and_its_coefficient():
+    """At rest the axes are alike, so what d was driven with stands for q."""
+    log = recorded(("heat_run", {}), keep=("id_a", "vd_v", "temp_winding_degc"), **PAIRS)
+    (whole,) = log.campaigns.values()
+    (one,) = whole.captures
+    named = {"id_a": "iq_a", "vd_v": "vq_v"}
+    one = replace(one, tables=tuple(t.rename(named, strict=False) for t in one.tables))
+    turned = replace(log, campaigns={whole.motor_id: replace(whole, captures=(one,))})
+    told = compared(turned).parameters
+    assert holds(told["r_ohm"], TRUE["r_phase_ohm"])
+    assert holds(told["copper_temperature.alpha_1_k"], TRUE["temp_coeff_copper_1_k"])
+    assert told["r_ohm"].u < 0.02 * TRUE["r_phase_ohm"]
