@@ -1,7 +1,7 @@
 """Effects of a datasheet as tables that other programs interpolate.
 
 An effect is evaluated, not rewritten: its own hooks are asked on a grid of whatever they turn out
-to depend on. So an effect of the user's has tables as well as one of ours.
+to depend on. An effect of the user's is not in the library, and has no table.
 """
 
 from __future__ import annotations
