@@ -31,8 +31,7 @@ def results(bench: Path, output: Path, workers: int, **environment: str) -> dict
         capture_output=True,
         text=True,
     )
-    # 4: a motor of which too little was recorded for any check
-    assert done.returncode in (0, 1, 4), done.stderr
+    assert done.returncode in (0, 1), done.stderr
     return {
         path.relative_to(output).as_posix(): path.read_bytes()
         for path in sorted(output.rglob("*"))
@@ -40,18 +39,12 @@ def results(bench: Path, output: Path, workers: int, **environment: str) -> dict
     }
 
 
-SHORT = ("resistance", "lcr", "open_circuit")
-
-
 def two_of_a_test(bench: Path, folder: Path) -> Path:
-    """A folder with two captures of a test, the first and the last: of each test of one motor, of
-    three of the other, whose search for missing effects is short.
-    """
-    for motor, tests in (("one", ("",)), ("two", SHORT)):
+    """A folder with two captures of each test of both motors, the first and the last."""
+    for motor in ("one", "two"):
         by_test: dict[str, list[Path]] = {}
         for path in sorted((bench / motor).iterdir()):
-            if path.name.startswith(tests):
-                by_test.setdefault(path.name.split("_")[0], []).append(path)
+            by_test.setdefault(path.name.split("_")[0], []).append(path)
         (folder / motor).mkdir(parents=True)
         for found in by_test.values():
             for path in {found[0], found[-1]}:
