@@ -47,8 +47,15 @@ def _terminals(pair: str) -> tuple[Alternative, ...]:
     return tuple((f"v{pair}_v", f"i{phase}_a") for phase in pair)
 
 
-TWO_LINE_VOLTAGES = Requirement(
-    tuple(combinations(LINE_VOLTAGES, 2)), "two of vab_v, vbc_v and vca_v"
+PHASE_VOLTAGES = ("va_v", "vb_v", "vc_v")
+TERMINAL_VOLTAGES = Requirement(
+    (
+        *combinations(LINE_VOLTAGES, 2),
+        *((name,) for name in LINE_VOLTAGES),
+        *combinations(PHASE_VOLTAGES, 2),
+        *((name,) for name in PHASE_VOLTAGES),
+    ),
+    "vab_v or another voltage between two terminals or of a phase",
 )
 DQ = ("vd_v", "vq_v", "id_a", "iq_a")
 
@@ -56,11 +63,17 @@ _FIXED: dict[str, tuple[Requirement, ...]] = {
     "resistance": _all("temp_winding_degc"),
     "current_step": (),
     "lcr": _all("theta_elec_deg", "lab_h"),
-    "open_circuit": (TWO_LINE_VOLTAGES, _any("theta_mech_rad", "omega_mech_rad_s")),
+    "open_circuit": (TERMINAL_VOLTAGES,),
     "hand_turn": (_any(*LINE_VOLTAGES),),
     "cogging": _all("theta_mech_rad", "torque_shaft_nm"),
-    "torque_map": _all(*DQ, "omega_mech_rad_s", "torque_shaft_nm"),
-    "spin_down": _all("omega_mech_rad_s"),
+    "torque_map": (
+        Requirement(
+            ((*DQ, "torque_shaft_nm"), ("iq_a", "torque_shaft_nm"), DQ, ("vq_v", "iq_a")),
+            "iq_a, and torque_shaft_nm or vq_v",
+        ),
+        _any("omega_mech_rad_s", "theta_mech_rad", "theta_elec_rad"),
+    ),
+    "spin_down": (_any("omega_mech_rad_s", "theta_mech_rad"),),
     "heat_run": _all("temp_winding_degc"),
     "holding_current": _all("theta_mech_rad", "iq_a"),
     "flux_map": (

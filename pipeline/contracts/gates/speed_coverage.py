@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.rotation import TURN_RAD, turned_rad
@@ -19,9 +20,10 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     Notes
     -----
-    Spin-down: the median speed of the fastest tenth of the record over that of the last tenth;
-    below `fall` [1] refuses, for Coulomb and viscous friction cannot be separated then. Torque map
-    and drive: less than `turns` [1] of travel warns.
+    Spin-down: the median speed of the fastest tenth of the record over that of the last tenth (by
+    the travel of an angle where no speed is there); below `fall` [1] refuses, for Coulomb and
+    viscous friction cannot be separated then. Torque map and drive: less than `turns` [1] of travel
+    warns.
 
     """
     if capture.meta.test == "spin_down":
@@ -38,11 +40,8 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _coast(capture: Capture, options: Mapping[str, float]) -> Passed:
-    speed = np.abs(capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"])
-    speed = speed[np.isfinite(speed)]
-    tenth = max(1, speed.size // 10)
-    top = max(float(np.median(part)) for part in np.array_split(speed, min(10, speed.size)))
-    end = float(np.median(speed[-tenth:]))
+    speeds = _speeds_of_tenths(capture)
+    top, end = float(np.max(speeds)), float(speeds[-1])
     if end * options["fall"] <= top and top > 0.0:
         return Passed()
     raise CaptureError(
@@ -51,6 +50,23 @@ def _coast(capture: Capture, options: Mapping[str, float]) -> Passed:
         "Coulomb from viscous friction",
         f"let it coast with open terminals to below 1/{options['fall']:g} of its speed",
     )
+
+
+def _speeds_of_tenths(capture: Capture) -> NDArray[np.float64]:
+    """Speed [10 or fewer, rad/s] of each tenth of a record: its median, or by the angle's travel.
+
+    Fewer than ten rows have a tenth each.
+    """
+    column = "omega_mech_rad_s" if capture.has("omega_mech_rad_s") else "theta_mech_rad"
+    data = capture.arrays("t_s", column)
+    fine = np.isfinite(data["t_s"]) & np.isfinite(data[column])
+    t_s, values = data["t_s"][fine], data[column][fine]
+    if column == "theta_mech_rad":
+        ends = np.linspace(0, max(t_s.size - 1, 0), min(11, t_s.size)).round().astype(int)
+        travel, took = np.diff(values[ends]), np.diff(t_s[ends])
+        return np.abs(travel / took) if ends.size > 1 else np.zeros(1)
+    parts = np.array_split(np.abs(values), min(10, max(values.size, 1)))
+    return np.array([float(np.median(part)) if part.size else 0.0 for part in parts])
 
 
 GATE = Gate(

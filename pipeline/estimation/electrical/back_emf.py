@@ -52,6 +52,9 @@ class Spin:
     def vector_v(self, centred: bool = True) -> Complex:
         """The space vector of the voltages, by least squares over the channels.
 
+        One voltage alone gives the vector of a rotor that turns in the positive sense: the part of
+        its spectrum at positive frequencies (analytic signal).
+
         Parameters
         ----------
         centred
@@ -65,18 +68,36 @@ class Spin:
         Raises
         ------
         ValueError
-            There are fewer than two independent channels.
+            There are several channels, none independent of the others.
+
+        References
+        ----------
+        Gabor, J. IEE 93(26), 1946, 429, doi:10.1049/ji-3-2.1946.0074 (analytic signal).
 
         """
+        if len(self.channels) == 1:
+            (only,) = self.channels
+            wave = _analytic(self.t_s, only.v_v) / only.gain * np.exp(1j * only.angle_rad)
+            return wave + (0.0 if centred else np.mean(only.v_v) / only.gain)
         rows = np.array([c.gain * np.exp(1j * c.angle_rad) for c in self.channels])
         design = np.column_stack([rows.real, rows.imag])
         if np.linalg.matrix_rank(design, tol=1e-6) < 2:
-            raise ValueError("one voltage makes no space vector")
+            raise ValueError("the voltages are multiples of one another")
         inverse = np.linalg.pinv(design)
         vector: Complex = np.zeros(self.t_s.size, dtype=np.complex128)
         for weight, channel in zip((inverse[0] + 1j * inverse[1]), self.channels, strict=True):
             vector += weight * (channel.v_v - (np.mean(channel.v_v) if centred else 0.0))
         return vector
+
+
+def _analytic(t_s: Array, values: Array) -> Complex:
+    """The analytic signal [n] of samples less their mean, by way of an even clock."""
+    from scipy.signal import hilbert
+
+    even = np.linspace(t_s[0], t_s[-1], t_s.size)
+    found = hilbert(np.interp(even, t_s, values - np.mean(values)))
+    signal: Complex = np.interp(t_s, even, found.real) + 1j * np.interp(t_s, even, found.imag)
+    return signal
 
 
 def read_spin(capture: Capture, temp_column: str | None) -> Spin:
@@ -312,8 +333,8 @@ class StretchFlux:
 def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
     """Psi and harmonics of one stretch by least squares over the raw channels.
 
-    v = omega sum_k c_k e^{j k phase}, k = 1, its mirror -1 (unequal gains) and -5, 7, -11, 13 ...,
-    and an offset a channel; psi = |c_1|. Orders beyond the sampling rate are left out. The
+    v = omega sum_k c_k e^{j k phase}, k = 1, its mirror -1 (unequal gains, where several voltages
+    are there) and -5, 7, -11, 13 ..., and an offset a channel; psi = |c_1|. Orders beyond the sampling rate are left out. The
     standard error counts correlated residuals by their autocorrelation time.
 
     Parameters
@@ -332,7 +353,8 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
 
     """
     step = float(np.median(np.abs(np.diff(stretch.phase_rad))))
-    ranks = [1, -1] + [k if k % 6 == 1 else -k for k in orders if k * step < 0.8 * math.pi]
+    mirror = [-1] if len(spin.channels) > 1 else []
+    ranks = [1, *mirror] + [k if k % 6 == 1 else -k for k in orders if k * step < 0.8 * math.pi]
     omega = np.abs(stretch.omega_elec_rad_s)
     waves = [omega * np.exp(1j * k * stretch.phase_rad) for k in ranks]
     width = 2 * len(ranks)

@@ -48,6 +48,7 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
 
     """
     ratios: list[float] = []
+    senses: set[int] = set()
     words = ""
     paths = []
     for capture in dict.fromkeys(g.capture.path for g in groups):
@@ -56,6 +57,8 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
         if math.isfinite(ratio):
             ratios.append(ratio)
             paths.append(capture)
+            if len(own[0].spin.channels) > 1:
+                senses.add(1 if ratio > 0.0 else -1)
             words = "theta_mech_rad" if by_angle else "omega_mech_rad_s"
     missing = (
         "record theta_mech_rad or omega_mech_rad_s in the open_circuit capture, or a hand_turn"
@@ -74,7 +77,9 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
         worst = max(abs(abs(r) - counts[0]) for r in ratios)
         note = f"electrical cycles a turn of {words}: {found}; {worst:.1g} from the whole number"
         pairs = method.measured("pole_pairs", counts[0], captures=paths, notes=note)
-    senses = {1 if r > 0.0 else -1 for r in ratios}
+    if not senses:
+        note = "one voltage does not tell it; record two line voltages in the open_circuit capture"
+        return pairs, method.missing("phase_order", note)
     if len(senses) > 1:
         note = "captures disagree on the phase order; check which leads were exchanged"
         return pairs, method.missing("phase_order", note)

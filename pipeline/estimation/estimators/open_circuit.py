@@ -137,7 +137,7 @@ def _groups(
             spin = read_spin(capture, column)
             stretches = steady_stretches(spin, options["speed_change"])
         except (KeyError, ValueError):
-            notes.append(f"{capture.path}: needs two line voltages")
+            notes.append(f"{capture.path}: needs a line voltage")
             continue
         if not stretches:
             least = policy().back_emf.least_cycles

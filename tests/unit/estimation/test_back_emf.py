@@ -60,6 +60,25 @@ def test_flux_and_harmonics_with_an_eccentric_encoder():
     assert found["psi_pm_wb"].u_b == pytest.approx(4e-3 * math.hypot(0.001, 0.0011 * 0.5), rel=0.01)
 
 
+def test_one_channel_of_a_scope_gives_flux_and_harmonics_but_no_phase_order():
+    """One line voltage and no motion at all: flux and harmonics; with a speed pole pairs too."""
+    whole = spin_capture((60.0, 120.0))
+    table = whole.tables[0]
+    alone = replace(whole, tables=(table.select("t_s", "vab_v", "temp_magnet_degc"),))
+    found = estimates(open_circuit.ESTIMATOR, alone)
+    assert found["psi_pm_wb"].number == pytest.approx(4e-3, rel=2e-4)
+    assert found["bemf_harmonic_5"].number == pytest.approx(0.03, rel=5e-3)
+    assert found["bemf_harmonic_7"].number == pytest.approx(0.01, rel=1e-2)
+    assert found["pole_pairs"].value is None
+    speed = np.gradient(table["theta_mech_rad"].to_numpy(), table["t_s"].to_numpy())
+    turning = alone.tables[0].with_columns(omega_mech_rad_s=speed)
+    found = estimates(open_circuit.ESTIMATOR, replace(whole, tables=(turning,)))
+    assert found["pole_pairs"].value == 5
+    assert found["ke_phase_peak_v_s_rad"].number == pytest.approx(0.02, rel=2e-4)
+    assert found["phase_order"].value is None
+    assert "two line voltages" in found["phase_order"].note
+
+
 def test_exchanged_leads_are_seen_as_phase_order():
     found = estimates(open_circuit.ESTIMATOR, spin_capture((40.0, 120.0), swap=True))
     assert found["phase_order"].value == -1
