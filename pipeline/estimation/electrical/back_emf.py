@@ -334,8 +334,9 @@ def flux_of(spin: Spin, stretch: Stretch, orders: Sequence[int]) -> StretchFlux:
     """Psi and harmonics of one stretch by least squares over the raw channels.
 
     v = omega sum_k c_k e^{j k phase}, k = 1, its mirror -1 (unequal gains, where several voltages
-    are there) and -5, 7, -11, 13 ..., and an offset a channel; psi = |c_1|. Orders beyond the sampling rate are left out. The
-    standard error counts correlated residuals by their autocorrelation time.
+    are there) and -5, 7, -11, 13 ..., and an offset a channel; psi = |c_1|. Orders beyond the
+    sampling rate are left out. The standard error counts correlated residuals by their
+    autocorrelation time.
 
     Parameters
     ----------

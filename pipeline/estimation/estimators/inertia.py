@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from pipeline.estimation.electrical.magnet_temperature import (
     magnet_uncertainties,
 )
 from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.mechanical.coast_setups import Setup, coast_setups, setup_words
 from pipeline.estimation.mechanical.drag import (
     DRAG_FORMS,
     DragFit,
@@ -194,9 +195,13 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     drag curve left free, T = J (a_driven - a_coasting) at each speed.
     """
     torque = _torque(known)
+    setups = coast_setups(campaign.of("spin_down"))
+    if len(setups) > 1:
+        campaign = replace(campaign, captures=campaign.of("drive"))
     rows = _rows(known, campaign) if torque is not None else None
     if torque is None or rows is None or not np.any(rows.kind == DRIVE):
         missing = "a torque constant is not known" if torque is None else "no usable drive log"
+        missing = f"{missing}; {_parted(setups)}" if len(setups) > 1 else missing
         note = f"{missing}; {EXPERIMENT}"
         return METHOD.nothing(GIVES, note)
     nuisances = [*NUISANCES, *(n for n in rows.columns if n.startswith("order "))]
@@ -217,6 +222,9 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
         return METHOD.nothing(GIVES, f"{_of_no_torque(strange)}; {LOAD}")
     doubts = Doubts(strange, drag_disagreements(rows, found, options["level"]))
     estimates = _estimates(rows, torque, found, doubts, _left_out(rows, campaign))
+    if len(setups) > 1:
+        words = _parted(setups)
+        estimates = tuple(replace(e, note=f"{words}; {e.note}") for e in estimates)
     inertia = estimates[0]
     if inertia.known and inertia.u >= abs(inertia.number):
         estimates = METHOD.nothing(
@@ -226,6 +234,11 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
             f"torque_shaft_nm, else {EXPERIMENT}",
         ).estimates
     return Fit(estimates, _evidence(rows, y, found))
+
+
+def _parted(setups: Sequence[Setup]) -> str:
+    """Why coasts were not used, in words."""
+    return f"{setup_words(setups)}, so none is used beside the drives"
 
 
 def _rows(known: Constants, campaign: Campaign) -> ShaftRows | None:

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.estimation.mechanical.coast_setups import REMEDY, coast_setups, setup_words
 from pipeline.estimation.mechanical.drag import DRAG_FORMS, STRIBECK
 from pipeline.estimation.method import Method
 from pipeline.estimation.policy import policy
@@ -131,10 +132,30 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
 
     The trajectory is integrated, the record never differentiated; windage, Stribeck's bump and an
     eccentric encoder join where the residuals demand them. J is not in it: that needs a known
-    torque (estimator inertia).
+    torque (estimator inertia). Coasts of several set-ups (`coast_setups`) have no common value;
+    what each gives is in the note.
     """
     del known
-    coasts = [c for capture in campaign.of("spin_down") for c in _coasts(capture)]
+    captures = campaign.of("spin_down")
+    setups = coast_setups(captures)
+    if len(setups) > 1:
+        each = (_brief(_fit(setup.captures, options)) for setup in setups)
+        note = f"{setup_words(setups)}; in this order {' | '.join(each)}; {REMEDY}"
+        return METHOD.nothing(GIVES, note)
+    return _fit(captures, options)
+
+
+def _brief(found: Fit) -> str:
+    """Both constants of one set-up, in words."""
+    if not all(e.known for e in found.estimates):
+        return "nothing by itself"
+    words = (f"{e.name} {e.number:.5g} ± {e.u:.2g} {e.unit}" for e in found.estimates)
+    return ", ".join(words)
+
+
+def _fit(captures: Sequence[Capture], options: Mapping[str, float]) -> Fit:
+    """T_c/J and B/J of coasts of one set-up."""
+    coasts = [c for capture in captures for c in _coasts(capture)]
     if not coasts:
         return METHOD.nothing(
             GIVES, f"no coast-down of {LEAST_SAMPLES} samples or more; {EXPERIMENT}"

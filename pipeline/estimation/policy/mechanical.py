@@ -111,6 +111,20 @@ class CoastDown:
         3, "1", "terms that may join a coast-down at a time",
         why="one of drag and two of an eccentric encoder",
     )  # fmt: skip
+    setup_share: float = chosen(
+        0.2, unit="1", meaning="difference of two files' decelerations, of their mean, above which "
+        "they are of two set-ups",
+        why="by judgement: grease changes a coast by a tenth from cold to warm, a chain by more",
+    )  # fmt: skip
+    setup_top: float = chosen(
+        0.95, unit="1", meaning="of the lower top speed of two coasts, from which on they are "
+        "compared",
+        why="by judgement: the smoothed speed of the first moments is of the driven shaft too",
+    )  # fmt: skip
+    setup_least: float = chosen(
+        0.2, unit="1", meaning="of the speed that two coasts have to have in common",
+        why="by judgement: the noise of a smoothed speed is a hundredth of that",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
