@@ -105,7 +105,9 @@ def rows_of_runs(size: int, starts: NDArray[np.int64], lengths: NDArray[np.int64
     return np.cumsum(edges[:-1]) > 0
 
 
-def gaps_of(t_s: Array, factor: float) -> tuple[NDArray[np.int64], float]:
+def gaps_of(
+    t_s: Array, factor: float, pause_s: float | None = None
+) -> tuple[NDArray[np.int64], float]:
     """Gaps of a clock.
 
     Parameters
@@ -114,6 +116,8 @@ def gaps_of(t_s: Array, factor: float) -> tuple[NDArray[np.int64], float]:
         Instants [n, s].
     factor
         Median intervals beyond which an interval is a gap [1].
+    pause_s
+        Interval beyond which it is none but a pause of the recorder [s]; None where it had none.
 
     Returns
     -------
@@ -133,7 +137,8 @@ def gaps_of(t_s: Array, factor: float) -> tuple[NDArray[np.int64], float]:
     if steps.size == 0:
         return np.empty(0, dtype=np.int64), math.nan
     usual = float(np.median(steps))
-    return np.flatnonzero(steps > factor * usual).astype(np.int64), usual
+    longest = math.inf if pause_s is None else pause_s
+    return np.flatnonzero((steps > factor * usual) & (steps <= longest)).astype(np.int64), usual
 
 
 def missing_samples(t_s: Array, gaps: NDArray[np.int64], usual_s: float) -> float:

@@ -169,6 +169,8 @@ def _metadata() -> Iterable[Term]:
     yield number("u_temp_degc", "degC", words, 0, 100)
     words = "relative standard uncertainty of the time base of t_s; 1e-4 where not stated"
     yield number("u_rel_clock", "1", words, 0, 1)
+    words = "the recorder paused where its clock steps by more: no sample is missing there"
+    yield number("pause_s", "s", words, 0.0, 1e6)
     yield text("sha256_rows", "HEX/ROWS over the rows of a CSV")
 
 

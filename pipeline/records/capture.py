@@ -60,6 +60,7 @@ class CaptureMeta:
     u_rel_torque: float | None = None
     u_temp_degc: float | None = None
     u_rel_clock: float | None = None
+    pause_s: float | None = None
     sha256_rows: str | None = None
     extra: Mapping[str, str] = field(default_factory=dict)
 

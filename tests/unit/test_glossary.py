@@ -45,7 +45,7 @@ ambient_degc pair theta_elec_deg voltage_kind voltage_timing pwm_hz vdc_v u_rel_
 u_rel_voltage u_rel_torque u_temp_degc sha256_rows
 """)
 
-OWN_METADATA = _words("u_rel_clock")
+OWN_METADATA = _words("u_rel_clock pause_s")
 """Keys that the contract keeps as others, and this project reads."""
 
 CONTRACT_TESTS = _words("""

@@ -24,7 +24,9 @@ WITNESSES = {
     "heat_run": ("temp_winding_degc", "theta_mech_rad"),
 }
 GAPS_LOOKED_AT = 200
-REMEDY = "fix the logger's clock, or cut the file at that row"
+REMEDY = (
+    "fix the logger's clock, or cut the file at that row; state `pause_s` where the recorder paused"
+)
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -44,7 +46,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         if "t_s" not in table.columns or table.height < 3:
             continue
         t_s = table["t_s"].to_numpy()
-        gaps, usual_s = gaps_of(t_s, options["gap_intervals"])
+        gaps, usual_s = gaps_of(t_s, options["gap_intervals"], capture.meta.pause_s)
         left_s = capture.meta.instrument_u("u_rel_clock") * float(t_s[-1] - t_s[0])
         names = [n for n in WITNESSES[capture.meta.test] if n in table.columns]
         for gap in gaps[:GAPS_LOOKED_AT]:

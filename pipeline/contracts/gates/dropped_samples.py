@@ -26,7 +26,10 @@ TESTS = (
     "heat_run",
     "drive",
 )
-REMEDY = "record again with a logger that keeps up, or at a lower rate"
+REMEDY = (
+    "record again with a logger that keeps up, or at a lower rate; state `pause_s` where the "
+    "recorder paused"
+)
 
 
 def check(capture: Capture, options: Mapping[str, float]) -> Passed:
@@ -35,9 +38,9 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     Notes
     -----
     Lost are Σ (gap/interval − 1) samples over the gaps that are longer than `gap_intervals` [1]
-    median intervals, less what a hurried clock made up for. A share above `refuse_share` [1]
-    refuses; so does a gap of a current step in which the current changes by more than `edge_share`
-    [1] of its range.
+    median intervals and no pauses (`pause_s`), less what a hurried clock made up for. A share
+    above `refuse_share` [1] refuses; so does a gap of a current step in which the current changes
+    by more than `edge_share` [1] of its range.
 
     """
     findings: list[Finding] = []
@@ -45,7 +48,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
         if table.height < 3 or "t_s" not in table.columns:
             continue
         t_s = table["t_s"].to_numpy()
-        gaps, usual_s = gaps_of(t_s, options["gap_intervals"])
+        gaps, usual_s = gaps_of(t_s, options["gap_intervals"], capture.meta.pause_s)
         lost = missing_samples(t_s, gaps, usual_s)
         if lost < 0.5:
             continue

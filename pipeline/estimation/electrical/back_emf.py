@@ -77,8 +77,10 @@ class Spin:
         """
         if len(self.channels) == 1:
             (only,) = self.channels
-            wave = _analytic(self.t_s, only.v_v) / only.gain * np.exp(1j * only.angle_rad)
-            return wave + (0.0 if centred else np.mean(only.v_v) / only.gain)
+            mean = 0.0 if centred else float(np.mean(only.v_v))
+            turn = np.exp(1j * only.angle_rad) / only.gain
+            wave: Complex = (_analytic(self.t_s, only.v_v) + mean) * turn
+            return wave
         rows = np.array([c.gain * np.exp(1j * c.angle_rad) for c in self.channels])
         design = np.column_stack([rows.real, rows.imag])
         if np.linalg.matrix_rank(design, tol=1e-6) < 2:

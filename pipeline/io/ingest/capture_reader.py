@@ -38,6 +38,9 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     if hashlib.sha256(data).hexdigest() != entry.sha256:
         raise CaptureError("changed", "the file changed while it was read", "run again")
     meta = capture_meta(entry.stated)
+    if entry.part is not None and entry.part.fields and entry.source is not None:
+        source = replace(entry.source, fields=(*entry.source.fields, *entry.part.fields))
+        entry = replace(entry, source=source)
     if entry.form == "mcap":
         raw, source, verified = _read_mcap(data, entry)
     elif entry.form == "foreign":
@@ -45,6 +48,8 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
     else:
         raw, source, verified = _read_csv(data, entry)
     frames = [frame for table in raw if (frame := _frame(table, source, meta)) is not None]
+    if entry.form == "foreign":
+        _once(frames)
     frames = _cut(frames, entry.part)
     if not frames:
         raise CaptureError(
@@ -60,9 +65,21 @@ def _frame(table: RawTable, source: SourceMap | None, meta: CaptureMeta) -> pl.D
     return to_frame(table, source, meta.pole_pairs)
 
 
+def _once(frames: list[pl.DataFrame]) -> None:
+    """Raises CaptureError for a column that several tables of a form hold: two motors in a log."""
+    columns = [name for frame in frames for name in frame.columns if name != "t_s"]
+    twice = next((name for name in columns if columns.count(name) > 1), None)
+    if twice is not None:
+        raise CaptureError(
+            "duplicate_column",
+            f"{columns.count(twice)} tables of the file become {twice}",
+            "name the fields of each motor in `captures` of a source map, a capture each",
+        )
+
+
 def _cut(frames: list[pl.DataFrame], part: Part | None) -> list[pl.DataFrame]:
     """The rows of a part; raises CaptureError where the file has several clocks or fewer rows."""
-    if part is None or not frames:
+    if part is None or part.whole or not frames:
         return frames
     if len(frames) > 1:
         words = f"{len(frames)} tables of different clocks cannot be cut by rows"

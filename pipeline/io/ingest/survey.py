@@ -308,6 +308,7 @@ def _entry(
         form, topics = "csv", []
         form_known = any(s.reader and _may_read(s, path, beside, listed) for s in sources.values())
         own, head = _text_head(data, bool(listed or beside) and not form_known)
+        topics = _tables(path, data, sources)
     source, known = _source(path, own, beside, listed, head, topics, sources)
     if not known:
         _not_lost(path, data)
@@ -328,6 +329,14 @@ def _entry(
     check_texts(stated)
     belongs(stated)
     return Entry(path, digest, form, source, tuple(sorted(stated.items())), recovered)
+
+
+def _tables(path: str, data: bytes, sources: Mapping[str, SourceMap]) -> list[str]:
+    """Names of a file's tables, where a map that may be the file's own knows it by them."""
+    for source in sources.values():
+        if source.reader and source.topics and source.recognises_name(path):
+            return [table.name for table in find_reader(source.reader).read(data)]
+    return []
 
 
 def _may_read(

@@ -151,7 +151,8 @@ def _foreign(look_at: _Look, reader: Reader) -> InspectReport:
         streams = tuple(_stream(table, reader.name, look_at.answers) for table in tables)
     except CaptureError as fault:
         look_at.faults.append(str(fault))
-    look_at.source = _matched(look_at.name, None, [], look_at.sources)
+    topics = [stream.name for stream in streams]
+    look_at.source = _matched(look_at.name, None, topics, look_at.sources)
     suffix = PurePosixPath(look_at.name).suffix
     shape = Shape(streams, suffixes=(suffix,), reader=reader.name)
     return look_at.report(shape, lacks=look_at.source is None, foreign=False)

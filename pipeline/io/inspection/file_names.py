@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import PurePosixPath
 
 from pipeline.io.inspection.labels import plain
@@ -14,6 +15,7 @@ _BREAK = r"[_\-. /]"
 _LEAST_INSIDE = 4
 _SERIAL = re.compile(r"[A-Za-z]{0,8}-?\d{1,10}[A-Za-z]?|[A-Za-z]+\d+-\d+")
 _DATE = re.compile(r"(19|20)\d{2}-?(0[1-9]|1[0-2])-?([0-2]\d|3[01])")
+_TIME = re.compile(r"([01]\d|2[0-3])[-h]?[0-5]\d([-m]?[0-5]\d)?")
 _PAIRS = {"ab": "ab", "bc": "bc", "ca": "ca", "uv": "ab", "vw": "bc", "wu": "ca"}
 
 
@@ -103,9 +105,18 @@ def _motor_pattern(paths: Sequence[str]) -> str | None:
 
 def _serials(path: str) -> list[str]:
     """Words of a path that may be a serial number, in order."""
-    words = re.split(r"[_ /.]", _without_suffix(path))
+    words = _without_instants(re.split(r"[_ /.]", _without_suffix(path)))
     words = [p for w in words for p in ([w] if _SERIAL.fullmatch(w) else w.split("-"))]
     return [w for w in words if _SERIAL.fullmatch(w) and not _DATE.fullmatch(w) and _is_long(w)]
+
+
+def _without_instants(words: Sequence[str]) -> list[str]:
+    """The words but a time of day behind a date: `20240301_181530` is no serial number."""
+    return [
+        word
+        for before, word in pairwise(["", *words])
+        if not (_DATE.fullmatch(before) and _TIME.fullmatch(word))
+    ]
 
 
 def _is_long(word: str) -> bool:

@@ -188,7 +188,10 @@ def _converted(
     numbers = values.astype(np.float64, copy=False)
     if part.wraps is not None and part.column != "t_s":
         numbers = np.unwrap(numbers, period=part.wraps)
-    unit = units.get(part.field, "") if part.unit == "row" else part.unit
+    unit = units.get(part.field) if part.unit == "row" else part.unit
+    if part.unit == "row" and not unit:
+        words = f"the file states no unit for {part.field!r}"
+        raise CaptureError("unknown_unit", words, "write its unit into the source map")
     factor, shift = part.sign * part.scale, part.offset
     if unit is not None:
         scale = scale_to(unit, COLUMNS[part.column].unit)

@@ -42,6 +42,7 @@ _KIND_WORDS = {
     "flag": "`true` or `false`",
     "metadata": "metadata by key",
     "maps": "list of maps",
+    "fields": "as `fields`",
 }
 
 KEYS: tuple[Key, ...] = (
@@ -59,7 +60,12 @@ KEYS: tuple[Key, ...] = (
         "are ends of lines",
         "'^Time;RPM;'",
     ),
-    Key("recognise.topics", "texts", "a topic of an MCAP file, with `*` and `?`", "['/joint*']"),
+    Key(
+        "recognise.topics",
+        "texts",
+        "a topic of an MCAP file, or a table of a form with a `reader`, with `*` and `?`",
+        "['/joint*']",
+    ),
     Key("reader", "text", "the plug-in for a form that is neither MCAP nor a text table", "npz"),
     Key(
         "messages",
@@ -147,6 +153,12 @@ KEYS: tuple[Key, ...] = (
         "capture as a whole",
         "0-4999",
     ),
+    Key(
+        "captures[].fields",
+        "fields",
+        "fields of this part alone, beside those of the whole file: of a terminal pair, of a motor",
+        "{U2: vbc_v, I2: ib_a}",
+    ),
     Key("captures[].*", "metadata", "other keys are metadata of the part", "test: spin_down"),
     Key(
         "variants",
@@ -209,7 +221,10 @@ def _object(prefix: str) -> dict[str, Any]:
             any_key = _any_name(key, f"{prefix}*.") if dot or prefix != "captures[]." else _SCALAR
         elif name.endswith("[]"):
             inner = _object(f"{prefix}{name}.")
-            properties[name[:-2]] = {"type": "array", "items": {**inner, "required": ["rows"]}}
+            properties[name[:-2]] = {
+                "type": "array",
+                "items": {**inner, "anyOf": [{"required": ["rows"]}, {"required": ["fields"]}]},
+            }
         else:
             properties[name] = _object(f"{prefix}{name}.") if dot else _leaf(key)
     return {"type": "object", "properties": properties, "additionalProperties": any_key}
@@ -235,7 +250,13 @@ def _leaf(key: Key) -> dict[str, Any]:
     if key.kind in ("texts", "patterns"):
         items = {"type": "array", "items": {"type": "string"}}
         return {**schema, "anyOf": [{"type": "string"}, items]}
-    kinds = {"number": "number", "whole": "integer", "flag": "boolean", "maps": "array"}
+    kinds = {
+        "number": "number",
+        "whole": "integer",
+        "flag": "boolean",
+        "maps": "array",
+        "fields": "object",
+    }
     return {**schema, "type": kinds.get(key.kind, "string")}
 
 

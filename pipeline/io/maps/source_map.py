@@ -67,16 +67,28 @@ Pairs = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Rows `first` to `last` of a file, counted from 0, as a capture; None is the file's end."""
+    """Rows `first` to `last` of a file, counted from 0, as a capture; None is the file's end.
+
+    `fields` stand beside those that all parts have in common: those of one pair, or one motor.
+    """
 
     files: tuple[str, ...]
     first: int
     last: int | None
     metadata: Pairs
+    fields: tuple[FieldMap, ...] = ()
+    number: int = 1
+
+    @property
+    def whole(self) -> bool:
+        """Whether it holds every row of the file."""
+        return self.first == 0 and self.last is None
 
     @property
     def name(self) -> str:
         """What stands behind the file's stem in the path of the capture."""
+        if self.fields:
+            return f"part {self.number}"
         return f"rows {self.first}-{'' if self.last is None else self.last}"
 
 
@@ -237,7 +249,7 @@ def _parsed(plain: Any, name: str) -> SourceMap:
         per_file=_per_key(top.section("per_file")),
         file_names=_file_names(top),
         values=_per_key(top.section("values")),
-        captures=tuple(_part(part) for part in top.sections("captures")),
+        captures=tuple(_part(part, n) for n, part in enumerate(top.sections("captures"), 1)),
     )
     top.text("about")
     recognise.close()
@@ -349,14 +361,18 @@ def _file_names(section: Section) -> tuple[str, ...]:
     return patterns
 
 
-def _part(section: Section) -> Part:
-    """A capture cut from a file: `rows: 0-4999`, `rows: 5000-`; other keys are its metadata."""
-    files, rows = section.texts("files"), section.text("rows") or ""
+def _part(section: Section, number: int) -> Part:
+    """A capture cut from a file: `rows: 0-4999`, `rows: 5000-`, or `fields` of its own.
+
+    Other keys are its metadata.
+    """
+    files, fields = section.texts("files"), _fields(section.section("fields"))
+    rows = section.text("rows") or ("0-" if fields else "")
     match = re.fullmatch(r"(\d{1,12})-(\d{1,12})?", rows.replace(" ", ""))
     if match is None or (match[2] and int(match[2]) <= int(match[1])):
         raise section.fault("rows", f"{rows!r} is no range of rows", "write `0-4999` or `5000-`")
     last = int(match[2]) if match[2] else None
-    return Part(files, int(match[1]), last, _pairs(section))
+    return Part(files, int(match[1]), last, _pairs(section), fields, number)
 
 
 def find_maps(maps: Mapping[str, SourceMap], name: str) -> dict[str, SourceMap]:

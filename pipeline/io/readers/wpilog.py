@@ -29,6 +29,7 @@ START, FINISH = 0, 1
 class _Entry:
     name: str
     kind: str
+    unit: str = ""
     times_us: list[int] = field(default_factory=list)
     payloads: list[bytes] = field(default_factory=list)
 
@@ -45,6 +46,7 @@ def read(data: bytes) -> tuple[RawTable, ...]:
     -------
     tuple of RawTable
         One an entry: `timestamp` [s] and its name; an array's elements are `NAME.0`, `NAME.1`, ...
+        Its metadata, where SysId writes the unit, is the unit of its fields.
         An array that changes its length is left out, and so are texts.
 
     Raises
@@ -85,8 +87,9 @@ def _control(payload: bytes, open_: dict[int, _Entry], done: list[_Entry]) -> No
     kind, number = struct.unpack_from("<BI", payload)
     if kind == START:
         name, at = _text(payload, 5)
-        form, _ = _text(payload, at)
-        open_[number] = _Entry(name, form)
+        form, at = _text(payload, at)
+        unit, _ = _text(payload, at)
+        open_[number] = _Entry(name, form, unit)
         done.append(open_[number])
     elif kind == FINISH:
         open_.pop(number, None)
@@ -135,7 +138,9 @@ def _table(entry: _Entry) -> RawTable | None:
         fields = {f"{entry.name}.{n}": rows[:, n] for n in range(width)}
     else:
         return None
-    return RawTable(entry.name, {"timestamp": times, **fields})
+    units = dict.fromkeys(fields, entry.unit) if entry.unit else {}
+    stated = (("timestamp", "s"), *units.items())
+    return RawTable(entry.name, {"timestamp": times, **fields}, units=stated)
 
 
 READER = Reader("wpilog", read, suffixes=(".wpilog",))
