@@ -59,6 +59,49 @@ def white_noise_sigma(signal: Array) -> float:
     return robust / math.sqrt(6.0)
 
 
+def noise_about_cubics(t_s: Array, signal: Array) -> float:
+    """Standard deviation of the noise of a signal that bends, on any clock.
+
+    Parameters
+    ----------
+    t_s
+        Sampling instants [n, s], rising.
+    signal
+        Samples [n, any unit].
+
+    Returns
+    -------
+    float
+        In the unit of the signal; 0 for fewer than six samples.
+
+    Notes
+    -----
+    Each sample is held against the cubic through the two before and the two after, at their own
+    instants: e_k = x_k - Σ w_j x_j, of variance σ² (1 + Σ w_j²). Where a shaft turns by radians
+    between samples, their jitter is no noise, as it is in second differences.
+
+    Examples
+    --------
+    >>> t_s = np.array([0.0, 1.0, 2.1, 2.9, 4.2, 5.0, 6.1])
+    >>> round(noise_about_cubics(t_s, 3.0 * t_s**3 - t_s), 9)
+    0.0
+
+    """
+    if t_s.size < 6:
+        return 0.0
+    near = (-2, -1, 1, 2)
+    at = t_s[2:-2]
+    stamps = {n: t_s[2 + n : t_s.size - 2 + n] for n in near}
+    error, power = signal[2:-2].astype(np.float64), np.ones(at.size)
+    for n in near:
+        others = [m for m in near if m != n]
+        parts = [(at - stamps[m]) / (stamps[n] - stamps[m]) for m in others]
+        weight = np.prod(parts, axis=0)
+        error = error - weight * signal[2 + n : t_s.size - 2 + n]
+        power = power + weight**2
+    return float(np.median(np.abs(error) / np.sqrt(power))) / 0.6744897501960817
+
+
 def find_plateaus(
     signal: Array,
     least: int = 20,

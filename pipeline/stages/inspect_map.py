@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -80,12 +80,25 @@ def folder(settings: InspectSettings) -> Outcome:
     strangers = [one for one in looked if one.report.shape and not one.report.source]
     known = [one for one in looked if one not in strangers and one.report.streams]
     lines = [f"{settings.file}: {counted(len(paths), 'file')}"]
-    if known:
-        lines.append(f"{counted(len(known), 'file')} read as they are")
+    lines += _known_lines(known)
     empty = [one.file for one in looked if one not in strangers and one not in known]
     lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
     more = finish(settings, settings.file, strangers, None)
     return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors)
+
+
+def _known_lines(known: Sequence[Looked]) -> list[str]:
+    """Files that need no new map, by the map that reads them, with what stands in their way."""
+    by_map: dict[str | None, list[Looked]] = defaultdict(list)
+    for one in known:
+        by_map[one.report.source].append(one)
+    lines: list[str] = []
+    for source, files in by_map.items():
+        many = counted(len(files), "file")
+        lines.append(f"{many} read {f'by the source map {source}' if source else 'as they are'}")
+        faults = Counter(fault for one in files for fault in one.report.faults)
+        lines += [f"  {counted(n, 'file')}: {fault}" for fault, n in faults.items()]
+    return lines
 
 
 def _look_or_fault(task: InspectTask) -> Looked | str:

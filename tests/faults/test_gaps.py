@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -183,6 +185,21 @@ def test_too_many_drops(rng: np.random.Generator) -> None:
     keep = np.ones(40000, dtype=bool)
     keep[10000:24000] = False
     assert refused(with_rows(capture, keep)).code == "dropped_samples"
+
+
+def test_a_recorder_that_pauses_loses_nothing(rng: np.random.Generator) -> None:
+    """Let through: gaps beyond the stated `pause_s`; what is lost between pauses still counts."""
+    capture = drive(MOTOR, rng)
+    keep = np.ones(40000, dtype=bool)
+    keep[10000:24000] = False
+    paused = with_rows(capture, keep)
+    paused = replace(paused, meta=replace(paused.meta, pause_s=0.5))
+    assert validate(paused, {})[1] == ()
+    every_s = float(column(capture, "t_s")[1] - column(capture, "t_s")[0])
+    keep[5000:5300] = False
+    lossy = with_rows(capture, keep)
+    _, finding = warned(replace(lossy, meta=replace(lossy.meta, pause_s=1000.0 * every_s)))
+    assert "about 300 samples are missing in 1 gaps" in finding.message
 
 
 def test_drop_inside_the_step(rng: np.random.Generator) -> None:

@@ -93,8 +93,9 @@ def speed_over_angle(capture: Capture, turns: float) -> float | None:
         if rows.shape[0] < 2 * BLOCKS:
             continue
         edges = np.linspace(0, rows.shape[0] - 1, BLOCKS + 1).astype(int)
-        by_angle = np.diff(rows[edges, 1])
-        by_speed = np.diff(integral(rows[:, 0], rows[:, 2])[edges])
+        t_s, theta = _without_pauses(rows[:, 0], rows[:, 1], capture.meta.pause_s)
+        by_angle = np.diff(theta[edges])
+        by_speed = np.diff(integral(t_s, rows[:, 2])[edges])
         if max(np.abs(by_angle).sum(), np.abs(by_speed).sum()) < turns * TURN_RAD:
             continue
         if np.abs(by_angle).sum() < turns * TURN_RAD and is_noise(rows[:, 2]):
@@ -103,6 +104,16 @@ def speed_over_angle(capture: Capture, turns: float) -> float | None:
             return math.inf
         return float(by_angle @ by_speed / (by_angle @ by_angle))
     return None
+
+
+def _without_pauses(t_s: Array, theta: Array, pause_s: float | None) -> tuple[Array, Array]:
+    """Time and angle [n] that stand still while the recorder paused."""
+    if pause_s is None:
+        return t_s, theta
+    on = np.diff(t_s) <= pause_s
+    steps = (np.concatenate([[0.0], np.cumsum(np.diff(one) * on)]) for one in (t_s, theta))
+    closed_s, closed = steps
+    return closed_s, closed
 
 
 def is_noise(speed_rad_s: Array) -> bool:

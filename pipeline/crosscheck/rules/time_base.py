@@ -102,7 +102,7 @@ def pace(capture: Capture, turns: float) -> Pace | None:
     rows = rows[np.isfinite(rows).all(axis=1)]
     if rows.shape[0] < BLOCKS * LEAST_ROWS:
         return None
-    blocks = _increments(rows)
+    blocks = _increments(rows, capture.meta.pause_s)
     if np.abs(blocks[:, 1]).sum() < turns * TURN_RAD:
         return None
     line, u = _line(blocks)
@@ -110,15 +110,18 @@ def pace(capture: Capture, turns: float) -> Pace | None:
     return Pace(capture.path, line, math.hypot(u, clocks))
 
 
-def _increments(rows: Array) -> Array:
+def _increments(rows: Array, pause_s: float | None = None) -> Array:
     """Increments [K, 3] of the integrated speed [rad], the angle [rad] and the speed [rad/s], over
-    blocks of rows [n, 3]: time, angle, speed.
+    blocks of rows [n, 3]: time, angle, speed. What happened in pauses of the recorder is in none.
     """
     t_s, theta, omega = rows.T
-    steps = 0.5 * (omega[1:] + omega[:-1]) * np.diff(t_s)
-    turned = np.concatenate([[0.0], np.cumsum(steps)])
+    turned = 0.5 * (omega[1:] + omega[:-1]) * np.diff(t_s)
+    steps = np.column_stack([turned, np.diff(theta), np.diff(omega)])
+    if pause_s is not None:
+        steps[np.diff(t_s) > pause_s] = 0.0
+    along = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
     edges = np.linspace(0, t_s.size - 1, BLOCKS + 1).round().astype(np.int64)
-    return np.diff(np.column_stack([turned, theta, omega])[edges], axis=0)
+    return np.diff(along[edges], axis=0)
 
 
 def _line(blocks: Array) -> tuple[float, float]:

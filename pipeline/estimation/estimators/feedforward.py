@@ -28,7 +28,7 @@ from pipeline.estimation.uncertainty.regimes import (
 from pipeline.numerics.clusters import cluster_covariance
 from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
-from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.numerics.plateaus import noise_about_cubics
 from pipeline.numerics.weak_rows import LEAST_SAMPLES, WeakRows, smooth_speed, weak_rows
 from pipeline.physics.glossary import Term
 from pipeline.records.capture import Campaign, Capture
@@ -194,7 +194,7 @@ def _part(capture: Capture) -> Part | None:
 def _windows(t_s: Array, theta_rad: Array, period_s: float) -> tuple[WeakRows, bool]:
     """The shortest windows in which the angle's noise is quiet beside the acceleration."""
     limits = policy().shaft_rows
-    sigma, shortest = white_noise_sigma(theta_rad), 1.5 * LEAST_SAMPLES * period_s
+    sigma, shortest = noise_about_cubics(t_s, theta_rad), 1.5 * LEAST_SAMPLES * period_s
     for usual in limits.drive_windows_s:
         weak = weak_rows(t_s, max(usual, shortest), limits.overlap)
         noise = sigma * weak.noise_gain(2)

@@ -16,6 +16,7 @@ from pipeline.io.maps.source_map import load_source_maps, parse_source_map
 from pipeline.io.tables import foreign
 from pipeline.io.tables.foreign import find_reader, readers
 from pipeline.io.tables.raw_table import RawTable
+from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 from pipeline.settings import configuration_folder
 
@@ -102,7 +103,7 @@ def mdf4() -> bytes:
     return buffer.getvalue()
 
 
-def wpilog(speed: str = "speed", current: str = "iq") -> bytes:
+def wpilog(speed: str = "speed", current: str = "iq", units: tuple[str, str] = ("", "")) -> bytes:
     """Two entries of doubles, one of texts, one of arrays; the last is closed."""
     parts = [b"WPILOG", struct.pack("<HI", 0x0100, 3), b"bot"]
 
@@ -111,7 +112,9 @@ def wpilog(speed: str = "speed", current: str = "iq") -> bytes:
         parts.append(struct.pack("<BBHI", 0b0110100, entry, len(payload), time_us) + payload)
 
     def start(entry: int, name: str, kind: str) -> None:
-        text = b"".join(struct.pack("<I", len(t)) + t for t in (name.encode(), kind.encode(), b""))
+        unit = dict(zip((speed, current), units, strict=True)).get(name, "")
+        parts = (name.encode(), kind.encode(), unit.encode())
+        text = b"".join(struct.pack("<I", len(t)) + t for t in parts)
         record(0, 0, struct.pack("<BI", 0, entry) + text)
 
     for entry, (name, kind) in enumerate(
@@ -249,15 +252,49 @@ def test_complex_numbers_are_no_column() -> None:
 
 def test_a_log_of_sysid_is_read_by_its_map(tmp_path: Path) -> None:
     """Entries of any motor and routine, each on its clock; turns become radians."""
-    log = wpilog("velocity-wheel-shooter", "current-wheel-shooter")
-    (tmp_path / "sysid-1.wpilog").write_bytes(log)
-    (tmp_path / "sysid-1.meta.yaml").write_text("motor_id: m\n")
-    found = survey(tmp_path, load_source_maps(configuration_folder() / "source"))
-    capture = read_capture(tmp_path, found.entries[0])
+    names, units = ("velocity-wheel-shooter", "voltage-wheel-shooter"), ("Rotation per Second", "V")
+    capture = _by_the_sysid_map(tmp_path, wpilog(*names, units))
     assert (capture.meta.test, capture.meta.voltage_kind) == ("drive", "commanded")
-    rows = capture.arrays("omega_mech_rad_s", "iq_a")
+    rows = capture.arrays("omega_mech_rad_s", "vq_v")
     np.testing.assert_allclose(rows["omega_mech_rad_s"], SPEED * 2 * np.pi)
-    np.testing.assert_allclose(rows["iq_a"], CURRENT)
+    np.testing.assert_allclose(rows["vq_v"], CURRENT)
+    for unit, words in (("Meter per Second", "Meter per Second"), ("", "states no unit")):
+        with pytest.raises(CaptureError, match=words):
+            _by_the_sysid_map(tmp_path, wpilog(*names, (unit, "Volt")))
+
+
+def _by_the_sysid_map(folder: Path, log: bytes) -> Capture:
+    """Robots name their logs by the hour."""
+    (folder / "FRC_20240301_181530.wpilog").write_bytes(log)
+    (folder / "FRC_20240301_181530.meta.yaml").write_text("motor_id: m\n")
+    found = survey(folder, load_source_maps(configuration_folder() / "source"))
+    return read_capture(folder, found.entries[0])
+
+
+def test_two_motors_in_a_log_are_refused_or_a_capture_each(tmp_path: Path) -> None:
+    """What the map takes for one column may not be several motors; `fields` of a part name each."""
+    log = wpilog("voltage-left-drive", "voltage-right-drive", ("Volt", "Volt"))
+    with pytest.raises(CaptureError, match="2 tables of the file become vq_v"):
+        _by_the_sysid_map(tmp_path, log)
+    source = parse_source_map(
+        b"""
+recognise: {files: ['*.wpilog']}
+reader: wpilog
+fields: {timestamp: t_s}
+metadata: {test: drive}
+captures:
+  - {motor_id: left, fields: {'voltage-left-*': {column: vq_v, unit: row}}}
+  - {motor_id: right, fields: {'voltage-right-*': {column: vq_v, unit: row}}}
+""",
+        "robot",
+    )
+    found = survey(tmp_path, {"robot": source})
+    volts = {
+        capture.meta.motor_id: capture.arrays("vq_v")["vq_v"]
+        for capture in (read_capture(tmp_path, entry) for entry in found.entries)
+    }
+    np.testing.assert_allclose(volts["left"], SPEED)
+    np.testing.assert_allclose(volts["right"], CURRENT)
 
 
 def test_a_library_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
