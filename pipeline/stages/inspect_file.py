@@ -13,6 +13,7 @@ from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome
 from pipeline.settings import InspectSettings
 from pipeline.stages import inspect_map
+from pipeline.stages.inspect_record import file_record
 
 if TYPE_CHECKING:
     from pipeline.io.inspection.describe import InspectReport
@@ -42,10 +43,13 @@ def main(settings: InspectSettings) -> Outcome:
         raise CaptureError(error.code, message, error.remedy, error.rows) from error
     text = render(seen.report)
     code = CaptureError.exit_code if seen.refusals else 0
+    record = {"files": [file_record(seen.file, seen.report)]}
     if seen.report.shape is None and not settings.check:
-        return Outcome(code, text, seen.refusals)
+        result = {**record, "asked": {}, "map": None, "motors": None}
+        return Outcome(code, text, seen.refusals, result=result)
     more = inspect_map.finish(settings, str(place.parent), [seen], (seen.file,))
-    return Outcome(more.exit_code if settings.check else code, text + more.text, seen.refusals)
+    code = more.exit_code if settings.check else code
+    return Outcome(code, text + more.text, seen.refusals, result={**record, **more.result})
 
 
 def render(report: InspectReport) -> str:

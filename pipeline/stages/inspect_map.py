@@ -20,13 +20,14 @@ from pipeline.records.finding import lines_of
 from pipeline.records.naming import counted, printable
 from pipeline.records.outcome import Outcome, first_that_applies
 from pipeline.settings import InspectSettings
+from pipeline.stages.inspect_record import file_record, motor_lines, motor_record
 
 if TYPE_CHECKING:
     from pipeline.io.inspection.file_names import NamePatterns
     from pipeline.io.inspection.starter_map import Shape
-    from pipeline.records.capture import Campaign
 
 PREVIEW_ROWS = 3
+_ASKED = "asked, for neither names nor numbers say it:"
 _STATED = frozenset(METADATA) - {"contract", "sha256_rows"}
 
 
@@ -84,7 +85,8 @@ def folder(settings: InspectSettings) -> Outcome:
     empty = [one.file for one in looked if one not in strangers and one not in known]
     lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
     more = finish(settings, settings.file, strangers, None)
-    return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors)
+    result = {"files": [file_record(one.file, one.report) for one in looked], **more.result}
+    return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors, result=result)
 
 
 def _known_lines(known: Sequence[Looked]) -> list[str]:
@@ -129,6 +131,7 @@ def finish(
 
     lines: list[str] = []
     text = ""
+    asked: dict[str, str] = {}
     if strangers:
         groups = _groups(strangers)
         names = name_patterns([one.file for one in strangers], frozenset(settings.answers))
@@ -137,7 +140,8 @@ def finish(
         text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
         if only is None:
             lines += _shape_lines(groups, names)
-        lines += _questions(groups, names, settings)
+        asked = _questions(groups, names, settings)
+        lines += [_ASKED, *(f"  {key}=  {words}" for key, words in asked.items())] if asked else []
         firsts = [files[0] for _, files in groups]
         tasks = [PreviewTask(root, file, _read_limits(settings), text) for file in firsts]
         for preview in in_workers(preview_of, tasks):
@@ -147,10 +151,13 @@ def finish(
             lines.append(f"written: {settings.map}; `run input={root} source={settings.map}`")
         elif only is None:
             lines += ["the source map (map=PATH writes it):", "", text.rstrip("\n")]
+    result = {"asked": asked, "map": text or None, "motors": None}
     if not settings.check:
-        return Outcome(0, "\n".join(lines) + "\n" if lines else "")
+        return Outcome(0, "\n".join(lines) + "\n" if lines else "", result=result)
     checked = _check(settings, root, text, only)
-    return Outcome(checked.exit_code, "\n".join([*lines, checked.text]) + "\n", checked.errors)
+    told = "\n".join([*lines, checked.text]) + "\n"
+    result |= checked.result
+    return Outcome(checked.exit_code, told, checked.errors, result=result)
 
 
 def _groups(strangers: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:
@@ -187,8 +194,8 @@ def _shape_lines(groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns)
 
 def _questions(
     groups: Sequence[tuple[Shape, list[str]]], names: NamePatterns, settings: InspectSettings
-) -> list[str]:
-    """What must be answered before the map reads every capture, a line each."""
+) -> dict[str, str]:
+    """What must be answered before the map reads every capture, and in what words."""
     found: dict[str, str] = {}
     for shape, _ in groups:
         found |= dict(seen.question for seen in shape.fields if seen.question)
@@ -199,8 +206,7 @@ def _questions(
             found["pole_pairs"] = "electrical speed is divided by them"
     found |= {"motor_id": "the serial number", "test": "which test of the contract it is"}
     given = set(settings.answers) | names.keys
-    asked = [f"  {key}=  {text}" for key, text in found.items() if key not in given]
-    return ["asked, for neither names nor numbers say it:", *asked] if asked else []
+    return {key: text for key, text in found.items() if key not in given}
 
 
 def preview_of(task: PreviewTask) -> list[str]:
@@ -227,28 +233,11 @@ def _check(
             write_whole(Path(source), text.encode())
         limits = _read_limits(settings)
         found = campaigns(root, source, limits=limits, config_dir=settings.config_dir, only=only)
-    lines = [line for campaign in found.campaigns for line in _determined(campaign)]
+    motors = [motor_record(campaign) for campaign in found.campaigns]
+    lines = [line for motor in motors for line in motor_lines(motor)]
     refused = any(one.severity == "refused" for one in found.findings)
     if not found.campaigns:
         lines.append("no capture can be used yet")
     code = first_that_applies(3 if refused else 0, 0 if found.campaigns else 4)
-    return Outcome(code, "\n".join(lines), tuple(lines_of(found.findings)))
-
-
-def _determined(campaign: Campaign) -> list[str]:
-    """Captures of a motor with the constants that rest on each, and what none determines."""
-    from pipeline.api.fits import fit
-    from pipeline.api.recordings import Recordings
-
-    fits = fit(Recordings({campaign.motor_id: campaign}))
-    chosen = fits.motors[campaign.motor_id].constants.chosen()
-    lines = [f"motor {printable(campaign.motor_id)}"]
-    for capture in campaign.captures:
-        rows = max(table.height for table in capture.tables)
-        names = [name for name, one in chosen.items() if capture.path in one.captures]
-        given = ", ".join(names) if names else "no constant by itself"
-        lines.append(f"  {printable(capture.path)}: {capture.meta.test}, {rows} rows: {given}")
-    open_ = [name for name, one in chosen.items() if one.status == "not_identifiable"]
-    if open_:
-        lines.append(f"  not determined: {', '.join(open_)}")
-    return lines
+    errors = tuple(lines_of(found.findings))
+    return Outcome(code, "\n".join(lines), errors, result={"motors": motors})
