@@ -45,7 +45,7 @@ def main(settings: InspectSettings) -> Outcome:
     code = CaptureError.exit_code if seen.refusals else 0
     record = {"files": [file_record(seen.file, seen.report)]}
     if seen.report.shape is None and not settings.check:
-        result = {**record, "asked": {}, "map": None, "motors": None}
+        result: dict[str, object] = {**record, "asked": {}, "map": None, "motors": None}
         return Outcome(code, text, seen.refusals, result=result)
     more = inspect_map.finish(settings, str(place.parent), [seen], (seen.file,))
     code = more.exit_code if settings.check else code

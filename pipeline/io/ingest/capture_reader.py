@@ -39,8 +39,8 @@ def _read_capture(folder: Path, entry: Entry) -> Capture:
         raise CaptureError("changed", "the file changed while it was read", "run again")
     meta = capture_meta(entry.stated)
     if entry.part is not None and entry.part.fields and entry.source is not None:
-        source = replace(entry.source, fields=(*entry.source.fields, *entry.part.fields))
-        entry = replace(entry, source=source)
+        fields = (*entry.source.fields, *entry.part.fields)
+        entry = replace(entry, source=replace(entry.source, fields=fields))
     if entry.form == "mcap":
         raw, source, verified = _read_mcap(data, entry)
     elif entry.form == "foreign":
