@@ -30,7 +30,7 @@ from pipeline.io.maps.source_map import Part, SourceMap, find_maps
 from pipeline.io.mcap.container import MAGIC, Layout, scan
 from pipeline.io.mcap.messages import count_messages
 from pipeline.io.tables.csv_table import MAX_HEAD_BYTES, PACKED, check_text, split_comments
-from pipeline.io.tables.foreign import find_reader
+from pipeline.io.tables.foreign import find_reader, table_names
 from pipeline.physics.glossary import METADATA
 from pipeline.records.errors import CaptureError, UsageError
 from pipeline.records.finding import Finding
@@ -308,7 +308,8 @@ def _entry(
         form, topics = "csv", []
         form_known = any(s.reader and _may_read(s, path, beside, listed) for s in sources.values())
         own, head = _text_head(data, bool(listed or beside) and not form_known)
-        topics = _tables(path, data, sources)
+        named = (s.reader for s in sources.values() if s.topics and s.recognises_name(path))
+        topics = table_names(named, data)
     source, known = _source(path, own, beside, listed, head, topics, sources)
     if not known:
         _not_lost(path, data)
@@ -329,14 +330,6 @@ def _entry(
     check_texts(stated)
     belongs(stated)
     return Entry(path, digest, form, source, tuple(sorted(stated.items())), recovered)
-
-
-def _tables(path: str, data: bytes, sources: Mapping[str, SourceMap]) -> list[str]:
-    """Names of a file's tables, where a map that may be the file's own knows it by them."""
-    for source in sources.values():
-        if source.reader and source.topics and source.recognises_name(path):
-            return [table.name for table in find_reader(source.reader).read(data)]
-    return []
 
 
 def _may_read(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -56,3 +56,9 @@ def find_reader(name: str) -> Reader:
     if name not in known:
         raise UsageError(f"there is no reader {name!r}", f"use one of {', '.join(known)}")
     return known[name]
+
+
+def table_names(readers_named: Iterable[str | None], data: bytes) -> list[str]:
+    """Names of a file's tables by the first reader that is named; none where none is."""
+    name = next((one for one in readers_named if one), None)
+    return [] if name is None else [table.name for table in find_reader(name).read(data)]
