@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_VOLTAGES, TERMINAL_VOLTAGES
-from pipeline.contracts.rotation import TURN_RAD, turned_rad, turning
+from pipeline.contracts.rotation import TURN_RAD, line_voltage_vector, turned_rad, turning
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
@@ -77,14 +77,20 @@ def _electrical_turn(capture: Capture, options: Mapping[str, float]) -> Passed:
 
 
 def _cycles(capture: Capture) -> float:
-    """Cycles of the voltage that goes through most, by its changes of sign clear of noise."""
+    """Cycles of a back-EMF without a shaft angle: by its vector, of one voltage by its signs."""
+    vector = line_voltage_vector(capture)
+    if vector is not None:
+        x = vector[1][np.isfinite(vector[1])]
+        clear = x[np.abs(x) > 0.1 * np.percentile(np.abs(x), 95.0)]
+        return float(np.abs(np.diff(np.unwrap(np.angle(clear)))).sum()) / TURN_RAD
     names = [n for group in TERMINAL_VOLTAGES.alternatives if len(group) == 1 for n in group]
     most = 0.0
     for name in (n for n in names if capture.has(n)):
         values = capture.arrays(name)[name]
-        values = values[np.isfinite(values)] - np.nanmean(values)
+        values = values[np.isfinite(values)]
         clear = values[np.abs(values) > 0.3 * np.percentile(np.abs(values), 95.0)]
-        most = max(most, 0.5 * np.count_nonzero(np.diff(np.sign(clear))))
+        changes = int(np.count_nonzero(np.diff(np.sign(clear))))
+        most = max(most, 0.5 * (changes - 1))
     return most
 
 
