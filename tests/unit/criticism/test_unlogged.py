@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pipeline.criticism.comparison import compare
-from pipeline.criticism.machine.model import BASE
+from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
@@ -18,7 +18,7 @@ from tests.simulated import campaign_of, design
 
 MOTOR = replace(design("gimbal-5208"), effects={})
 TRUE = truth(MOTOR)["constants"]
-U_K = next(constant.prior for constant in BASE if constant.name == "unlogged_magnet_k")
+U_K = DEFAULT.priors.unlogged_k
 REACH = 1.96
 
 
