@@ -23,7 +23,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.regression.mains_hum import hum_notes
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
-from pipeline.criticism.selection.missing_data import at_ambient, unused
+from pipeline.criticism.selection.missing_data import at_ambient, loaded, unused
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
 from pipeline.criticism.validation.error_maps import all_maps, unit_of
@@ -74,6 +74,7 @@ def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Compariso
         tuple(_where(maps)),
         (
             *unused(campaign, system.segments),
+            *loaded(campaign, machine),
             *at_ambient(system.segments, system.fit.model),
             *against_stated(system, held),
             *hum_notes(base.hum),

@@ -31,7 +31,7 @@ from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
-from pipeline.criticism.selection.missing_data import at_ambient, unexcited, unused
+from pipeline.criticism.selection.missing_data import at_ambient, loaded, unexcited, unused
 from pipeline.criticism.selection.one_capture import only_capture
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
@@ -113,6 +113,7 @@ def searched(campaign: Campaign, model: ModelSpec, base: BaseFit) -> tuple[Diagn
         _as_reported(last, end.left),
         (
             *unused(campaign, found),
+            *loaded(campaign, machine),
             *at_ambient(found, last.fit.model),
             *against_stated(last, ladder.held[-1]),
             *hum_notes(ladder.base.hum),

@@ -71,9 +71,9 @@ class Sensing:
 
     `reading`(segment, channel, model, values) is what a sensor's linearity is a share of [n, the
     channel's unit]; without it the recorded signal itself. `errors`: those of `voltage_jumps`,
-    `encoder_lines` and `standstill` that an equation of a drive's log has. `sensors` are the
-    recorded signals that the channels are made of, if they are not the signals themselves, and
-    `sensed`(segment, residual, model, values) is the residual of each of them [n].
+    `current_jumps`, `encoder_lines` and `standstill` that an equation of a drive's log has.
+    `sensors` are the recorded signals that the channels are made of, if they are not the signals
+    themselves, and `sensed`(segment, residual, model, values) is the residual of each of them [n].
     """
 
     reading: Reading | None = None

@@ -25,7 +25,15 @@ from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, ripple
 from pipeline.criticism.policy.captures import Cutting
-from pipeline.criticism.signals.shaft import TORQUE_RIPPLES, net_torque, sensed_torque, true_load
+from pipeline.criticism.signals.shaft import (
+    TORQUE_RIPPLES,
+    moved_on,
+    net_torque,
+    sensed_torque,
+    torque_of_current,
+    torque_reading,
+    true_load,
+)
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
     drive_current,
@@ -185,18 +193,15 @@ def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> 
     means. A free shaft is turned by the means; what a transducer tells of a held one is its own.
     """
     flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
-    current = values["ripple_torque"] * segment.ts_s * central(x.i_a, segment.ts_s) - current
-    moved = np.conj(pieces.psi_wb) * current - np.conj(flux) * x.i_a
-    torque: Array = 1.5 * x.machine.pole_pairs * moved.imag
-    return torque
+    torque = torque_of_current(x, pieces, moved_on(segment, x, values) - current)
+    less: Array = 1.5 * x.machine.pole_pairs * (np.conj(flux) * x.i_a).imag
+    return torque - less
 
 
 def _reading(segment: Segment, channel: str, model: Model, values: Values) -> Array:
     """Length of the voltage [n, V], or the torque of the current's length [n, N·m]."""
     if channel == TORQUE:
-        kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
-        torque: Array = kt * np.hypot(segment.recorded["id_a"], segment.recorded["iq_a"])
-        return torque
+        return torque_reading(segment, model, values)
     length: Array = np.sqrt(sum(segment.recorded[name] ** 2 for name in VOLTS))
     return length
 

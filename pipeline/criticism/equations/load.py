@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.q_log import in_time
+from pipeline.criticism.data.drive_log import in_time
 from pipeline.criticism.data.segment import Segment, electrical_orders, segment_of
 from pipeline.criticism.data.traces import (
     SMOOTHED,
@@ -21,7 +21,7 @@ from pipeline.criticism.data.traces import (
 )
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
-from pipeline.criticism.machine.model import Model, Pieces
+from pipeline.criticism.machine.model import STATE, Model, Pieces
 from pipeline.criticism.signals.shaft import net_torque, sensed_torque, true_load
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
@@ -122,7 +122,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
+        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad", *STATE),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"angle", "current", "load", "clock"}),
         torque_in=TORQUE,

@@ -1,19 +1,25 @@
-"""The motion of a shaft that runs free under the current of a log, with a voltage or none."""
+"""The motion of a shaft that runs free under the current of a log, with voltages or none."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.q_log import in_time, q_log
+from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import thinned, window_of
+from pipeline.criticism.data.unlogged_load import runs_free
 from pipeline.criticism.effect import Array, Machine, Operating, Values
-from pipeline.criticism.equation import Channel, Equation, Observes
-from pipeline.criticism.machine.model import Model, Pieces, clock_gain
-from pipeline.criticism.signals.shaft import net_torque, unexplained_acceleration
+from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
+from pipeline.criticism.machine.model import STATE, Model, Pieces, clock_gain
+from pipeline.criticism.signals.shaft import (
+    moved_on,
+    net_torque,
+    torque_of_current,
+    torque_reading,
+    unexplained_acceleration,
+)
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
     drive_current,
@@ -25,7 +31,7 @@ from pipeline.numerics.projection import projection
 from pipeline.records.capture import Capture
 
 TORQUE, RECORDER = "torque_shaft_nm", "log"
-_USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run")
+_USED = ("theta_mech_rad", "iq_a", "id_a", "travel_rad", "run", "temp_magnet_degc")
 _PAD = 8
 """Samples kept at either side: the angle's second difference needs a few beyond a window."""
 
@@ -33,21 +39,19 @@ _PAD = 8
 def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Angle and current, in a selection of the windows: waves of the angle are dear at speed.
 
-    Only where there is an angle, and no transducer: with one the shaft is not known to run free.
+    Only where there is an angle and no transducer, and where the current alone drives the shaft.
     """
-    log = None if capture.has(TORQUE) else q_log(capture, machine)
-    if log is None or not log.angle:
+    log = None if capture.has(TORQUE) else drive_log(capture, machine)
+    if log is None or not log.angle or not runs_free(log, machine):
         return None
     shaft = {name: log.columns[name] for name in _USED if name in log.columns}
-    warm = log.columns.get("temp_magnet_degc")
-    fixed = {} if warm is None else {"ambient_k": float(np.mean(warm)) - 25.0}
     shaft["row"] = np.arange(log.keep.size, dtype=float)
     policy = machine.policy.cutting
     window = window_of(log.period_s, log.keep.size, policy)
     shaft, starts = thinned(shaft, log.keep, window, policy.windows_motion, _PAD)
     weak = projection(shaft["theta_mech_rad"], starts, window, ())
     blocks = in_time(shaft.pop("row")[starts + window // 2], log.keep.size)
-    made = segment_of(
+    return segment_of(
         capture,
         "motion",
         "drive",
@@ -58,7 +62,6 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         weak=weak,
         blocks=blocks,
     )
-    return replace(made, fixed={**made.fixed, **fixed})
 
 
 def state(
@@ -84,11 +87,18 @@ def predicted(
 
     Notes
     -----
-    (1.5 p [Im(ψ* i) + ∂W/∂ε] − drags)/J − d²θ/dt², of a shaft without any load.
+    (1.5 p [Im(ψ* i) + ∂W/∂ε] − drags)/J − d²θ/dt², of a shaft without any load; with the current a
+    part of a sample period on.
 
     """
     stretch = 1.0 + clock_gain(RECORDER, model, values)
-    return unexplained_acceleration(segment, x, net_torque(x, pieces), values, stretch)[None]
+    torque = net_torque(x, pieces) + torque_of_current(x, pieces, moved_on(segment, x, values))
+    return unexplained_acceleration(segment, x, torque, values, stretch)[None]
+
+
+def _reading(segment: Segment, _: str, model: Model, values: Values) -> Array:
+    """Acceleration [n, rad/s²] that the length of the current makes."""
+    return torque_reading(segment, model, values) / values["j_kgm2"]
 
 
 EQUATION = Equation(
@@ -102,12 +112,14 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad"),
+        ("ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad", "ripple_torque", *STATE),
         hooks=frozenset({"flux", "torque"}),
         sensors=frozenset({"angle", "current", "clock"}),
         form="affine",
     ),
     recorder=RECORDER,
+    sensing=Sensing(_reading, frozenset({"standstill", "current_jumps"})),
+    use=Use(warms=frozenset({"flux"})),
     # behind the voltage of the same log
     rank=1,
 )

@@ -1,4 +1,4 @@
-"""Open terminals of a driven shaft: the back-EMF in the rotor frame."""
+"""Open terminals of a driven shaft: the back-EMF in the rotor frame, or in that of the voltage."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.criticism.data.segment import PAIR_RAD, Segment, electrical_orders, segment_of
+from pipeline.criticism.data.sensor_noise import sensor_noise
 from pipeline.criticism.data.traces import (
     ANGLES,
     LINES_V,
     even_clock,
     prepared,
     shaft_angle,
+    smoothed,
     thinned,
     window_of,
     with_angle,
@@ -30,6 +32,8 @@ from pipeline.numerics.projection import Projection, projection
 from pipeline.physics.frames import vector_of_lines
 from pipeline.records.capture import Capture
 
+_OWN_FRAME = "own_frame"
+"""Number of a segment whose angle is that of its voltage, for want of an encoder."""
 _LINE_RAD = {f"v{pair}_v": angle for pair, angle in PAIR_RAD.items()}
 """Where each line voltage stands [rad, electrical]."""
 
@@ -41,19 +45,21 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         return None
     extra = ["temp_magnet_degc"] if capture.has("temp_magnet_degc") else []
     names = with_angle(capture, [*lines, *extra])
-    if not ANGLES.intersection(names):
-        # where the magnet stands at first is another in every spin, and no speed tells it
-        return None
+    encoder = not ANGLES.isdisjoint(names)
     policy = machine.policy.cutting
-    period, found, keep = even_clock(capture, tuple(names), policy)
-    shaft_angle(found, period, machine)
+    wanted = tuple(names if encoder else [*lines, *extra])
+    period, found, keep = even_clock(capture, wanted, policy)
     window = window_of(period, keep.size, policy)
+    if encoder:
+        shaft_angle(found, period, machine)
+    else:
+        keep &= _by_voltage(found, machine, window)
     sensors = prepared(found, period, machine.policy)
     found["t_s"] = period * np.arange(keep.size, dtype=np.float64)
     found, starts = thinned(found, keep, window, policy.windows)
     weak = projection(found["theta_mech_rad"], starts, window, electrical_orders(machine))
     weak = weak.only(_steady(weak, found["theta_mech_rad"], policy))
-    return segment_of(
+    made = segment_of(
         capture,
         "open",
         "bench",
@@ -63,6 +69,29 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
         channels=("vd_v", "vq_v"),
         weak=weak,
     )
+    return made if encoder else replace(made, fixed={**made.fixed, _OWN_FRAME: 1.0})
+
+
+def _by_voltage(found: dict[str, Array], machine: Machine, window: int) -> NDArray[np.bool_]:
+    """Adds the angle [n, rad] at which the voltage stands; the samples where it is known.
+
+    Where the magnet stands at first is another in every spin, and no speed tells it. The voltage
+    does, but for the sense of rotation, which its own turning shows; its harmonics are averaged
+    out over a window.
+    """
+    voltage = vector_of_lines({name: found[name] for name in LINES_V if name in found})
+    noise = max(
+        sensor_noise(found[name], machine.policy.sensor_noise) for name in LINES_V if name in found
+    )
+    phase = np.unwrap(np.angle(voltage))
+    width = 2 * (window // 2) + 1
+    sense = np.sign(smoothed(np.gradient(phase), width))
+    angle = smoothed(phase - 0.5 * math.pi * sense, width)
+    found["theta_mech_rad"] = angle / machine.pole_pairs
+    known = (np.abs(voltage) > machine.policy.cutting.audible_u * noise) & (
+        np.diff(sense, prepend=sense[0]) == 0.0
+    )
+    return np.convolve(known.astype(float), np.ones(width), mode="same") > width - 0.5
 
 
 def _steady(weak: Projection, theta: Array, policy: Cutting) -> NDArray[np.bool_]:
@@ -84,14 +113,16 @@ def state(
     motion = motion_of(segment, signals, model.machine)
     none = np.zeros(motion.theta_rad.size, dtype=complex)
     x = operating(segment, signals, model, values, none, motion)
+    if _OWN_FRAME in segment.fixed:
+        return x
     x = replace(x, eps_rad=x.eps_rad - values["bench_angle_rad"])
     return at_true_angle(segment, x, model, values)
 
 
-def measured(_: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
+def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
     """Line voltages [2, n, V], turned into the rotor's frame by the recorded angle."""
     lines = vector_of_lines({name: signals[name] for name in LINES_V if name in signals})
-    voltage = lines * np.exp(-1j * _recorded_eps(signals, model, values))
+    voltage = lines * np.exp(-1j * _recorded_eps(segment, signals, model, values))
     return np.stack([voltage.real, voltage.imag])
 
 
@@ -116,9 +147,11 @@ def predicted(
     return np.stack([voltage.real, voltage.imag])
 
 
-def _recorded_eps(signals: Mapping[str, Array], model: Model, values: Values) -> Array:
-    eps: Array = model.machine.pole_pairs * signals["theta_mech_rad"] - values["bench_angle_rad"]
-    return eps
+def _recorded_eps(
+    segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
+) -> Array:
+    eps: Array = model.machine.pole_pairs * signals["theta_mech_rad"]
+    return eps if _OWN_FRAME in segment.fixed else eps - values["bench_angle_rad"]
 
 
 def _reading(segment: Segment, _: str, __: Model, ___: Values) -> Array:
@@ -130,7 +163,7 @@ def _reading(segment: Segment, _: str, __: Model, ___: Values) -> Array:
 
 def _sensed(segment: Segment, left: Array, model: Model, values: Values) -> Mapping[str, Array]:
     """A residual [2, n] in the rotor's frame, turned back to each line's voltage [n]."""
-    eps = _recorded_eps(segment.recorded, model, values)
+    eps = _recorded_eps(segment, segment.recorded, model, values)
     winding = math.sqrt(3.0) * (left[0] + 1j * left[1]) * np.exp(1j * (eps + math.pi / 6.0))
     lines = [name for name in LINES_V if name in segment.recorded]
     return {name: (winding * np.exp(-1j * _LINE_RAD[name])).real for name in lines}

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.criticism.data.q_log import in_time, q_log
+from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Use
-from pipeline.criticism.machine.model import Model, Pieces, values_of
+from pipeline.criticism.machine.model import STATE, Model, Pieces, values_of
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
     drive_current,
@@ -24,6 +24,7 @@ from pipeline.numerics.projection import projection, window_starts
 from pipeline.records.capture import Capture
 
 SPEED = "omega_mech_rad_s"
+_BOTH_AXES = ("vd_v", "vq_v", "id_a", "iq_a")
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
@@ -33,7 +34,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     If the log holds the drive's own speed, the voltage is predicted from it, since both share one
     clock, and the speed itself is compared with the angle; `sample_delay` says how late it is.
     """
-    log = q_log(capture, machine)
+    log = None if capture.has(*_BOTH_AXES) else drive_log(capture, machine)
     if log is None:
         return None
     window = window_of(log.period_s, log.keep.size, machine.policy.cutting)
@@ -108,7 +109,7 @@ EQUATION = Equation(
     measured=measured,
     predicted=predicted,
     observes=Observes(
-        ("r_ohm", "lead_share", "ld_h", "lq_h", "psi_wb"),
+        ("r_ohm", "lead_share", "ld_h", "lq_h", "psi_wb", *STATE),
         hooks=frozenset({"flux", "drop"}),
         sensors=frozenset({"angle", "current", "voltage", "clock"}),
         form="affine",

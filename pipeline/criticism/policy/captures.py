@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipeline.physics.conventions import UNLOGGED_D_SHARE, UNLOGGED_U_K
-from pipeline.records.policy import chosen, derived
+from pipeline.records.policy import calibrated, chosen, derived
 
 COST = "a bound of the cost, which goes with them"
 
@@ -132,6 +132,44 @@ class Cutting:
     part_rad: float = chosen(3.0, "rad", "turn of the highest order in one part", why="half a wave")
     coast_parts: int = chosen(48, "1", "parts of a coasting shaft's sample at the most", why=COST)
     log_parts: int = chosen(6, "1", "parts of a log's sample at the most", why=COST)
+    load_window_s: float = calibrated(
+        0.04, "s", "window in which a shaft's acceleration is held against its current",
+        by="windows of 20 to 160 ms",
+        on="free and loaded drives of three benches: at 20 ms a host's jitter looks like a load",
+    )  # fmt: skip
+    load_samples: int = derived(
+        12, "samples", "samples of such a window at the least", source="nine make a window"
+    )
+    unexplained_share: float = calibrated(
+        0.02, "1",
+        "power of the acceleration that follows neither current nor drags, over what the current "
+        "makes, from which on something unrecorded turns the shaft",
+        by="windows of 20 to 160 ms",
+        on="free shafts, which leave 0.002 at most, and loads of a third of rated torque, which "
+        "leave 0.09 to 2",
+    )  # fmt: skip
+    load_windows: int = derived(
+        2, "windows", "windows a column of that regression at the least",
+        source="of two, one shares no sample with another",
+    )  # fmt: skip
+    load_rounding: float = derived(
+        1e-9, "1", "share of the largest column below which one is rounding",
+        source="squares of doubles end at 1e-16",
+    )  # fmt: skip
+    averaged_out: float = chosen(
+        0.05, "1", "mean size of a wave's window means below which it does not matter there",
+        why="it turns too often in a window",
+    )  # fmt: skip
+    drag_knots: tuple[float, ...] = chosen(
+        (0.0, 0.01, 0.03, 0.06, 0.1, 0.16, 0.24, 0.34, 0.46, 0.6, 0.78, 1.0),
+        "highest speeds", "speeds between which drag is straight there",
+        why="denser where friction bends",
+    )  # fmt: skip
+    audible_u: float = derived(
+        20.0, "standard deviations of noise",
+        "open-circuit voltage below which its own angle is not known",
+        source="noise turns it by a twentieth of a radian",
+    )  # fmt: skip
     angle_rounds: int = chosen(
         2, "1", "times that an angle error is looked up at the angle it gives",
         why="each round leaves of the error its own size times its order a turn",

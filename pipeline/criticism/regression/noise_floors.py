@@ -23,6 +23,8 @@ from pipeline.criticism.residuals.channels import (
 )
 from pipeline.criticism.residuals.residual import operate, residual
 
+VOLTS = ("vd_v", "vq_v")
+
 
 @dataclass(frozen=True, slots=True)
 class Floor:
@@ -229,15 +231,11 @@ def reading_error(
     both: Array = np.hypot(reading, own)
     if "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
-        if "encoder_lines" in sensing.errors:
-            both[place] = np.hypot(both[place], _encoder_lines(segment, values, policy))
-        if "standstill" in sensing.errors:
-            x = operate(segment, segment.recorded, model, values) if state is None else state
-            both[place, :, 0] = np.hypot(both[place, :, 0], _at_rest(segment, model, values, x))
+        both[place] = np.hypot(both[place], _of_torque(segment, model, values, state))
     if "voltage_jumps" in sensing.errors:
-        jumps = _jumps(segment, policy)[:, None]
+        jumps = _jumps(segment, *VOLTS, policy)[:, None]
         for place, channel in enumerate(segment.channels):
-            if channel in ("vd_v", "vq_v"):
+            if channel in VOLTS:
                 both[place] = np.hypot(both[place], jumps)
         if any(effect.drop is not None for effect in model.effects):
             x = operate(segment, segment.recorded, model, values) if state is None else state
@@ -246,6 +244,28 @@ def reading_error(
                 place = segment.channels.index(channel)
                 both[place] = np.hypot(both[place], np.abs(weak.project(axis[None])[0]))
     return both
+
+
+def _of_torque(
+    segment: Segment, model: Model, values: Values, state: Operating | None
+) -> Array | float:
+    """What a drive's log may be off by in its torque [W, M], as weak samples of its channel."""
+    weak, policy = segment.weak, model.policy.noise_floors
+    errors = equation_of(segment).sensing.errors
+    if weak is None or not errors:
+        return 0.0
+    total = np.zeros((weak.starts.size, weak.orders.size))
+    if "encoder_lines" in errors:
+        total = _encoder_lines(segment, values, policy)
+    if "standstill" in errors:
+        x = operate(segment, segment.recorded, model, values) if state is None else state
+        total[:, 0] = np.hypot(total[:, 0], _at_rest(segment, model, values, x))
+    if "current_jumps" in errors:
+        kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+        jumps = kt * _jumps(segment, "id_a", "iq_a", policy)
+        total = np.hypot(total, jumps[:, None])
+    error: Array = total / reported_unit(segment, values)
+    return error
 
 
 def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
@@ -272,19 +292,20 @@ def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
     return change
 
 
-def _jumps(segment: Segment, policy: NoiseFloors) -> Array:
-    """Error [W] that a jump of the voltage may make, as weak samples: a quarter of it for a sample.
+def _jumps(segment: Segment, direct: str, quadrature: str, policy: NoiseFloors) -> Array:
+    """Error [W] that a jump of a vector may make, as weak samples: a quarter of it for a sample.
 
-    A log says what the voltage was at its samples, not when within a period it changed.
+    A log says what voltage or current was at its samples, not when within a period it changed.
     """
     weak = segment.weak
     if weak is None:
         return np.zeros(segment.size)
-    voltage = segment.recorded["vd_v"] + 1j * segment.recorded["vq_v"]
-    noise = math.hypot(segment.sensors.noise["vd_v"], segment.sensors.noise["vq_v"])
-    bend = np.zeros(voltage.size)
+    still, noises = np.zeros(segment.size), segment.sensors.noise
+    vector = segment.recorded.get(direct, still) + 1j * segment.recorded[quadrature]
+    noise = math.hypot(noises.get(direct, 0.0), noises[quadrature])
+    bend = np.zeros(vector.size)
     # a jump bends the line twice, there and back
-    bend[1:-1] = np.abs(np.diff(voltage, 2)) / math.sqrt(2.0)
+    bend[1:-1] = np.abs(np.diff(vector, 2)) / math.sqrt(2.0)
     bend[bend < policy.jump * noise] = 0.0
     rows = weak.starts[:, None] + np.arange(weak.length)[None, :]
     error: Array = policy.jump_periods * np.sqrt((bend[rows] ** 2) @ (weak.functions[0, 0] ** 2))
@@ -302,13 +323,15 @@ def _at_rest(segment: Segment, model: Model, values: Values, x: Operating) -> Ar
         return np.zeros(segment.size)
     policy = model.policy.noise_floors
     slow = policy.creep * model.machine.scales["speed_rad_s"]
-    creeping = np.flatnonzero(_lasting(np.abs(x.omega_rad_s) < slow, round(policy.rest_s / x.ts_s)))
+    finer = x.theta_rad.size // segment.size
+    pace = np.abs(x.omega_rad_s[::finer])
+    creeping = np.flatnonzero(_lasting(pace < slow, round(policy.rest_s / x.ts_s)))
     if creeping.size < 2:
         return np.zeros(weak.starts.size)
     known = dict(values)
     for effect in model.effects:
         known = {**zero(effect, model), **known}
-    there = x.at(creeping)
+    there = x.at(finer * creeping)
     onward, back = (
         evaluate(model, replace(there, omega_rad_s=np.full(creeping.size, speed)), known).drag_nm
         for speed in (slow, -slow)

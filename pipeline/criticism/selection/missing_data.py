@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Effect, Evidence
+from pipeline.criticism.data.traces import tellable
+from pipeline.criticism.data.unlogged_load import unexplained_share
+from pipeline.criticism.effect import Effect, Evidence, Machine
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import UNLOGGED, Model
 from pipeline.criticism.residuals.segments import known_tests
@@ -24,6 +27,35 @@ def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
     ]
     words = "without the signals of their test's equation, or an even stretch of samples"
     return (f"not used, {words}: {', '.join(sorted(idle))}",) if idle else ()
+
+
+def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
+    """A note of the drives whose motion tells nothing, since something unrecorded turns the shaft.
+
+    Parameters
+    ----------
+    campaign
+        All captures of one motor.
+    machine
+        Its orders of torque against angle.
+
+    """
+    shares = {}
+    for recorded in campaign.of("drive"):
+        capture = None if recorded.has("torque_shaft_nm") else tellable(recorded)
+        log = drive_log(capture, machine) if capture and capture.has("t_s", "iq_a") else None
+        share = unexplained_share(log, machine) if log and log.angle else None
+        if share is not None and share >= machine.policy.cutting.unexplained_share:
+            shares[recorded.path] = share
+    if not shares:
+        return ()
+    where = ", ".join(f"{path} {100.0 * share:.2g} %" for path, share in sorted(shares.items()))
+    return (
+        "the motion of these drives tells nothing of inertia and friction, as a torque that "
+        "nothing recorded turns the shaft (acceleration that does not follow the current over "
+        f"what does, squared): {where}; log torque_shaft_nm, or record with nothing coupled to "
+        "the shaft",
+    )
 
 
 def at_ambient(found: Sequence[Segment], model: Model) -> tuple[str, ...]:

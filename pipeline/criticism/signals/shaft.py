@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.effect import Array, Operating, Recorded, Values
+from pipeline.criticism.effect import Array, Complex, Operating, Recorded, Values
 from pipeline.criticism.machine.model import Model, Pieces, air_gap_torque, values_of
 from pipeline.criticism.signals.true_state import ahead_in
+from pipeline.criticism.signals.voltage import central
 
 TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 """Nuisances of the current's ripple that are in the torque (`model.BASE`)."""
@@ -19,6 +20,30 @@ TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 def net_torque(x: Operating, pieces: Pieces) -> Array:
     """Torque of the air gap less the drags [n, N·m]: 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags."""
     return air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
+
+
+def torque_reading(segment: Segment, model: Model, values: Values) -> Array:
+    """Torque [n, N·m] of the length of a drive's recorded current."""
+    kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
+    direct = segment.recorded.get("id_a", np.zeros(segment.size))
+    torque: Array = kt * np.hypot(direct, segment.recorded["iq_a"])
+    return torque
+
+
+def moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
+    """What the current moves on by within a part of a sample period [n, A]: c T_s di/dt.
+
+    Steps of the current come at one phase of a log's samples, which are its means at none.
+    """
+    period = segment.ts_s * segment.size / x.theta_rad.size
+    current: Complex = values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
+    return current
+
+
+def torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:
+    """Torque [n, N·m] of a small further current [n, A] at the same flux."""
+    torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(pieces.psi_wb) * current).imag
+    return torque
 
 
 def unexplained_acceleration(

@@ -134,8 +134,8 @@ def drive_current(
 ) -> Complex:
     """True current [size, A] of a drive's log, between its samples on straight lines."""
     recorded = _recorded(segment, signals, model)
-    zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"] if segment.kind == "dq" else 0.0
-    if zero:
+    zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
+    if zero and _both_axes(segment):
         recorded = replace(recorded, i_a=recorded.i_a - zero * np.exp(-1j * recorded.eps_rad))
     current = true_current(recorded, segment.instrument.ammeter, model, values)
     if current.size < size:
@@ -171,7 +171,8 @@ def _warmth(
     if name not in signals:
         warmed = segment.fixed.get(UNLOGGED[name], 0.0)
         return np.full(size, segment.fixed["ambient_k"] + warmed * values[UNLOGGED[name]])
-    return signals[name] - 25.0 - values["offset_temp_k"]
+    warm = signals[name] - 25.0 - values["offset_temp_k"]
+    return np.repeat(warm, size // warm.size)
 
 
 def _travel(signals: Mapping[str, Array], size: int) -> Array:
@@ -257,7 +258,14 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
 
 def zero_angle(segment: Segment, values: Values) -> float:
     """Recorded less true electrical angle [rad] where the drive's encoder has its zero."""
-    return values["zero_angle_rad"] if segment.kind == "dq" else 0.0
+    return values["zero_angle_rad"] if _both_axes(segment) else 0.0
+
+
+def _both_axes(segment: Segment) -> bool:
+    """Whether this is a drive's log of both currents, in a frame that its own encoder turns."""
+    return segment.instrument.name == "drive" and {"id_a", "theta_mech_rad"} <= set(
+        segment.recorded
+    )
 
 
 def angle_error(x: Operating, model: Model, values: Values) -> Array:

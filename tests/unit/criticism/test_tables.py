@@ -176,7 +176,7 @@ def test_steady_voltages_have_an_offset_a_level_and_are_held_out_by_level():
 def test_readings_that_came_late_are_set_aside_in_a_log_of_the_q_axis():
     time = np.arange(4000) * 1e-3
     time[2000:2007] = time[2006] + np.arange(7) * 1e-4
-    theta = 20.0 * time
+    theta = 20.0 * time - 50.0 * np.cos(time)
     log = capture(
         "drive",
         t_s=time,

@@ -54,3 +54,11 @@ def test_a_recorded_temperature_leaves_the_flux_as_sharp_as_the_instruments():
     psi, _ = flux(spins())
     assert abs(psi.value - TRUE["psi_pm_wb"]) < REACH * psi.u
     assert psi.u / psi.value < 0.005
+
+
+@pytest.mark.parametrize("lost", [("theta_mech_rad",), ("theta_mech_rad", "omega_mech_rad_s")])
+def test_a_trace_of_line_voltages_without_an_encoder_has_the_flux(lost):
+    psi, result = flux(spins(*lost))
+    assert abs(psi.value - TRUE["psi_pm_wb"]) < REACH * psi.u
+    assert psi.u / psi.value < 0.005
+    assert not any("not used" in note for note in result.notes)

@@ -68,6 +68,9 @@ def signals(n: int = 4000) -> dict[str, np.ndarray]:
 def segment_of(kind: str) -> Segment:
     test, names = RECORDED[kind]
     columns = signals()
+    if kind == "motion":
+        # a shaft that the current alone turns
+        columns["iq_a"] = -0.2 * columns["theta_mech_rad"]
     if kind == "steady":
         columns["id_a"] = np.repeat([0.0, -4.0, -8.0, -12.0], 1000)
     if kind == "torque_table":

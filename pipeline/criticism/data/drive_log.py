@@ -1,4 +1,4 @@
-"""A drive's log without both voltages, on an even clock: what there is, and the shaft's motion."""
+"""A drive's log on an even clock: current, motion, and what else there is but the d voltage."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MOTION = ("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad")
 
 
 @dataclass(frozen=True, slots=True)
-class QLog:
+class DriveLog:
     """Columns [n] on an even clock, samples to keep [n], and what the recording says of its
     sensors; `speed` and `angle`: whether the log holds the drive's own speed, and an angle.
     """
@@ -36,14 +36,10 @@ class QLog:
     angle: bool
 
 
-def q_log(capture: Capture, machine: Machine) -> QLog | None:
-    """The log of a drive that lacks a voltage or the d current; None of any other.
-
-    A heat run without a record of its motion is at rest.
-    """
+def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
+    """The log of a drive; None without a record of the motion, but that a heat run is at rest."""
     moving = [name for name in _MOTION if capture.has(name)]
-    unknown = not moving and capture.meta.test != "heat_run"
-    if capture.has("vd_v", "vq_v", "id_a", "iq_a") or unknown:
+    if not moving and capture.meta.test != "heat_run":
         return None
     there = tuple(name for name in _ELECTRICAL if capture.has(name))
     period, found, keep = even_clock(capture, (*there, *moving), machine.policy.cutting)
@@ -54,7 +50,7 @@ def q_log(capture: Capture, machine: Machine) -> QLog | None:
         found["omega_mech_rad_s"] = speed
     sensors = prepared(found, period, machine.policy)
     angle = any("theta" in name for name in moving)
-    return QLog(period, found, keep, sensors, speed is not None, angle)
+    return DriveLog(period, found, keep, sensors, speed is not None, angle)
 
 
 def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:

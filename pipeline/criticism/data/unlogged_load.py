@@ -1,0 +1,97 @@
+"""Whether a torque that nothing recorded drives the shaft of a log."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.criticism.data.drive_log import DriveLog
+from pipeline.criticism.data.segment import slow_orders
+from pipeline.criticism.effect import Array, Machine
+from pipeline.numerics.weak_rows import WeakRows, smooth_speed, weak_rows
+
+
+def runs_free(log: DriveLog, machine: Machine) -> bool:
+    """Whether current and drags alone explain how the shaft of a log moves."""
+    share = unexplained_share(log, machine)
+    return share is not None and share < machine.policy.cutting.unexplained_share
+
+
+def unexplained_share(log: DriveLog, machine: Machine) -> float | None:
+    """Power of the acceleration that neither current nor drags explain.
+
+    Parameters
+    ----------
+    log
+        With an angle and the q current.
+    machine
+        Its orders of torque against angle.
+
+    Returns
+    -------
+    float or None
+        Over the power of what the current makes [1]; none where the shaft stands still, or the
+        windows are too few to say.
+
+    Notes
+    -----
+    A regression of the angle's second derivative over windows on i_q, i_d i_q and di_q/dt, drag
+    against speed, a constant, and waves of the angle. A torque that no column has is left in the
+    residual; where a speed loop works against it, the current goes with it and its coefficient is
+    too small. So what is left, its noise taken out, over what the current makes bounds the
+    relative error of 1/J.
+
+    References
+    ----------
+    Fuller, Measurement Error Models, 1987, 1.1 (attenuation).
+
+    """
+    theta = log.columns["theta_mech_rad"]
+    policy = machine.policy.cutting
+    width = max(policy.load_window_s, policy.load_samples * log.period_s)
+    time = log.period_s * np.arange(theta.size, dtype=float)
+    if time[-1] < 2.0 * width or float(np.ptp(theta)) < policy.turning_rad:
+        return None
+    weak = weak_rows(time, width)
+    whole = weak.integral((~log.keep).astype(float)) == 0.0
+    driven, others = _columns(log, weak, machine)
+    most = np.count_nonzero(whole) // policy.load_windows - len(driven)
+    chosen = [*driven]
+    for group in others:
+        if len(chosen) + len(group) <= most:
+            chosen += group
+        elif group is others[0]:
+            return None
+    columns = np.column_stack(chosen)[whole]
+    size = np.sqrt((columns**2).sum(axis=0))
+    columns = columns / np.where(size > policy.load_rounding * size.max(), size, np.inf)
+    target = weak.integral(theta, order=2)[whole]
+    found, _, rank, _ = np.linalg.lstsq(columns, target, rcond=policy.load_rounding)
+    left = target - columns @ found
+    made = columns[:, : len(driven)] @ found[: len(driven)]
+    noise = log.sensors.noise["theta_mech_rad"] * weak.noise_gain(2)
+    power = float(left @ left) / (target.size - int(rank)) - noise**2
+    share: float = max(power, 0.0) / max(float(np.mean(made**2)), 1e-300)
+    return share
+
+
+def _columns(
+    log: DriveLog, weak: WeakRows, machine: Machine
+) -> tuple[list[Array], list[list[Array]]]:
+    """Window means [w] of what the current makes; and, in groups, of what else moves a shaft."""
+    theta, q = log.columns["theta_mech_rad"], log.columns["iq_a"]
+    policy = machine.policy.cutting
+    knots = policy.drag_knots
+    time = log.period_s * np.arange(theta.size, dtype=float)
+    omega = smooth_speed(time, theta, policy.load_window_s / 8)
+    pace, sense = np.abs(omega) / max(float(np.abs(omega).max()), 1e-300), np.sign(omega)
+    driven = [weak.integral(q)]
+    if "id_a" in log.columns:
+        driven.append(weak.integral(log.columns["id_a"] * q))
+    plain = [weak.integral(sense), weak.integral(omega), np.ones(weak.count)]
+    curve = [weak.integral(sense * np.interp(pace, knots, one)) for one in np.eye(len(knots))]
+    turns = []
+    for order in slow_orders(machine):
+        wave = [weak.integral(part(order * theta)) for part in (np.cos, np.sin)]
+        if float(np.hypot(*wave).mean()) > policy.averaged_out:
+            turns += wave
+    return driven, [plain, [weak.integral(q, order=1)], curve, turns]

@@ -1,0 +1,124 @@
+"""Drives without a transducer: the motion of a free shaft counts, that of a loaded one does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.criticism.comparison import compare
+from pipeline.criticism.data.drive_log import DriveLog, drive_log
+from pipeline.criticism.data.machine_scale import machine_of
+from pipeline.criticism.data.segment import Sensors
+from pipeline.criticism.data.unlogged_load import unexplained_share
+from pipeline.criticism.effect import Machine
+from pipeline.criticism.residuals.segments import segments
+from pipeline.records.capture import Campaign
+from pipeline.records.comparison import ModelSpec
+from pipeline.records.constants import Constants
+from pipeline.simulator.bench import campaign
+from pipeline.simulator.design import EXACT, Bench
+from pipeline.simulator.truth import truth
+from tests.simulated import campaign_of, design
+
+MOTOR = replace(design("gimbal-5208"), effects={})
+TRUE = truth(MOTOR)["constants"]
+J, PSI, DRY = TRUE["j_rotor_kgm2"], TRUE["psi_pm_wb"], TRUE["torque_coulomb_nm"]
+AXES = ("id_a", "iq_a", "vd_v", "vq_v", "theta_mech_rad", "temp_winding_degc", "temp_magnet_degc")
+FREE, LOADED = {"load": 0.0}, {}
+REACH = 2.576
+SCALES = {"current_a": 1.0, "voltage_v": 1.0, "speed_rad_s": 10.0, "torque_nm": 1.0}
+MACHINE = Machine(3, 9, SCALES)
+UNEXPLAINED = MACHINE.policy.cutting.unexplained_share
+
+
+def driven(how: dict[str, float], keep: Collection[str] = AXES) -> Campaign:
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 2, (("d", "drive", how),)))
+    (one,) = whole.captures
+    tables = (t.select([n for n in t.columns if n in {"t_s", *keep}]) for t in one.tables)
+    return replace(whole, captures=(replace(one, tables=tuple(tables)),))
+
+
+def share(part: Campaign) -> float | None:
+    machine = machine_of(part, Constants())
+    return unexplained_share(drive_log(part.captures[0], machine), machine)
+
+
+def kinds(part: Campaign) -> set[str]:
+    return {one.kind for one in segments(part, machine_of(part, Constants()))}
+
+
+@pytest.mark.parametrize("keep", [AXES, ("iq_a", "vq_v", "theta_mech_rad")])
+def test_only_a_free_shaft_has_an_equation_of_motion(keep):
+    assert "motion" in kinds(driven(FREE, keep))
+    assert "motion" not in kinds(driven(LOADED, keep))
+
+
+def test_a_transducer_tells_the_load_whatever_it_is():
+    assert kinds(driven(FREE, (*AXES, "torque_shaft_nm"))) == {"dq"}
+
+
+def test_what_a_load_leaves_is_far_from_what_a_free_shaft_leaves():
+    assert share(driven(FREE)) < UNEXPLAINED / 4
+    assert share(driven(LOADED)) > 4 * UNEXPLAINED
+
+
+def turned(acceleration: Callable[[float, float, float], float], seconds: float = 4.0) -> DriveLog:
+    """A log with a swinging current, and a shaft that goes by d²θ/dt² of (i, θ, t)."""
+    period = 1e-3
+    time = period * np.arange(round(seconds / period))
+    amps = np.sin(8.0 * np.pi * time)
+    theta, speed = [0.0], 2.0
+    for t, i in zip(time[1:], amps[1:], strict=True):
+        speed += period * acceleration(i, theta[-1], t)
+        theta.append(theta[-1] + period * speed)
+    columns = {"theta_mech_rad": np.array(theta), "iq_a": amps}
+    sensors = Sensors(dict.fromkeys(columns, 1e-09))
+    return DriveLog(period, columns, np.ones(time.size, dtype=bool), sensors, False, True)
+
+
+def cogging(i: float, theta: float, _: float) -> float:
+    return 50.0 * (i + 0.5 * np.cos(MACHINE.pole_pairs * theta))
+
+
+def load(i: float, _: float, t: float) -> float:
+    return 50.0 * (i + 0.5 * np.sign(np.sin(11.0 * t)))
+
+
+def test_waves_of_the_angle_are_no_load_and_steps_in_time_are():
+    assert unexplained_share(turned(cogging), MACHINE) < UNEXPLAINED
+    assert unexplained_share(turned(load), MACHINE) > 4 * UNEXPLAINED
+
+
+def test_a_shaft_that_stands_or_a_log_of_a_moment_says_nothing():
+    assert unexplained_share(turned(lambda *_: 0.0, 0.04), MACHINE) is None
+    assert unexplained_share(turned(cogging, 0.05), MACHINE) is None
+
+
+@pytest.fixture(scope="module")
+def free():
+    return compare(driven(FREE), ModelSpec(), Constants())
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return compare(driven(LOADED), ModelSpec(), Constants())
+
+
+def test_a_log_of_both_axes_alone_has_inertia_and_friction(free):
+    for name, true in (("psi_wb", PSI), ("j_kgm2", J), ("coulomb_friction.torque_nm", DRY)):
+        one = free.parameters[name]
+        assert abs(one.value - true) <= REACH * one.u, name
+    assert free.parameters["j_kgm2"].u < 0.05 * J
+    assert not any("nothing recorded turns" in note for note in free.notes)
+
+
+def test_no_constant_of_the_shaft_comes_from_a_load_that_nobody_logged(loaded):
+    assert loaded.parameters["psi_wb"].value is not None
+    assert loaded.parameters["j_kgm2"].value is None
+    assert not any("j_kgm2" in one.of for one in loaded.combinations)
+    (note,) = (note for note in loaded.notes if "nothing recorded turns" in note)
+    assert "d.mcap" in note
+    assert "torque_shaft_nm" in note
