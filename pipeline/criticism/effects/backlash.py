@@ -20,13 +20,14 @@ def _torque(x: Operating, q: Values) -> Array:
         found: Array = 0.5 * gap * side_of(through, q["torque_nm"]) + spring_twist(x, q, through)
         return found
 
-    return far_drag(x, share, q["between"] > 0.0, twist)
+    return far_drag(x, share, q["between"], twist)
 
 
 EFFECT = Effect(
     name="backlash",
     words="two masses, a share of J at the far end, behind half a gap to the side that the torque "
-    "presses to, and a spring; between: the transducer is in the coupling",
+    "presses to, and a spring; between: the transducer is in the coupling (1), or "
+    "beyond it on a dynamometer that gives way (-1)",
     signature="no torque at the shaft while the gap is crossed, a jump of the angle at reversals",
     tests=("drive", "torque_map"),
     experiment="reversals of torque with the angle recorded on the load side as well",
@@ -38,7 +39,7 @@ EFFECT = Effect(
         Parameter("twist_rad", "rad", 0.005, 0.0, low=1e-5, high=3.0, scan=(0.003,)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
         Parameter("torque_nm", "N·m", 0.03, 0.0, "torque_nm", scan=(0.01,), choice=True),
-        Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
+        Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0, -1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),
     rivals={

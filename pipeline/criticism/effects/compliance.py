@@ -10,14 +10,14 @@ def _torque(x: Operating, q: Values) -> Array:
     def twist() -> Array:
         return spring_twist(x, q, passed_on(x, q["share"]))
 
-    return far_drag(x, q["share"], q["between"] > 0.0, twist)
+    return far_drag(x, q["share"], q["between"], twist)
 
 
 EFFECT = Effect(
     name="compliance",
     words="two masses and a spring: a share of J at the far end, behind a twist (told at the "
     "machine's torque) by the torque passed on, damping_s late (c/k); between: the transducer is "
-    "in the coupling",
+    "in the coupling (1), or beyond it on a dynamometer that gives way (-1)",
     signature="a resonance after torque steps",
     tests=("drive", "torque_map"),
     experiment="torque steps with the angle recorded on the load side as well",
@@ -27,7 +27,7 @@ EFFECT = Effect(
         Parameter("share", "1", 0.3, 0.03, low=0.0, high=0.95),
         Parameter("twist_rad", "rad", 0.01, 0.0005, low=1e-5, high=3.0, scan=(0.002, 0.01, 0.1)),
         Parameter("damping_s", "s", 1.0, 0.0, "period_s", 0.0, 5.0, scan=(0.0,), optional=1),
-        Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0), choice=True),
+        Parameter("between", "1", 1.0, 0.0, scan=(0.0, 1.0, -1.0), choice=True),
     ),
     signals=("torque_shaft_nm",),
     rivals={

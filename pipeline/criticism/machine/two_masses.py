@@ -180,7 +180,7 @@ def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:
     return twist
 
 
-def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], Array]) -> Array:
+def far_drag(x: Operating, share: float, between: float, twist_rad: Callable[[], Array]) -> Array:
     """What a far inertia takes from the shaft torque beyond a rigid shaft's.
 
     Parameters
@@ -190,7 +190,9 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
     share
         Of the inertia that is at the far end [1].
     between
-        Whether the transducer stands between the two parts, and so reads S.
+        1: the transducer stands between the two parts, and so reads S. 0: it is beyond them, and a
+        dynamometer that holds the far end reads S too. −1: that dynamometer gives way, and what
+        it reads has the far part's inertia in it.
     twist_rad
         Gives the twist [n, rad] where it is needed.
 
@@ -207,7 +209,8 @@ def far_drag(x: Operating, share: float, between: bool, twist_rad: Callable[[], 
     if not x.inverter:
         return np.zeros(np.shape(x.omega_rad_s))
     far = share * x.base["j_kgm2"]
-    moved = x.theta_rad if between else twist_rad()
+    rigid = between > 0.0 or (between == 0.0 and x.shaft.held)
+    moved = x.theta_rad if rigid else twist_rad()
     drag = np.zeros(x.theta_rad.size)
     drag[1:-1] = -far / x.ts_s**2 * np.diff(moved, 2)
     return drag

@@ -154,6 +154,6 @@ def _begun(fit: Fit, effect: Effect) -> Fit | None:
         return None
     model = fit.model.with_effects(effect)
     own = {f"{effect.name}.{name}": value for name, value in spring.items()}
-    still = {f"{effect.name}.{name}": 0.0 for name in ("damping_s", "between")}
+    still = {f"{effect.name}.damping_s": 0.0, f"{effect.name}.between": -1.0}
     begun = replace(fit, model=model, values={**fit.values, **still, **own})
     return begun.at({**moved, **own})

@@ -84,7 +84,7 @@ def test_the_linear_form_is_the_spring_and_gives_it_back():
     }
     spring = {"share": share, "twist_rad": torque / stiffness, "damping_s": 0.0}
     twist = spring_twist(x, spring, passed_on(x, share))
-    both = far_drag(x, share, False, lambda: twist), linear_far_drag(x, linear)
+    both = far_drag(x, share, -1.0, lambda: twist), linear_far_drag(x, linear)
     inside = slice(60, -60)
     assert both[1][inside] == pytest.approx(both[0][inside], rel=1e-6, abs=1e-9)
     assert np.abs(both[0][inside]).max() > 0.01
