@@ -16,13 +16,15 @@ ROOT = Path(__file__).parents[2]
 TABLE = re.compile(r"registry/(_delta_log/|part-)")
 
 
-def results(bench: Path, output: Path, workers: int, **environment: str) -> dict[str, bytes]:
+def results(
+    bench: Path, output: Path, workers: int, *more: str, **environment: str
+) -> dict[str, bytes]:
     """Every output of a fresh process that is reproducible.
 
     Recordings (.rrd) never are, and the registry's table says when each row was added; its file of
     each version has no time in it.
     """
-    words = [f"input={bench}", f"output={output}", f"workers={workers}", "recordings=false"]
+    words = [f"input={bench}", f"output={output}", f"workers={workers}", "recordings=false", *more]
     done = subprocess.run(
         [sys.executable, "-m", "pipeline", "run", *words],
         cwd=ROOT,
@@ -69,7 +71,7 @@ def test_nothing_but_the_work_changes_the_bytes(bench: Path, tmp_path: Path) -> 
     elsewhere = {"TZ": "Asia/Kathmandu", "LC_ALL": "de_DE.UTF-8", "PYTHONHASHSEED": "2"}
     assert results(copy, tmp_path / "b", 2, **elsewhere) == first
 
-    one = results(bench / "one", tmp_path / "a", 1)
+    one = results(bench / "one", tmp_path / "a", 1, "prune=true")
     kept = ("registry/", ".cache/")
     pages = {name for name in one if "gimbal" in name and not name.startswith(kept)}
     kinds = {"datasheets": "json", "performance": "json", "report": "html", "sheet": "html"}

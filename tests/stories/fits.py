@@ -65,7 +65,7 @@ def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bo
     machine = machine_of(found, start)
     parts = tuple(s for s in segments(found, machine) if not kinds or s.kind in kinds)
     if not offsets:
-        parts = tuple(replace(s, offsets=None) for s in parts)
+        parts = tuple(replace(s, disturbances=replace(s.disturbances, offsets=None)) for s in parts)
     model = model_of(ModelSpec("ideal", effects), machine)
     begun = fit_of(parts, model)
     system = trimmed(begun.system, effects)

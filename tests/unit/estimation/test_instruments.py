@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.criticism.machine.model import BASE
+from pipeline.criticism.machine.model import Model
 from pipeline.estimation.registry import fit_all
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.records.capture import UNSTATED_U, Campaign, Capture, CaptureMeta
@@ -14,6 +14,7 @@ from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import Bench
 from tests.simulated import campaign_of, design
+from tests.unit.criticism.machines import machine
 
 KEYS = ("u_rel_voltage", "u_rel_current", "u_temp_degc", "u_rel_torque")
 
@@ -25,7 +26,7 @@ def capture(**meta: object) -> Capture:
 
 def test_both_rooms_take_the_same_for_an_instrument_that_states_nothing() -> None:
     """`run` and `diagnose` judge one bench alike."""
-    priors = {constant.name: constant.prior for constant in BASE if constant.hook == "gain"}
+    priors = {name: u for name, (_, u) in Model(machine(), ()).priors().items()}
     assert priors["gain_current"] == UNSTATED_U["u_rel_current"]
     assert priors["gain_voltage"] == priors["gain_commanded"] == UNSTATED_U["u_rel_voltage"]
     assert priors["gain_torque"] == UNSTATED_U["u_rel_torque"]

@@ -35,6 +35,8 @@ def loop(motor, period_s=5e-5, **change):
         "ki_speed": 0.0,
         "i_limit": 1e9,
         "held_speed": False,
+        "dyno_nms": 0.0,
+        "dyno_nm": 0.0,
         **{f"gain_{x}": 1.0 for x in "abc"},
         **{f"offset_{x}": 0.0 for x in "abc"},
         "lsb_current": 0.0,

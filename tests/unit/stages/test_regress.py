@@ -354,7 +354,11 @@ def test_export_needs_a_release(output: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "format= is missing; known are c-header, csv, moteus, odrive, simplefoc, ssv, vesc"),
+        (
+            (),
+            "format= is missing; known are c-header, csv, json, moteus, mujoco, odrive, simplefoc, "
+            "simscape, ssv, vesc",
+        ),
         (("format=tmc", "motor=A-0"), "no format 'tmc'"),
         (("format=csv",), "motor= is missing"),
         (("format=csv", "motor=nobody"), "no motor 'nobody'"),
