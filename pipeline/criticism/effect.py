@@ -119,7 +119,7 @@ class Supply:
 
     `pwm_s`, `vdc_v`: period of the inverter's switching and voltage of its link, 0 where not known.
     `volts_v`: the voltage that the drive's log records, in the true rotor frame, where it has both
-    axes; a leg near zero current goes by the voltage that it is told. `q_alone`: the log shows the
+    axes; a leg near zero current is judged by it. `q_alone`: the log shows the
     q axis only, so that of a voltage's delay its envelope is what shows.
     """
 

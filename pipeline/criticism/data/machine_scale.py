@@ -12,7 +12,7 @@ from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.data.instruments import stated_u
 from pipeline.criticism.data.sensor_noise import rounding_step
 from pipeline.criticism.data.stated import stated_parameters
-from pipeline.criticism.data.traces import LINES_V, tellable
+from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
 from pipeline.numerics.orders import TURN_RAD
@@ -62,7 +62,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
         if any(capture.has(name) for capture in electric for name in _TURNING):
             return None
         pole_pairs = 1
-    captures = tuple(c for c in map(tellable, campaign.captures) if c is not None)
+    captures = tuple(c for c in map(with_values, campaign.captures) if c is not None)
     campaign = replace(campaign, captures=captures)
     logs, tables = campaign.of(*_TRACED), campaign.of(*_TABLES)
     current = _largest(logs, ("id_a", "iq_a")) or _largest(campaign.captures, _LINES_A)
@@ -194,7 +194,7 @@ def counted_pole_pairs(campaign: Campaign) -> int | None:
 
     """
     for recorded in campaign.of("open_circuit"):
-        capture = tellable(recorded)
+        capture = with_values(recorded)
         if capture is None or not capture.has("theta_mech_rad"):
             continue
         lines = [name for name in LINES_V if capture.has(name)]

@@ -34,7 +34,7 @@ _SHORTEST = 24
 """Fewest rows of a capture with a clock: three windows of eight, by judgement."""
 
 
-def tellable(capture: Capture) -> Capture | None:
+def with_values(capture: Capture) -> Capture | None:
     """The capture without columns that hold no value at the samples of its richest table; None
     where nothing is left, and of a test with a clock, where that does not rise or is too short.
     """

@@ -97,7 +97,7 @@ def _changes(system: LinearSystem) -> Iterator[Change]:
 
 
 def _may_change(system: LinearSystem, name: str) -> bool:
-    """Constants of the machine, and amplitudes that handbooks do not tell."""
+    """Constants of the machine, and amplitudes without a usual value."""
     known = system.fit.model.parameters()
     if name not in known:
         return name in PHYSICAL

@@ -75,7 +75,7 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def _by_voltage(found: dict[str, Array], machine: Machine, window: int) -> NDArray[np.bool_]:
     """Adds the angle [n, rad] at which the voltage stands; the samples where it is known.
 
-    Where the magnet stands at first is another in every spin, and no speed tells it. The voltage
+    The magnet's angle at the start differs between spins, and a speed does not show it. The voltage
     does, but for the sense of rotation, which its own turning shows; its harmonics are averaged
     out over a window.
     """

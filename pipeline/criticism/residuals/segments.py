@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.criticism.data.instruments import gains_of
 from pipeline.criticism.data.segment import Segment, with_lines
 from pipeline.criticism.data.sensor_noise import is_rounded, rounding_step
-from pipeline.criticism.data.traces import PAD, tellable
+from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equations
@@ -25,7 +25,7 @@ def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
     made: list[Segment] = []
     gains = gains_of(campaign.captures)
     for recorded in campaign.captures:
-        capture = tellable(recorded) if recorded.meta.test in known_tests() else None
+        capture = with_values(recorded) if recorded.meta.test in known_tests() else None
         if capture is not None:
             own = gains[recorded.path]
             cut = (_by_encoder(s, machine) for s in _cut(capture, machine))

@@ -86,15 +86,15 @@ def _torque_misses(wide: LinearSystem, significant: NDArray[np.bool_]) -> bool:
 def _scored(wide: LinearSystem, candidate: Candidate) -> Score | None:
     """The score of a coupling fitted from its own start; None where the torque shows none.
 
-    A twist told by an angle has much of its noise. Both fits are held against the floors that it
-    has with the coupling.
+    A twist derived from an angle amplifies its noise. Both fits use the noise floors of the fit
+    with the coupling.
     """
     begun = _begun(wide.fit, candidate.effect)
     if begun is None:
         return None
     near = gauss_newton(replace(begun, sigma=floors(begun.segments, begun.model, begun.values)))
-    end = by_floors_of(near.fit, near.fit)
-    base = by_floors_of(wide.fit, end.fit)
+    end = _reweighted(near.fit, near.fit)
+    base = _reweighted(wide.fit, end.fit)
     before, after = _standing(base), _standing(end)
     own = f"{candidate.effect.name}."
     values = {name: value for name, value in end.fit.values.items() if name.startswith(own)}
@@ -113,8 +113,8 @@ def _scored(wide: LinearSystem, candidate: Candidate) -> Score | None:
     return replace(found, penalty=dof * math.log(wide.size))
 
 
-def by_floors_of(fit: Fit, other: Fit) -> LinearSystem:
-    """A fit held against the noise floors that the segments have with another one's values."""
+def _reweighted(fit: Fit, other: Fit) -> LinearSystem:
+    """A fit again, by the noise floors that the segments have at the values of another one."""
     sigma = floors(other.segments, other.model, other.values)
     return gauss_newton(replace(fit, sigma=sigma, near=other.values))
 

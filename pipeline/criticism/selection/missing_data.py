@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.criticism.data.drive_log import drive_log
 from pipeline.criticism.data.segment import Segment
-from pipeline.criticism.data.traces import tellable
+from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.data.unlogged_load import unexplained_share
 from pipeline.criticism.effect import Effect, Evidence, Machine
 from pipeline.criticism.library.equations import equation_of
@@ -30,7 +30,7 @@ def unused(campaign: Campaign, found: Sequence[Segment]) -> tuple[str, ...]:
 
 
 def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
-    """A note of the drives whose motion tells nothing, since something unrecorded turns the shaft.
+    """A note of the drives whose motion is not used, since an unrecorded torque turns the shaft.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
     """
     shares = {}
     for recorded in campaign.of("drive"):
-        capture = None if recorded.has("torque_shaft_nm") else tellable(recorded)
+        capture = None if recorded.has("torque_shaft_nm") else with_values(recorded)
         log = drive_log(capture, machine) if capture and capture.has("t_s", "iq_a") else None
         share = unexplained_share(log, machine) if log and log.angle else None
         if share is not None and share >= machine.policy.cutting.unexplained_share:
@@ -51,7 +51,7 @@ def loaded(campaign: Campaign, machine: Machine) -> tuple[str, ...]:
         return ()
     where = ", ".join(f"{path} {100.0 * share:.2g} %" for path, share in sorted(shares.items()))
     return (
-        "the motion of these drives tells nothing of inertia and friction, as a torque that "
+        "the motion of these drives gives no inertia and no friction, as a torque that "
         "nothing recorded turns the shaft (acceleration that does not follow the current over "
         f"what does, squared): {where}; log torque_shaft_nm, or record with nothing coupled to "
         "the shaft",

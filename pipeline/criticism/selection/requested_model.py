@@ -31,7 +31,7 @@ class BaseFit:
 
 
 def in_better_frame(system: LinearSystem, near: Fit) -> LinearSystem:
-    """The fit by the rotor frame that held voltages are better told in.
+    """The fit by the rotor frame that explains held voltages better.
 
     Parameters
     ----------

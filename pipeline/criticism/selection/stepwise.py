@@ -155,7 +155,7 @@ def _refit_best(
     least = 0.0
     for score in close:
         effect = score.candidate.effect
-        begun = _by_floors_of(wide, score)
+        begun = _reweighted(wide, score)
         tried = _refitted(begun, score)
         rival = usual if begun is wide else _Rival.of(gauss_newton(begun.fit, begun), found)
         base = rival.wide
@@ -199,11 +199,11 @@ class _Rival:
         return holds and not spoils(tried, without, after)
 
 
-def _by_floors_of(wide: LinearSystem, score: Score) -> LinearSystem:
+def _reweighted(wide: LinearSystem, score: Score) -> LinearSystem:
     """The fit by the noise floors that a candidate begins with, if it is a coupling.
 
-    A twist told by an angle amplifies its noise: at orders of the angle by hundreds. By the floors
-    of a rigid shaft that would pass for a misfit.
+    A twist derived from an angle amplifies its noise, at orders of the angle by hundreds. By the
+    floors of a rigid shaft this noise would count as deviance.
     """
     if score.candidate.effect.discriminator is None:
         return wide

@@ -78,7 +78,7 @@ def count_pole_pairs(method: Method, groups: Sequence[Group]) -> tuple[Estimate,
         note = f"electrical cycles a turn of {words}: {found}; {worst:.1g} from the whole number"
         pairs = method.measured("pole_pairs", counts[0], captures=paths, notes=note)
     if not senses:
-        note = "one voltage does not tell it; record two line voltages in the open_circuit capture"
+        note = "one voltage does not show it; record two line voltages in the open_circuit capture"
         return pairs, method.missing("phase_order", note)
     if len(senses) > 1:
         note = "captures disagree on the phase order; check which leads were exchanged"

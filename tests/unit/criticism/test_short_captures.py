@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from pipeline.criticism.data.machine_scale import machine_of
-from pipeline.criticism.data.traces import tellable
+from pipeline.criticism.data.traces import with_values
 from pipeline.criticism.residuals.segments import known_tests, segments
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
@@ -63,7 +63,7 @@ def test_a_column_that_no_row_of_the_capture_s_clock_holds_is_as_good_as_not_the
     late = pl.DataFrame({"t_s": [-9.0, -8.0, -7.0], "temp_winding_degc": [25.0, 26.0, 27.0]})
     one = capture("torque_map", 4000, time, 0.03 * np.arange(4000), late)
     assert one.has("temp_winding_degc")
-    assert not tellable(one).has("temp_winding_degc")
+    assert not with_values(one).has("temp_winding_degc")
     (segment,) = made_of(one)
     assert "temp_winding_degc" not in segment.recorded
     assert np.isfinite(segment.weak.project(segment.recorded["iq_a"][None])).all()
@@ -71,4 +71,4 @@ def test_a_column_that_no_row_of_the_capture_s_clock_holds_is_as_good_as_not_the
 
 def test_a_capture_that_tells_all_it_says_is_not_copied():
     one = capture("torque_map", 400, 1e-3 * np.arange(400), 0.03 * np.arange(400))
-    assert tellable(one) is one
+    assert with_values(one) is one

@@ -14,6 +14,7 @@ import pytest
 
 from pipeline.__main__ import main
 from pipeline.contracts.json_schema import build_schemas
+from pipeline.export.registry import exporters
 from pipeline.io.registry.store import Registry
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.lot_regression import regression_of
@@ -354,11 +355,7 @@ def test_export_needs_a_release(output: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (
-            (),
-            "format= is missing; known are c-header, csv, json, moteus, mujoco, odrive, simplefoc, "
-            "simscape, ssv, vesc",
-        ),
+        ((), f"format= is missing; known are {', '.join(sorted(exporters()))}"),
         (("format=tmc", "motor=A-0"), "no format 'tmc'"),
         (("format=csv",), "motor= is missing"),
         (("format=csv", "motor=nobody"), "no motor 'nobody'"),
