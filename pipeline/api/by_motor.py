@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TypeVar
+
+import polars as pl
+
+from pipeline.records.naming import counted
 
 One = TypeVar("One")
 
 
-@dataclass(frozen=True, slots=True)
-class ByMotor(Generic[One]):
+class Shown(ABC):
+    """What a terminal and a notebook show of a result: a title over one table, not its arrays."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def _table(self) -> pl.DataFrame:
+        """What is worth a look first."""
+
+    def _title(self) -> str:
+        return type(self).__name__
+
+    def __repr__(self) -> str:
+        return f"{self._title()}\n{self._table()}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self._title()}</p>{self._table()._repr_html_()}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ByMotor(Shown, Mapping[str, One]):
     """Results by motor_id, in the order of the motors.
 
     Attributes
@@ -31,6 +55,9 @@ class ByMotor(Generic[One]):
 
     def __len__(self) -> int:
         return len(self.motors)
+
+    def _title(self) -> str:
+        return f"{type(self).__name__}: {counted(len(self), 'motor')}"
 
     def motor_or_first(self, motor: str | None) -> str:
         """A motor_id, or the first one.

@@ -37,7 +37,7 @@ DATASHEET_SCHEMA = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Datasheets(ByMotor[Datasheet]):
     """Datasheets by motor.
 
@@ -87,8 +87,8 @@ class Datasheets(ByMotor[Datasheet]):
         ]
         return frames.frame(rows, DATASHEET_SCHEMA)
 
-    def _repr_html_(self) -> str:
-        return self.summary.select("motor_id", "lot", "status", "why")._repr_html_()
+    def _table(self) -> pl.DataFrame:
+        return self.summary.select("motor_id", "lot", "status", "why")
 
 
 def check(

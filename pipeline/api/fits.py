@@ -58,12 +58,12 @@ class MotorFit:
 
     campaign: Campaign
     constants: Constants
-    evidence: tuple[Evidence, ...]
+    evidence: tuple[Evidence, ...] = field(repr=False)
     failures: tuple[Failure, ...]
     sources: tuple[SourceMap, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Fits(ByMotor[MotorFit]):
     """Estimates of every motor, before any check.
 
@@ -139,9 +139,9 @@ class Fits(ByMotor[MotorFit]):
             rows += constant_rows(motor_id, motor_type, lot, chosen)
         return frames.frame(rows, CONSTANT_SCHEMA)
 
-    def _repr_html_(self) -> str:
+    def _table(self) -> pl.DataFrame:
         known = self.constants.filter(pl.col("value").is_not_null())
-        return known.select("motor_id", "constant", "value", "u", "unit", "method")._repr_html_()
+        return known.select("motor_id", "constant", "value", "u", "unit", "method")
 
 
 def fit(

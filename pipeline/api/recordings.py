@@ -10,6 +10,7 @@ from typing import Any
 import polars as pl
 
 from pipeline.api import frames
+from pipeline.api.by_motor import Shown
 from pipeline.execution.tasks.captures import ReadTask, usable_captures
 from pipeline.io.ingest.files import input_folder
 from pipeline.io.ingest.guard import ReadLimits
@@ -19,13 +20,14 @@ from pipeline.io.maps.source_map import SourceMap
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import UsageError
 from pipeline.records.finding import Finding
+from pipeline.records.naming import counted
 
 Options = Mapping[str, Mapping[str, float]]
 """Options by the name of a gate, an estimator or a check."""
 
 
-@dataclass(frozen=True, slots=True)
-class Recordings:
+@dataclass(frozen=True, slots=True, repr=False)
+class Recordings(Shown):
     """Validated captures by motor, with findings on refused or doubtful files.
 
     Attributes
@@ -123,11 +125,14 @@ class Recordings:
                     return capture
         raise KeyError(path)
 
-    def _repr_html_(self) -> str:
-        shown = self.captures.group_by("motor_id", "test", maintain_order=True).agg(
+    def _title(self) -> str:
+        motors, findings = counted(len(self), "motor"), counted(len(self.findings), "finding")
+        return f"Recordings: {motors}, {findings}"
+
+    def _table(self) -> pl.DataFrame:
+        return self.captures.group_by("motor_id", "test", maintain_order=True).agg(
             pl.len().alias("captures"), pl.col("rows").sum()
         )
-        return f"<p>{len(self)} motors, {len(self.findings)} findings</p>{shown._repr_html_()}"
 
 
 def read(

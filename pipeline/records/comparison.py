@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.records.error_map import ErrorMap
+from pipeline.records.plain_form import PlainRecord, plain_of
 from pipeline.records.policy import Overrides
 
 Array = NDArray[np.float64]
@@ -43,7 +44,7 @@ class ModelSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class ModelParameter:
+class ModelParameter(PlainRecord):
     """One fitted parameter with its standard uncertainty [unit]; both are None where the captures
     and the station's priors do not determine it. `stated`: nothing but what somebody states does.
     """
@@ -78,7 +79,7 @@ class ModelParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class KnownCombination:
+class KnownCombination(PlainRecord):
     """What is determined of parameters that are not, one by one: a ratio, a product or a sum, with
     its standard uncertainty [unit]. `of` are the parameters in it.
     """
@@ -89,19 +90,9 @@ class KnownCombination:
     unit: str
     of: tuple[str, ...]
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {
-            "expression": self.expression,
-            "value": self.value,
-            "u": self.u,
-            "unit": self.unit,
-            "of": list(self.of),
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class Move(PlainRecord):
     """A parameter before and after effects were added, with standard uncertainties [unit]."""
 
     parameter: str
@@ -128,7 +119,7 @@ class Move:
 
 
 @dataclass(frozen=True, slots=True)
-class SignalError:
+class SignalError(PlainRecord):
     """Error of one signal of one capture, as means over smooth windows [unit of the signal].
 
     `kind`: what an `equation` misses by, sample by sample, or what a `free_run` of the model away
@@ -145,41 +136,18 @@ class SignalError:
     unit: str = ""
     kind: Literal["equation", "free_run"] = "equation"
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "signal": self.signal,
-            "capture": self.capture,
-            "split": self.split,
-            "rmse": self.rmse,
-            "noise_floor": self.noise_floor,
-            "n": self.n,
-            "n_eff": self.n_eff,
-            "unit": self.unit,
-            "kind": self.kind,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Dependence:
+class Dependence(PlainRecord):
     """How much of a signal's error variance a variable explains, as a binned curve.
 
-    `p_value` is None where too few stretches of record tell.
+    `p_value` is None where there are too few stretches of record.
     """
 
     signal: str
     variable: str
     explained: float
     p_value: float | None
-
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "signal": self.signal,
-            "variable": self.variable,
-            "explained": self.explained,
-            "p_value": self.p_value,
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,12 +182,12 @@ class Comparison:
     parameters: Mapping[str, ModelParameter]
     errors: tuple[SignalError, ...]
     held_out: float
-    where: tuple[Dependence, ...]
+    where: tuple[Dependence, ...] = field(repr=False)
     notes: tuple[str, ...] = field(default=())
-    maps: tuple[ErrorMap, ...] = field(default=())
+    maps: tuple[ErrorMap, ...] = field(default=(), repr=False)
     moved: tuple[Move, ...] = field(default=())
     bare: float | None = None
-    traces: tuple[Trace, ...] = field(default=())
+    traces: tuple[Trace, ...] = field(default=(), repr=False)
     combinations: tuple[KnownCombination, ...] = field(default=())
     before: tuple[SignalError, ...] = field(default=())
 
@@ -236,16 +204,16 @@ class Comparison:
             "model": {
                 "name": self.name,
                 "effects": list(self.effects),
-                "parameters": {n: p.document() for n, p in self.parameters.items()},
-                "combinations": [one.document() for one in self.combinations],
+                "parameters": plain_of(self.parameters),
+                "combinations": plain_of(self.combinations),
             },
             "errors": [one for named, one in errors if named],
             "errors_other": [one for named, one in errors if not named],
-            "errors_before": [one.document() for one in self.before],
+            "errors_before": plain_of(self.before),
             "total": {"held_out": self.held_out, "without_effects": self.bare},
             "where": [one for named, one in where if named],
             "where_other": [one for named, one in where if not named],
-            "maps": [one.document() for one in self.maps],
-            "moved": [one.document() for one in self.moved],
+            "maps": plain_of(self.maps),
+            "moved": plain_of(self.moved),
             "notes": list(self.notes),
         }

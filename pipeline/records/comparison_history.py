@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from pipeline.records.comparison import Comparison
+from pipeline.records.plain_form import plain_of, record_of
 
 SCHEMA = "comparison-history/1"
 MOST = 50
@@ -32,15 +33,7 @@ def history_of(document: Mapping[str, Any] | None) -> tuple[Earlier, ...]:
     if document is None or document.get("schema") != SCHEMA:
         return ()
     try:
-        return tuple(
-            Earlier(
-                str(one["name"]),
-                tuple(map(str, one["effects"])),
-                float(one["held_out"]),
-                None if one["bare"] is None else float(one["bare"]),
-            )
-            for one in document["comparisons"]
-        )
+        return tuple(record_of(Earlier, one) for one in document["comparisons"])
     except (LookupError, TypeError, ValueError):
         return ()
 
@@ -53,5 +46,4 @@ def with_latest(earlier: Sequence[Earlier], latest: Earlier) -> tuple[Earlier, .
 
 def document_of(motor_id: str, history: Sequence[Earlier]) -> dict[str, Any]:
     """The JSON form."""
-    documents = [{**asdict(one), "effects": list(one.effects)} for one in history]
-    return {"schema": SCHEMA, "motor_id": motor_id, "comparisons": documents}
+    return {"schema": SCHEMA, "motor_id": motor_id, "comparisons": plain_of(history)}

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import MODEL_REASON, ModelVerdict
+from pipeline.records.plain_form import PlainRecord, plain_of
 
 CheckStatus = Literal["pass", "marginal", "fail", "not_evaluated"]
 DatasheetStatus = Literal["released", "provisional", "refused"]
@@ -28,7 +29,7 @@ def left_to_a_person(reason: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class Check(PlainRecord):
     """One cross-check. `value` is judged against `limit` [unit]; both None if not evaluated."""
 
     name: str
@@ -39,21 +40,9 @@ class Check:
     unit: str = "1"
     suspect: str | None = None
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "name": self.name,
-            "status": self.status,
-            "value": self.value,
-            "limit": self.limit,
-            "unit": self.unit,
-            "meaning": self.meaning,
-            "suspect": self.suspect,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class CaptureReference:
+class CaptureReference(PlainRecord):
     """Which file a datasheet rests on.
 
     `sha256` is that of its bytes, `read_sha256` that of what was read from them: columns, metadata
@@ -68,21 +57,9 @@ class CaptureReference:
     started_at: str | None = None
     read_sha256: str | None = None
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "path": self.path,
-            "sha256": self.sha256,
-            "test": self.test,
-            "integrity": self.integrity,
-            "station": self.station,
-            "started_at": self.started_at,
-            "read_sha256": self.read_sha256,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Superseded:
+class Superseded(PlainRecord):
     """The revoked version of the same work whose place a datasheet takes: by whom and why."""
 
     version: str
@@ -125,16 +102,16 @@ class Datasheet:
             "status": self.status,
             "why": list(self.why),
             "provenance": {
-                "captures": [reference.document() for reference in self.captures],
+                "captures": plain_of(self.captures),
                 "config_sha256": self.config_sha256,
                 "code_version": self.code_version,
                 "libraries": self.libraries,
             },
-            "supersedes": None if self.supersedes is None else asdict(self.supersedes),
+            "supersedes": plain_of(self.supersedes),
             "constants": {name: est.document() for name, est in sorted(self.constants.items())},
             "alternatives": [
                 {"name": est.name} | est.document()
                 for est in sorted(self.alternatives, key=lambda e: (e.name, e.method))
             ],
-            "checks": [check.document() for check in self.checks],
+            "checks": plain_of(self.checks),
         } | ({} if self.model is None else {"model": self.model.document()})

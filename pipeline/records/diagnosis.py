@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from pipeline.records.comparison import KnownCombination
 from pipeline.records.error_map import ErrorMap, Histogram
+from pipeline.records.plain_form import PlainRecord, plain_fields
 
 Verdict = Literal["adequate", "missing", "unknown", "insufficient"]
-ToldParameter = tuple[float | None, float | None, str]
-"""Value and standard uncertainty of a parameter, and their unit; None where the captures and the
-station's priors do not determine it."""
+
+
+class ReportedParameter(NamedTuple):
+    """Value and standard uncertainty of a parameter, and their unit; None where the captures and
+    the station's priors do not determine it.
+    """
+
+    value: float | None
+    u: float | None
+    unit: str
 
 
 @dataclass(frozen=True, slots=True)
-class Separation:
+class Separation(PlainRecord):
     """An experiment that parts two effects, with the power it is predicted to have at the 1 %
     level; None where that cannot be predicted.
     """
@@ -25,13 +33,9 @@ class Separation:
     experiment: str
     power: float | None
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {"against": self.against, "experiment": self.experiment, "power": self.power}
-
 
 @dataclass(frozen=True, slots=True)
-class RankedEffect:
+class RankedEffect(PlainRecord):
     """One effect's evidence. `score`: fall of the deviance less the BIC penalty of its parameters.
 
     `held_out_drop`: share of the removable held-out error that goes with it. `parameters`: value
@@ -47,7 +51,7 @@ class RankedEffect:
     confused_with: tuple[str, ...]
     explanation: str
     experiment: str
-    parameters: Mapping[str, ToldParameter]
+    parameters: Mapping[str, ReportedParameter]
     separation: tuple[Separation, ...] = ()
     size: float | None = None
     shortfall: str = ""
@@ -58,42 +62,18 @@ class RankedEffect:
         """Whether the captures show it, too small to matter."""
         return self.score > 0.0 and self.size is not None and self.size < 1.0
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "effect": self.effect,
-            "score": self.score,
-            "held_out_drop": self.held_out_drop,
-            "p_value": self.p_value,
-            "confused_with": list(self.confused_with),
-            "explanation": self.explanation,
-            "experiment": self.experiment,
-            "parameters": {
-                name: {"value": value, "u": u, "unit": unit}
-                for name, (value, u, unit) in self.parameters.items()
-            },
-            "separation": [one.document() for one in self.separation],
-            "size": self.size,
-            "shortfall": self.shortfall,
-            "headline": self.headline,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class RungError:
+class RungError(PlainRecord):
     """Held-out error of one signal's window means beside their noise floor [unit]."""
 
     rmse: float
     noise_floor: float
     unit: str
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {"rmse": self.rmse, "noise_floor": self.noise_floor, "unit": self.unit}
-
 
 @dataclass(frozen=True, slots=True)
-class Signature:
+class Signature(PlainRecord):
     """What came with a rung, as people look at it: mean errors of a signal [unit] without it and
     with it, [n] each, `at` values of a variable, a glossary name [its unit]. `capture` is None
     where it is of all captures together. With an `order` above 1, `at` is the angle [rad] within
@@ -114,22 +94,9 @@ class Signature:
         """What `at` is, as a name of the glossary's form."""
         return self.variable if self.order == 1 else f"theta_in_one_of_{self.order}_waves_rad"
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {
-            "order": self.order,
-            "signal": self.signal,
-            "unit": self.unit,
-            "variable": self.variable,
-            "capture": self.capture,
-            "at": list(self.at),
-            "before": list(self.before),
-            "after": list(self.after),
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class LadderRung:
+class LadderRung(PlainRecord):
     """A model's held-out error, 1 at the noise floor, and rms error of each signal [its unit].
 
     For looking: `errors` are those of `signals` beside their noise floors, `parameters` those of
@@ -141,26 +108,10 @@ class LadderRung:
     held_out: float
     signals: Mapping[str, float]
     errors: Mapping[str, RungError] = field(default_factory=dict)
-    parameters: Mapping[str, ToldParameter] = field(default_factory=dict)
+    parameters: Mapping[str, ReportedParameter] = field(default_factory=dict)
     maps: tuple[ErrorMap, ...] = field(default=())
     histograms: tuple[Histogram, ...] = field(default=())
     signature: Signature | None = None
-
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "effects": list(self.effects),
-            "held_out": self.held_out,
-            "signals": dict(self.signals),
-            "errors": {name: one.document() for name, one in self.errors.items()},
-            "parameters": {
-                name: {"value": value, "u": u, "unit": unit}
-                for name, (value, u, unit) in self.parameters.items()
-            },
-            "maps": [one.document() for one in self.maps],
-            "histograms": [one.document() for one in self.histograms],
-            "signature": None if self.signature is None else self.signature.document(),
-        }
 
     def map_of(self, signal: str, *variables: str) -> ErrorMap | None:
         """The map of a signal over one variable, or over x and y."""
@@ -172,7 +123,7 @@ class LadderRung:
 
 
 @dataclass(frozen=True, slots=True)
-class Remainder:
+class Remainder(PlainRecord):
     """One place where error over the noise floor is left: χ²/n, its size [unit of signal], and
     whether that is as much as anybody would act on.
     """
@@ -184,20 +135,9 @@ class Remainder:
     size: float
     matters: bool = True
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {
-            "capture": self.capture,
-            "signal": self.signal,
-            "order": self.order,
-            "chi2_per_n": self.chi2_per_n,
-            "size": self.size,
-            "matters": self.matters,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class CurvePoint:
+class CurvePoint(PlainRecord):
     """A curve at one place: value and 95 % band [unit of the curve]."""
 
     at: float
@@ -205,13 +145,24 @@ class CurvePoint:
     low: float
     high: float
 
-    def document(self) -> dict[str, float]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {"at": self.at, "value": self.value, "low": self.low, "high": self.high}
+
+class SketchTerm(NamedTuple):
+    """A term of an unknown structure, and its coefficient [unit]."""
+
+    term: str
+    coefficient: float
+    unit: str
+
+
+class AlternativeVariables(NamedTuple):
+    """Variables that explain nearly as much, with their share of the held-out evidence [1]."""
+
+    variables: tuple[str, ...]
+    share: float
 
 
 @dataclass(frozen=True, slots=True)
-class UnknownStructure:
+class UnknownStructure(PlainRecord):
     """Error that no known effect explains: where it acts, on what it depends, its shape.
 
     `curve` runs over the first of `variables`, temperatures counted from 25 degC; `times` is what
@@ -222,37 +173,23 @@ class UnknownStructure:
     signal: str
     variables: tuple[str, ...]
     shape: str
-    sketch: tuple[tuple[str, float, str], ...]
+    sketch: tuple[SketchTerm, ...]
     expression: str = ""
     curve: tuple[CurvePoint, ...] = ()
     times: str = ""
-    alternatives: tuple[tuple[tuple[str, ...], float], ...] = ()
+    alternatives: tuple[AlternativeVariables, ...] = ()
     effect: str = ""
     source: str = ""
 
     def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`."""
-        return {
-            "signal": self.signal,
-            "variables": list(self.variables),
-            "shape": self.shape,
-            "sketch": [
-                {"term": term, "coefficient": coefficient, "unit": unit}
-                for term, coefficient, unit in self.sketch
-            ],
-            "expression": self.expression,
-            "curve": [point.document() for point in self.curve],
-            "times": self.times,
-            "alternatives": [
-                {"variables": list(variables), "share": share}
-                for variables, share in self.alternatives
-            ],
-            "effect": self.effect,
-        }
+        """The JSON form of `contract/outputs.md`; `source` has a file of its own."""
+        written = plain_fields(self)
+        del written["source"]
+        return written
 
 
 @dataclass(frozen=True, slots=True)
-class Unexcited:
+class Unexcited(PlainRecord):
     """An effect of which these captures can say nothing: the tests that would show it, by name,
     what to do in them, and the signals that the captures of these tests lack.
     """
@@ -269,18 +206,9 @@ class Unexcited:
         tests += f" with {' and '.join(self.signals)}" if self.signals else ""
         return f"no test here excites {self.effect}: record {tests} ({self.experiment})"
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {
-            "effect": self.effect,
-            "tests": list(self.tests),
-            "experiment": self.experiment,
-            "signals": list(self.signals),
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Diagnosis:
+class Diagnosis(PlainRecord):
     """The verdict on one motor's model, with the ladder that leads to it.
 
     `asked`: effects that were asked for beside the `model`'s own; the first rung holds them.
@@ -310,19 +238,5 @@ class Diagnosis:
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, schema model-diagnosis/1."""
-        return {
-            "schema": "model-diagnosis/1",
-            "motor_id": self.motor_id,
-            "model": self.model,
-            "policy": self.policy,
-            "asked": list(self.asked),
-            "verdict": self.verdict,
-            "missing": list(self.missing),
-            "ranking": [ranked.document() for ranked in self.ranking],
-            "ladder": [rung.document() for rung in self.ladder],
-            "unknown": None if self.unknown is None else self.unknown.document(),
-            "remainder": [left.document() for left in self.remainder],
-            "unexcited": [one.document() for one in self.unexcited],
-            "combinations": [one.document() for one in self.combinations],
-            "notes": [*self.notes, *(one.words for one in self.unexcited)],
-        }
+        notes = [*self.notes, *(one.words for one in self.unexcited)]
+        return {**plain_fields(self), "schema": "model-diagnosis/1", "notes": notes}

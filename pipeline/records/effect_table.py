@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+
+from pipeline.records.plain_form import PlainRecord
 
 
 @dataclass(frozen=True, slots=True)
-class EffectTable:
+class EffectTable(PlainRecord):
     """One quantity that one effect adds, over a grid.
 
     Parameters
@@ -39,17 +40,6 @@ class EffectTable:
     def variables(self) -> tuple[str, ...]:
         """Names of the axes."""
         return tuple(self.axes)
-
-    def document(self) -> dict[str, Any]:
-        """The JSON form."""
-        return {
-            "effect": self.effect,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "axes": {name: list(grid) for name, grid in self.axes.items()},
-            "values": list(self.values),
-            "note": self.note,
-        }
 
 
 @dataclass(frozen=True, slots=True)

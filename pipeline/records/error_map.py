@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.records.plain_form import PlainRecord
+
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Bins:
+class Bins(PlainRecord):
     """The cells of one variable, a glossary name: cell n runs from edge n to edge n + 1."""
 
     variable: str
@@ -24,18 +26,14 @@ class Bins:
         """Cells."""
         return len(self.edges) - 1
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form."""
-        return {"variable": self.variable, "edges": list(self.edges)}
-
 
 @dataclass(frozen=True, slots=True)
-class ErrorMap:
+class ErrorMap(PlainRecord):
     """Mean error of one signal [unit] over cells of `x` [X], or of `y` and `x` [Y, X].
 
     `count` are the samples of each cell, `mean` is NaN where there are none. `p_value` is that of
-    a mean this far from zero by chance, NaN where too few visits tell; `p_map` that of means this
-    far from each other. `explained` is the share of the error's variance between the cells.
+    a mean this far from zero by chance, NaN where there are too few visits; `p_map` that of means
+    this far from each other. `explained` is the share of the error's variance between the cells.
     """
 
     signal: str
@@ -70,7 +68,7 @@ class ErrorMap:
 
 
 @dataclass(frozen=True, slots=True)
-class Histogram:
+class Histogram(PlainRecord):
     """How often [H] a signal's error, over its noise floor, falls between the edges [H + 1].
 
     Errors beyond the last edges are counted in the outermost bins.
@@ -79,10 +77,6 @@ class Histogram:
     signal: str
     edges: tuple[float, ...]
     count: tuple[int, ...]
-
-    def document(self) -> dict[str, Any]:
-        """The JSON form."""
-        return {"signal": self.signal, "edges": list(self.edges), "count": list(self.count)}
 
 
 def _nulls(nested: Any) -> Any:

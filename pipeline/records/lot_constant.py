@@ -19,6 +19,8 @@ Verdict = Literal[
     "CONFOUNDED",
 ]
 Side = Literal["baseline", "candidate"]
+MOST_RELATIVE = 2.0
+"""Change over the baseline above which it is given in the constant's own unit, not in percent."""
 Decision = Literal["pass", "conditional_pass", "conditional_fail", "fail", "not_evaluated"]
 
 

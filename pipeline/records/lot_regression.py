@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from pipeline.records.lot_constant import ConstantResult, Side, Verdict
-from pipeline.records.plain_form import plain_of, record_of
+from pipeline.records.plain_form import PlainRecord, plain_fields
 
 SCHEMA = "lot-regression/1"
 
@@ -107,7 +106,7 @@ class Outlier:
 
 
 @dataclass(frozen=True, slots=True)
-class LotRegression:
+class LotRegression(PlainRecord):
     """One comparison. `headline` is one sentence, `reasons` what led to the verdict.
 
     `history` is INSUFFICIENT_HISTORY where the baseline has too few lots for the lot-level test,
@@ -133,14 +132,4 @@ class LotRegression:
 
     def document(self) -> dict[str, Any]:
         """The JSON form, schema lot-regression/1."""
-        return {"schema": SCHEMA, **plain_of(self)}
-
-
-def regression_of(document: Mapping[str, Any]) -> LotRegression:
-    """The record that `LotRegression.document` wrote.
-
-    Raises LookupError, TypeError or ValueError where the document is no such record.
-    """
-    if document["schema"] != SCHEMA:
-        raise ValueError(f"{document['schema']!r} is not {SCHEMA}")
-    return record_of(LotRegression, document)
+        return {"schema": SCHEMA, **plain_fields(self)}

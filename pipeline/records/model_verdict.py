@@ -7,17 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pipeline.records.diagnosis import ToldParameter, Unexcited
+from pipeline.records.diagnosis import ReportedParameter, Unexcited
+from pipeline.records.plain_form import PlainRecord, plain_fields, record_of
 
 ModelState = Literal["adequate", "missing", "unknown", "insufficient", "not_tested"]
-Parameters = Mapping[str, ToldParameter]
+Parameters = Mapping[str, ReportedParameter]
 """Value, standard uncertainty and unit of an effect's parameters, by name."""
 MODEL_REASON = "model: "
 """How a reason in `why` begins that is about the model: a person may approve in spite of it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Excess:
+class Excess(PlainRecord):
     """Where a residual is over its noise floor: rms over the floor [1] and the part of the rms
     that the floor does not explain [unit of the signal]; `order` a turn of the shaft, 0 for means.
     """
@@ -35,24 +36,13 @@ class Excess:
         order = f", {self.order:g} a turn," if self.order else ""
         return f"{self.signal}{order} of {self.capture} by {number(self.floors)} noise floors"
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: an extension of `contract/outputs.md`."""
-        return {
-            "capture": self.capture,
-            "signal": self.signal,
-            "order": self.order,
-            "floors": self.floors,
-            "size": self.size,
-            "unit": self.unit,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class FoundEffect:
+class FoundEffect(PlainRecord):
     """An effect that a model lacks: value, standard uncertainty and unit of its parameters by name.
 
     `headline` says it with its size; `confused_with` is what else it could be, and `experiment`
-    what would tell.
+    what would separate them.
     """
 
     parameters: Parameters
@@ -60,28 +50,9 @@ class FoundEffect:
     confused_with: tuple[str, ...] = ()
     experiment: str = ""
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form of `contract/outputs.md`, with more keys and without the effect's name."""
-        return {
-            "parameters": _quantities(self.parameters),
-            "headline": self.headline,
-            "confused_with": list(self.confused_with),
-            "experiment": self.experiment,
-        }
-
-    @classmethod
-    def of(cls, document: Mapping[str, Any]) -> FoundEffect:
-        """The record that `document` wrote."""
-        return cls(
-            _parameters(document["parameters"]),
-            document.get("headline", ""),
-            tuple(document.get("confused_with", ())),
-            document.get("experiment", ""),
-        )
-
 
 @dataclass(frozen=True, slots=True)
-class ModelVerdict:
+class ModelVerdict(PlainRecord):
     """The residual test of one motor against the noise floors of `diagnose`.
 
     `verdict` is that of a diagnosis of the same model, or `not_tested`. `missing` with an empty
@@ -195,61 +166,22 @@ class ModelVerdict:
 
     def document(self) -> dict[str, Any]:
         """The JSON form of `contract/outputs.md`, with more keys."""
-        return {
-            "verdict": self.verdict,
-            "missing": [{"effect": name} | one.document() for name, one in self.missing.items()],
-            "held_out": self.held_out,
-            "residual": self.residual,
-            "name": self.model,
-            "effects": list(self.effects),
-            "worst": None if self.worst is None else self.worst.document(),
-            "over": self.over,
-            "note": self.note,
-            "held_out_with": self.held_out_with,
-            "unknown": self.unknown,
-            "unexcited": [one.document() for one in self.unexcited],
-            "fitted": [
-                {"effect": name, "parameters": _quantities(one)}
-                for name, one in self.fitted.items()
-            ],
-            "scales": dict(sorted(self.scales.items())),
-        }
+        written = plain_fields(self)
+        written["name"] = written.pop("model")
+        written["missing"] = [{"effect": n} | one for n, one in written["missing"].items()]
+        fitted = written["fitted"].items()
+        return written | {"fitted": [{"effect": n, "parameters": one} for n, one in fitted]}
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> ModelVerdict:
-        """The record that `document` wrote; raises LookupError or TypeError for anything else."""
-        worst = document.get("worst")
-        return cls(
-            verdict=document["verdict"],
-            model=document.get("name", "standard"),
-            effects=tuple(document.get("effects", ())),
-            missing={one["effect"]: FoundEffect.of(one) for one in document["missing"]},
-            held_out=document["held_out"],
-            residual=document["residual"],
-            worst=None if worst is None else Excess(**worst),
-            over=document.get("over", 0),
-            note=document.get("note", ""),
-            held_out_with=document.get("held_out_with"),
-            unknown=document.get("unknown", ""),
-            unexcited=tuple(
-                Unexcited(
-                    one["effect"], tuple(one["tests"]), one["experiment"], tuple(one["signals"])
-                )
-                for one in document.get("unexcited", ())
-            ),
-            fitted={
-                one["effect"]: _parameters(one["parameters"]) for one in document.get("fitted", ())
-            },
-            scales=document.get("scales", {}),
-        )
-
-
-def _quantities(parameters: Parameters) -> dict[str, dict[str, Any]]:
-    return {name: {"value": v, "u": u, "unit": unit} for name, (v, u, unit) in parameters.items()}
-
-
-def _parameters(document: Mapping[str, Any]) -> dict[str, ToldParameter]:
-    return {name: (one["value"], one["u"], one["unit"]) for name, one in document.items()}
+        """The record that `document` wrote; raises as `record_of` for anything else."""
+        fitted = document.get("fitted", ())
+        changed = {
+            "model": document.get("name", "standard"),
+            "missing": {one["effect"]: one for one in document["missing"]},
+            "fitted": {one["effect"]: one["parameters"] for one in fitted},
+        }
+        return record_of(cls, {**document, **changed})
 
 
 def number(floors: float) -> str:

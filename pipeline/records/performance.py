@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
+
+from pipeline.records.plain_form import PlainRecord, plain_of
 
 Numbers = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Operation:
+class Operation(PlainRecord):
     """The conditions that a motor is operated at; `origin` says by name where each comes from.
 
     Currents are phase peaks. `voltage_share` is what the inverter uses of vdc/√3. `drop_v` [V] and
@@ -28,13 +30,9 @@ class Operation:
     on_ohm: float | None = None
     origin: Mapping[str, str] = field(default_factory=dict)
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: part of `motor-performance/1`."""
-        return {**asdict(self), "origin": dict(sorted(self.origin.items()))}
-
 
 @dataclass(frozen=True, slots=True)
-class Derived:
+class Derived(PlainRecord):
     """One number [unit]: value, 95 % interval, formula, and what is conventional in it."""
 
     name: str
@@ -46,13 +44,9 @@ class Derived:
     formula: str
     convention: str = ""
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: part of `motor-performance/1`."""
-        return asdict(self)
-
 
 @dataclass(frozen=True, slots=True)
-class Blank:
+class Blank(PlainRecord):
     """A number that the captures do not give: why, and the test that would."""
 
     name: str
@@ -60,13 +54,9 @@ class Blank:
     why: str
     test: str
 
-    def document(self) -> dict[str, str]:
-        """The JSON form: part of `motor-performance/1`."""
-        return asdict(self)
-
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class Curve(PlainRecord):
     """Values [n, unit] over `x` [n, the unit that ends `x_name`] with their 95 % intervals."""
 
     name: str
@@ -78,13 +68,9 @@ class Curve:
     low: Numbers
     high: Numbers
 
-    def document(self) -> dict[str, Any]:
-        """The JSON form: part of `motor-performance/1`."""
-        return {name: list(v) if isinstance(v, tuple) else v for name, v in asdict(self).items()}
-
 
 @dataclass(frozen=True, slots=True)
-class MapCell:
+class MapCell(PlainRecord):
     """One operating point of the efficiency map: the currents that give it with the least copper
     loss, losses by place [W], efficiency and its 95 % interval [1].
     """
@@ -99,10 +85,6 @@ class MapCell:
     efficiency: float
     low: float
     high: float
-
-    def document(self) -> dict[str, Any]:
-        """The JSON form: part of `motor-performance/1`."""
-        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,11 +118,11 @@ class Performance:
             "schema": "motor-performance/1",
             "motor_id": self.motor_id,
             "datasheet_version": self.version,
-            "operation": None if self.operation is None else self.operation.document(),
-            "numbers": [one.document() for one in self.numbers],
-            "curves": [one.document() for one in self.curves],
-            "efficiency_map": [one.document() for one in self.cells],
+            "operation": plain_of(self.operation),
+            "numbers": plain_of(self.numbers),
+            "curves": plain_of(self.curves),
+            "efficiency_map": plain_of(self.cells),
             "regimes": list(self.regimes),
-            "blanks": [one.document() for one in self.blanks],
+            "blanks": plain_of(self.blanks),
             "notes": list(self.notes),
         }

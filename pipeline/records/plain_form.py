@@ -5,19 +5,58 @@ from __future__ import annotations
 import math
 import types
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 Record = TypeVar("Record")
 
 
+class PlainRecord:
+    """A frozen dataclass whose JSON form is an object of its fields by name."""
+
+    __slots__ = ()
+
+    def document(self) -> dict[str, Any]:
+        """The JSON form, as `contract/outputs.md` has it; more keys are an extension of it.
+
+        Raises
+        ------
+        ValueError
+            For NaN or infinity.
+
+        """
+        return plain_fields(self)
+
+
 def plain_of(value: Any) -> Any:
-    """A record as maps, lists, texts and numbers; raises ValueError for NaN and infinity."""
+    """A record as JSON values.
+
+    Parameters
+    ----------
+    value
+        A record, or what a field of one may hold: mappings, tuples, named tuples, scalars.
+
+    Returns
+    -------
+    dict, list or scalar
+        A record or a named tuple is a dict of its fields.
+
+    Raises
+    ------
+    ValueError
+        For NaN or infinity.
+
+    """
+    if isinstance(value, PlainRecord):
+        return value.document()
     if is_dataclass(value):
-        return {field.name: plain_of(getattr(value, field.name)) for field in fields(value)}
+        return plain_fields(value)
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        return plain_of(value._asdict())
     if isinstance(value, Mapping):
-        return {str(key): plain_of(value[key]) for key in sorted(value)}
+        return {str(key): plain_of(one) for key, one in value.items()}
     if isinstance(value, (tuple, list)):
         return [plain_of(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
@@ -25,13 +64,33 @@ def plain_of(value: Any) -> Any:
     return value
 
 
-def record_of(kind: type[Record], document: Any) -> Record:
-    """The record that `plain_of` wrote; keys that it has no field for are passed over.
+def plain_fields(record: Any) -> dict[str, Any]:
+    """The fields of a record by name, each as `plain_of` gives it."""
+    return {field.name: plain_of(getattr(record, field.name)) for field in fields(record)}
 
-    Raises LookupError, TypeError or ValueError where `document` is no such record.
+
+def record_of(kind: type[Record], document: Any) -> Record:
+    """The record that `plain_of` wrote.
+
+    Parameters
+    ----------
+    kind
+        A dataclass.
+    document
+        Its JSON form. Keys without a field are passed over; a field without a key has its default.
+
+    Returns
+    -------
+    Record
+        Of that kind.
+
+    Raises
+    ------
+    LookupError, TypeError or ValueError
+        `document` is no such record.
+
     """
-    made: Record = _made(kind, document)
-    return made
+    return cast(Record, _made(kind, document))
 
 
 @cache
@@ -42,25 +101,43 @@ def hints_of(kind: type) -> Mapping[str, Any]:
 
 def _made(kind: Any, document: Any) -> Any:
     origin, inner = get_origin(kind), get_args(kind)
-    if is_dataclass(kind) and isinstance(kind, type):
-        return kind(**{n: _made(hint, document[n]) for n, hint in hints_of(kind).items()})
     if origin in (Union, types.UnionType):
-        one = next(one for one in inner if one is not type(None))
-        return None if document is None and type(None) in inner else _made(one, document)
+        return _one_of(inner, document)
     if origin is tuple:
-        if not isinstance(document, list):
-            raise TypeError(f"{document!r} is no list")
-        return tuple(_made(inner[0], item) for item in document)
+        return _tuple(inner, document)
+    if origin is Mapping:
+        return {key: _made(inner[1], one) for key, one in document.items()}
+    if is_dataclass(kind) or hasattr(kind, "_fields"):
+        hints = hints_of(kind)
+        return kind(**{n: _made(hints[n], document[n]) for n in hints if n in document})
     return _scalar(kind, document)
 
 
+def _one_of(kinds: tuple[Any, ...], document: Any) -> Any:
+    """The first of several kinds that a value has."""
+    if document is None and types.NoneType in kinds:
+        return None
+    for kind in kinds:
+        with suppress(LookupError, TypeError, ValueError):
+            return _made(kind, document)
+    raise TypeError(f"{document!r} is none of {', '.join(map(str, kinds))}")
+
+
+def _tuple(kinds: tuple[Any, ...], document: Any) -> tuple[Any, ...]:
+    if not isinstance(document, list):
+        raise TypeError(f"{document!r} is no list")
+    if kinds[-1] is Ellipsis:
+        return tuple(_made(kinds[0], item) for item in document)
+    return tuple(_made(kind, item) for kind, item in zip(kinds, document, strict=True))
+
+
 def _scalar(kind: Any, document: Any) -> Any:
+    """A text, number or word of a literal; a whole number may stand for a float."""
     if get_origin(kind) is Literal:
         if document not in get_args(kind):
             raise ValueError(f"{document!r} is none of {', '.join(map(str, get_args(kind)))}")
         return document
-    if kind is float and isinstance(document, int) and not isinstance(document, bool):
-        return float(document)
-    if not isinstance(document, kind) or (isinstance(document, bool) and kind is not bool):
+    kinds = (float, int) if kind is float else kind
+    if not isinstance(document, kinds) or (isinstance(document, bool) and kind is not bool):
         raise TypeError(f"{document!r} is no {kind.__name__}")
     return document
