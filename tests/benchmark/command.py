@@ -97,7 +97,7 @@ def _world(chosen: Options, book: Book) -> str:
     """Diagnoses the cases of somebody else's plant; recorded many at once, so in chunks."""
     from tests.benchmark.worlds.recording import WORLDS, Recorder
     from tests.benchmark.worlds.rivals import METHODS, judged_by
-    from tests.benchmark.worlds.table import beside
+    from tests.benchmark.worlds.table import beside, by_programme
     from tests.benchmark.worlds.table import cases as world_cases
     from tests.benchmark.worlds.table import table as world_table
 
@@ -122,7 +122,7 @@ def _world(chosen: Options, book: Book) -> str:
     }
     shown = found[chosen.method or "diagnose"]
     heading = f"{len(shown)} of {len(drawn)} cases of world `{chosen.world}`, code {own.code}\n\n"
-    text = f"{heading}{world_table(shown)}\n{beside(found)}"
+    text = f"{heading}{by_programme(shown)}\n{world_table(shown)}\n{beside(found)}"
     if chosen.docs:
         _into_page(Path(chosen.docs), f"world {chosen.world}", text)
     return f"{done} cases diagnosed\n\n{text}"

@@ -31,6 +31,30 @@ def cases(name: str) -> list[WorldCase]:
     return found
 
 
+def by_programme(found: Found) -> str:
+    """What the answers of each programme are worth, a row a programme and one of all.
+
+    exact: just what is hidden is named, or nothing where nothing is. partial: some of it, or all
+    beside a false name. missed: called adequate or insufficient. abstained: a remainder in place of
+    a name. false names: how many, over all cases. flagged: cases of nobody's library of which a
+    remainder is reported.
+    """
+    heads = ("programme", "cases", "exact", "partial", "missed", "abstained", "false names")
+    rows = ["| " + " | ".join((*heads, "flagged")) + " |", "|---" * (len(heads) + 1) + "|"]
+    programmes = dict.fromkeys(case.programme for case, _ in found)
+    for programme in (*programmes, "all"):
+        mine = [(c, d) for c, d in found if programme in (c.programme, "all")]
+        inside = [(c, d) for c, d in mine if not c.outside]
+        marks = [marked(case, document) for case, document in inside]
+        counts = [marks.count(mark) for mark in ("right", "half", "silent", "unsure")]
+        false = sum(judged(case, document)[1] for case, document in mine if "verdict" in document)
+        flagged = [marked(case, document) for case, document in mine if case.outside]
+        of = f"{flagged.count('abstained right')} of {len(flagged)}"
+        numbers = " | ".join(str(number) for number in (len(mine), *counts, false))
+        rows.append(f"| {programme} | {numbers} | {of} |")
+    return "\n".join(rows) + "\n"
+
+
 def table(found: Found) -> str:
     """Marks by line, and each answer that is not right on a line of its own."""
     rows = ["| hidden | cases | " + " | ".join(MARKS) + " |", "|---" * (2 + len(MARKS)) + "|"]

@@ -14,7 +14,7 @@ from tests.benchmark.worlds.case import WorldCase, marked
 from tests.benchmark.worlds.lanes import Lane, run
 from tests.benchmark.worlds.programmes import PROGRAMMES, PWM_HZ, Campaigner, Hidden
 from tests.benchmark.worlds.rivals import _chosen
-from tests.benchmark.worlds.table import beside, table
+from tests.benchmark.worlds.table import beside, by_programme, table
 
 NULL = WorldCase("motulator", "laboratory", 1)
 COGGING = WorldCase("motulator", "laboratory", 1, {"cogging": 1.0})
@@ -61,6 +61,22 @@ def test_the_table_counts_marks_by_line_and_lists_what_is_not_right() -> None:
     assert "| all | 2 | 1 | 0 | 0 | 0 | 0 | 1 | 0 |" in text
     assert "| laboratory | 1 | 1 cogging | wrong | missing | windage |" in text
     assert text.count("| laboratory |") == 1
+
+
+def test_each_programme_has_its_row_of_what_its_answers_are_worth() -> None:
+    other = WorldCase("motulator", "telemetry", 2, {"cogging": 1.0})
+    found = [
+        (NULL, answer("adequate")),
+        (COGGING, answer("unknown")),
+        (PAIR, answer("missing", "cogging", "stribeck")),
+        (OUTSIDE, answer("unknown")),
+        (other, answer("missing", "windage", "stribeck")),
+        (other, {"failure": "ValueError"}),
+    ]
+    text = by_programme(found)
+    assert "| laboratory | 4 | 1 | 1 | 0 | 1 | 1 | 1 of 1 |" in text
+    assert "| telemetry | 2 | 0 | 0 | 0 | 0 | 2 | 0 of 0 |" in text
+    assert "| all | 6 | 1 | 1 | 0 | 1 | 3 | 1 of 1 |" in text
 
 
 def test_a_world_that_is_unknown_or_not_installed_is_a_wrong_usage(
@@ -222,6 +238,17 @@ def test_what_is_hidden_in_mujoco_brakes_a_coast_as_it_is_meant_to(
     brake = -m.j_rotor_kgm2 * np.diff(path[:, 1]) * 1000.0
     extra = brake - m.torque_coulomb_nm - m.b_visc_nm_s_rad * speed
     assert extra == pytest.approx(at(m, speed, theta), abs=0.03 * 0.012 * m.torque_rated_nm)
+
+
+@pytest.mark.parametrize("name", ["presliding", "stribeck", "cogging"])
+def test_the_current_is_that_of_the_winding_whatever_friction_has_a_state(
+    hinge: Any, name: str
+) -> None:
+    plant = hidden_in(hinge, name)
+    m, rotor = plant.motor, hinge._Rotor(plant.motor, plant.hidden, 0.0, 40.0, held=True)
+    rotor.on(6.0, 20000)
+    emf = m.pole_pairs * m.psi_pm_wb * 40.0
+    assert rotor.amps == pytest.approx((6.0 - emf) / m.r_phase_ohm, rel=1e-6)
 
 
 def test_the_bristles_of_mujoco_hold_before_they_slide(hinge: Any) -> None:

@@ -171,7 +171,7 @@ class _Rotor:
         self.data = mujoco.MjData(self.model)
         self.data.qpos[0], self.data.qvel[0] = theta, omega
         self.data.qfrc_applied[0] = -h["constant_load"]
-        # the winding's current is the first activation where it has one, LuGre's bristle the last
+        # LuGre's bristle is the first activation where it has one, the winding's current the last
         self.winding = kind.get("powered", True)
         self.theta, self.omega = theta, omega
 
@@ -189,7 +189,7 @@ class _Rotor:
     @property
     def amps(self) -> float:
         """The q current [A]."""
-        return float(self.data.act[0]) / 1.5 if self.winding else 0.0
+        return float(self.data.act[-1]) / 1.5 if self.winding else 0.0
 
     def shaft_torque(self) -> float:
         """All torques but the flywheel's [N·m]."""
