@@ -116,7 +116,7 @@ def _one_test_only(campaign: Campaign) -> list[Finding]:
             "one_test_only",
             f"{campaign.motor_id} has captures of {test} only: no two constants can be "
             "held against each other",
-            f"see what to record next with `plan motor={campaign.motor_id}`",
+            "see what to record next with `plan`",
         )
     ]
 

@@ -30,7 +30,7 @@ class Gate:
     `tests`: the tests it looks at. `options`: its thresholds with defaults, each with its reason
     beside it; `gates.NAME.KEY=` in the configuration overrides them and `gates.NAME.enabled=0`
     turns the gate off. `follows`: gates whose fault, where both find one, is the cause of this
-    one's, and is told first.
+    one's, and is reported first.
     """
 
     name: str

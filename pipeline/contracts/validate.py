@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import polars as pl
+import polars.selectors as cs
 
 from pipeline.contracts.gates import missing_values
 from pipeline.contracts.protocol import warning
@@ -54,9 +55,11 @@ def validate(
     """
     check_metadata(capture.meta)
     check_columns(capture)
-    check_tables(capture)
     masks: list[Mask] = []
+    capture, unfilled = _filled_rows(capture)
+    check_tables(capture)
     capture, findings = _without_blanks(capture)
+    findings = [*unfilled, *findings]
     refusals: dict[str, CaptureError] = {}
     broken: list[CaptureError] = []
     for gate in gates():
@@ -83,6 +86,26 @@ def _causes_first(refusals: Mapping[str, CaptureError]) -> list[CaptureError]:
     """The refusals by gate's name, those that another one's fault brings about last."""
     causes = {g.name: [n for n in g.follows if n in refusals] for g in gates()}
     return [refusals[name] for name in sorted(refusals, key=lambda name: len(causes[name]))]
+
+
+def _filled_rows(capture: Capture) -> tuple[Capture, list[Finding]]:
+    """The capture without the end of a buffer that was not filled.
+
+    These rows repeat the last one, its clock and all, so that none of them is known to be a sample.
+    """
+    tables, findings = [], []
+    for table in capture.tables:
+        changed = pl.any_horizontal(cs.numeric().ne_missing(cs.numeric().shift()))
+        rows = table.select(changed).to_series().arg_true()
+        first = int(rows[-1]) if rows.len() and "t_s" in table.columns else table.height - 1
+        count = table.height - first
+        if count > 1:
+            words = f"the last {count} rows repeat one another, clock and all"
+            remedy = "stop the file where the recording ends; they are left out"
+            span = (first, table.height - 1)
+            findings.append(warning(capture, "unfilled_rows", words, remedy, span))
+        tables.append(table.head(first) if count > 1 else table)
+    return (replace(capture, tables=tuple(tables)) if findings else capture), findings
 
 
 def _without_blanks(capture: Capture) -> tuple[Capture, list[Finding]]:

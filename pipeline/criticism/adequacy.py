@@ -18,11 +18,11 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.selection.drift import drifting_segments
 from pipeline.criticism.selection.requested_model import BaseFit
-from pipeline.criticism.validation.error_maps import unit_of
+from pipeline.physics.glossary import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.records.diagnosis import Diagnosis, ToldParameter
+from pipeline.records.diagnosis import Diagnosis, ReportedParameter
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 
 
@@ -111,7 +111,7 @@ def _named(tested: ModelVerdict, found: Diagnosis) -> ModelVerdict:
     )
 
 
-def _fitted(found: Diagnosis) -> dict[str, dict[str, ToldParameter]]:
+def _fitted(found: Diagnosis) -> dict[str, dict[str, ReportedParameter]]:
     """Parameters of the effects that were asked for, beside those that were found."""
     if not found.ladder:
         return {}

@@ -26,8 +26,9 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.missing_data import at_ambient, loaded, unused
 from pipeline.criticism.selection.pruning import trimmed
 from pipeline.criticism.selection.requested_model import fit_of
-from pipeline.criticism.validation.error_maps import all_maps, unit_of
+from pipeline.criticism.validation.error_maps import all_maps
 from pipeline.criticism.validation.held_out import effective, run_errors, simulate, traces
+from pipeline.physics.glossary import unit_of
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import (
     Comparison,
@@ -44,7 +45,7 @@ _IDLE = "no capture holds what an equation needs: record a torque map"
 
 
 def compare(campaign: Campaign, model: ModelSpec, start: Constants) -> Comparison:
-    """Fits a model's parameters to all captures and tells its errors, capture by capture.
+    """Fits a model's parameters to all captures and gives its errors, capture by capture.
 
     An error marked `held_out` is of a capture predicted from all the others; `fit` marks a
     capture that alone carries a constant.

@@ -22,7 +22,6 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
     HeldOut,
     over_floor,
-    predicted_chi2,
 )
 from pipeline.criticism.regression.identifiability import against_stated, reported_combinations
 from pipeline.criticism.regression.linear_system import LinearSystem
@@ -32,7 +31,7 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.search import Ladder, SearchResult, search_ladder
 from pipeline.criticism.selection.alternatives import alternatives_to, experiment_for, remedies
 from pipeline.criticism.selection.missing_data import at_ambient, loaded, unexcited, unused
-from pipeline.criticism.selection.one_capture import only_capture
+from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of, frame_notes
 from pipeline.criticism.selection.score_test import Candidate, Score, candidates
 from pipeline.criticism.selection.stepwise import LadderStep, loss_without
@@ -46,7 +45,7 @@ from pipeline.records.diagnosis import (
     LadderRung,
     RankedEffect,
     Remainder,
-    ToldParameter,
+    ReportedParameter,
     Unexcited,
     Verdict,
 )
@@ -149,12 +148,8 @@ def _records(steps: Sequence[LadderStep], held: Sequence[HeldOut]) -> tuple[Ladd
 def _rests_on_one(ladder: Ladder) -> Iterator[str]:
     """Notes of the effects that one capture alone asks for, of those that others could show."""
     for n in range(1, len(ladder.steps)):
-        before, step = ladder.steps[n - 1].system, ladder.steps[n]
-        without, after = (
-            predicted_chi2(system, held)
-            for system, held in ((before, ladder.held[n - 1]), (step.system, ladder.held[n]))
-        )
-        capture = only_capture(step.system, without, after)
+        step = ladder.steps[n]
+        capture = rests_on((ladder.steps[n - 1].system, step.system), ladder.held[n - 1 : n + 1])
         name = step.fit.model.effects[-1].name
         if capture is not None and name in ladder.steps[-1].added:
             yield _ALONE.format(name, capture)
@@ -315,7 +310,7 @@ def _p_value(fall: float, dof: int) -> float:
     return float(gammaincc(dof / 2.0, max(fall, 0.0) / 2.0))
 
 
-def _parameters(step: LadderStep, effect: Effect, held: HeldOut) -> dict[str, ToldParameter]:
+def _parameters(step: LadderStep, effect: Effect, held: HeldOut) -> dict[str, ReportedParameter]:
     reported, start = parameters_of(step, held), f"{effect.name}."
     return {
         name.removeprefix(start): one for name, one in reported.items() if name.startswith(start)

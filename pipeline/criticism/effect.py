@@ -118,6 +118,7 @@ class Supply:
     """How a drive feeds the machine, where that is known.
 
     `pwm_s`, `vdc_v`: period of the inverter's switching and voltage of its link, 0 where not known.
+    `hold_s`: time for which a voltage vector stands while the rotor turns, 0 where not known.
     `volts_v`: the voltage that the drive's log records, in the true rotor frame, where it has both
     axes; a leg near zero current is judged by it. `q_alone`: the log shows the
     q axis only, so that of a voltage's delay its envelope is what shows.
@@ -127,6 +128,7 @@ class Supply:
     vdc_v: float = 0.0
     volts_v: Complex | None = None
     q_alone: bool = False
+    hold_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,8 +291,8 @@ def _waves(order: int, angle: Any) -> tuple[Any, Any]:
 class Recorded:
     """What sensor hooks may correct: complex dq current [A], shaft torque [N·m], on one clock.
 
-    `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument` tells the
-    instruments of one bench apart (`drive` or `bench`), `phase` (0, 1, 2) whose line current a
+    `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument`: which
+    of a bench's (`drive` or `bench`), `phase` (0, 1, 2) whose line current a
     two-terminal test recorded. `ahead`(delay): what current, torque and electrical angle are so
     much later [s], less what they are now, from the whole log; without it, from these samples.
     """
@@ -375,9 +377,23 @@ ClockHook = Callable[[str, Values], float]
 DiscriminatorHook = Callable[[Sequence[FullLog], Values], Discrimination | None]
 
 
+@dataclass(frozen=True, slots=True)
+class LinearForm:
+    """The equation of an effect in other parameters, which it is linear in wherever they are.
+
+    `effect` has these parameters; its name is never reported. `values`(q, base, machine): the
+    effect's own parameters from them and from the base constants, in their units; None where no
+    machine has such. `channel`: the signal in which it acts.
+    """
+
+    effect: Effect
+    channel: str
+    values: Callable[[Values, Values, Machine], Values | None]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Description:
-    """What is said of an effect to people.
+    """The description of an effect for people.
 
     `words` is its formula in a line, `signature` what it looks like, `headline` what a person says
     of it, with sizes in braces (`criticism.library.headline`); name and parameters without one.
@@ -421,6 +437,8 @@ class Hooks:
     shaft(t, q): recorded shaft torque from the true one [N·m].
     clock(recorder, q): recorded time over true time, less one [1], of a `RECORDERS` name.
 
+    linear: its linear form, from which it is fitted where no tangent leads to it.
+
     discriminator(logs, q): which of the effects that share this very function it is;
         None where full logs do not say. For effects whose equations differ in what windows smooth.
     """
@@ -436,6 +454,7 @@ class Hooks:
     shaft: Callable[[Array, Values], Array] | None = None
     speed: Callable[[Array, Values, float], Array] | None = None
     clock: ClockHook | None = None
+    linear: LinearForm | None = None
     discriminator: DiscriminatorHook | None = None
 
     @property
@@ -450,7 +469,7 @@ class Hooks:
 
 @dataclass(frozen=True, kw_only=True)
 class Effect(Description, Evidence, Hooks):
-    """One effect: what it is called, where it acts, what shows it and what is said of it.
+    """One effect: what it is called, where it acts, what shows it and its description.
 
     `parameters`, or `expand(machine)` where their number depends on the machine. `left_out`: the
     numbers of the optional terms that this copy of the effect does without.

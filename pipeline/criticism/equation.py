@@ -1,7 +1,7 @@
 """What an equation is: the physics that a kind of test is held against.
 
 An equation takes the captures of its tests as segments, says what their sensors should have shown
-by the machine's model, and what that tells of the model. It is one file in `equations/` with one
+by the machine's model, and what that shows of the model. It is one file in `equations/` with one
 `EQUATION`; CONTRIBUTING.md shows how to add one, here or in a package of your own.
 """
 
@@ -49,7 +49,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Observes:
-    """What an equation has in it, and so may tell of.
+    """What an equation has in it, and so may observe.
 
     `constants` of the base model (`machine.model.BASE`); of effects the `hooks` (`flux`, `drop`,
     `torque`), and the `sensors` whose errors are in it (`angle`, `current`, `voltage`, `load`,
@@ -71,7 +71,8 @@ class Sensing:
 
     `reading`(segment, channel, model, values) is what a sensor's linearity is a share of [n, the
     channel's unit]; without it the recorded signal itself. `errors`: those of `voltage_jumps`,
-    `current_jumps`, `encoder_lines` and `standstill` that an equation of a drive's log has.
+    `current_jumps`, `encoder_lines`, `standstill` and `late_speed` that an equation of a drive's
+    log has.
     `sensors` are the recorded signals that the channels are made of, if they are not the signals
     themselves, and `sensed`(segment, residual, model, values) is the residual of each of them [n].
     """
@@ -87,14 +88,16 @@ class Use:
     """What segments of an equation serve for, beside the fit.
 
     `shows`: of `current` and `turning`, what such a test is done under; a diagnosis needs both.
-    `warms`: hooks whose effects grow in it with a temperature. `free_runs`: tests in which the
-    model is also left to itself, with these `currents` as its state; a log with currents is looked
-    through for orders too. `angle_maps`: errors are mapped over the turn. `whole_beside`: equations
-    beside whose segments one of this is held out as a whole, and not in its blocks.
+    `warms`: hooks whose effects grow in it with a temperature; `at_rest`: in it no drive warmed the
+    winding. `free_runs`: tests in which the model is also left to itself, with these `currents` as
+    its state; a log with currents is looked through for orders too. `angle_maps`: errors are mapped
+    over the turn. `whole_beside`: equations beside whose segments one of this is held out as a
+    whole, and not in its blocks.
     """
 
     shows: frozenset[str] = frozenset()
     warms: frozenset[str] = frozenset()
+    at_rest: bool = False
     free_runs: tuple[str, ...] = ()
     currents: tuple[str, ...] = ()
     angle_maps: bool = False

@@ -13,10 +13,10 @@ from pipeline.criticism.validation.error_maps import (
     angle_maps,
     histograms,
     speed_current_map,
-    unit_of,
     window_errors,
 )
-from pipeline.records.diagnosis import LadderRung, RungError, ToldParameter
+from pipeline.physics.glossary import unit_of
+from pipeline.records.diagnosis import LadderRung, ReportedParameter, RungError
 
 
 def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
@@ -39,11 +39,12 @@ def step_record(step: LadderStep, held: HeldOut) -> LadderRung:
     )
 
 
-def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ToldParameter]:
+def parameters_of(step: LadderStep, held: HeldOut) -> dict[str, ReportedParameter]:
     """Value, standard uncertainty and unit of every effect's parameters on a step."""
     reported = reported_parameters(step.system, held)
     own = step.fit.model.parameters()
-    return {name: (reported[name].value, reported[name].u, reported[name].unit) for name in own}
+    found = ((name, reported[name]) for name in own)
+    return {name: ReportedParameter(one.value, one.u, one.unit) for name, one in found}
 
 
 def _rms(values: np.ndarray) -> float:

@@ -19,6 +19,7 @@ from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import HeldOut, in_common, leave_out, remainder
 from pipeline.criticism.residuals.segments import segments
 from pipeline.criticism.selection.drift import drifting_segments
+from pipeline.criticism.selection.one_capture import rests_on
 from pipeline.criticism.selection.order_scan import orders_left
 from pipeline.criticism.selection.requested_model import BaseFit, fit_of
 from pipeline.criticism.selection.stepwise import LadderStep, search
@@ -31,6 +32,10 @@ _DRIFT = "instruments drift slowly, by some {:g} times their noise at most: take
 _SMALLER = (
     "the sketch is of {}; {} misses by more, {:.3g} noise floors in {}, and no state of the "
     "machine predicts that"
+)
+_ALONE = (
+    "{} would help {} alone: predicted from the others, the other captures that it moves do not "
+    "gain with it; record that test once more"
 )
 _WITHIN = (
     "the sketch of what is left was held out a twelfth of a capture at a time, since no other "
@@ -166,12 +171,32 @@ def _with_drift(ladder: Ladder, library: Mapping[str, Effect]) -> Ladder | None:
 
 def ladder_from(start: BaseFit, library: Mapping[str, Effect]) -> Ladder:
     """The ladder from a model fitted, as far as it is trusted."""
-    steps = search(start.system.fit, library)
-    alone = [leave_out(step.system) for step in steps]
-    kept, left = truncated(steps, in_common([r.system for r in steps], alone))
+    searched = search(start.system.fit, library)
+    alone = [leave_out(step.system) for step in searched]
+    steps, unconfirmed = _confirmed(searched, alone)
+    kept, left = truncated(steps, in_common([r.system for r in steps], alone[: len(steps)]))
     held = in_common([r.system for r in kept], alone[: len(kept)])
     cut = {step.added[-1]: contradiction(step) for step in steps[len(kept) :]}
-    return Ladder(start, kept, list(held), left, cut)
+    return Ladder(start, kept, list(held), left, cut | unconfirmed)
+
+
+def _confirmed(
+    steps: Sequence[LadderStep], alone: Sequence[HeldOut]
+) -> tuple[tuple[LadderStep, ...], dict[str, str]]:
+    """The steps without trailing ones that one capture alone asks for, of which others show that
+    it is not there; and a note of each that goes.
+    """
+    count, notes = len(steps), {}
+    while count > 1:
+        systems = [step.system for step in steps[count - 2 : count]]
+        held = in_common(systems, alone[count - 2 : count])
+        capture = rests_on(systems, held)
+        if capture is None:
+            break
+        name = systems[-1].fit.model.effects[-1].name
+        notes[name] = _ALONE.format(name, capture)
+        count -= 1
+    return tuple(steps[:count]), notes
 
 
 def _sketched(

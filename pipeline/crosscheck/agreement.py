@@ -7,7 +7,7 @@ is chi-square distributed with n - 1 degrees of freedom [1]. Where it is too lar
 are parted at the gap that leaves least chi-square in both parts, again and again until each part
 agrees in itself.
 
-Parts are told only where they can be another motor's: the gap between them is wider than the
+Parts are reported only where they can be another motor's: the gap between them is wider than the
 parts themselves (else it is a drift), and captures of one way of measuring stand in both (else it
 is the way, a convention or a gain, for which there are other checks).
 

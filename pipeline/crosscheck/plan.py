@@ -98,10 +98,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Steps, the most telling first, and what no capture will settle.
+    """Steps, the most informative first, and what no capture will settle.
 
-    `model` says in lines what the model lacks, which command adds it, and what would tell it from
-    what else it could be.
+    `model` says in lines what the model lacks, which command adds it, and what would separate it
+    from what else it could be.
     """
 
     motor_id: str
@@ -131,7 +131,7 @@ class Plan:
 
 
 def _reasons(step: Step) -> list[str]:
-    """One line a reason, for all doubts that share it; what `how` tells is not said again."""
+    """One line a reason, for all doubts that share it; what `how` states is not repeated."""
     names: dict[str, list[str]] = {}
     for doubt in step.doubts:
         covered = doubt.words in step.experiments
@@ -240,8 +240,8 @@ def _model_lines(known: Known) -> tuple[str, ...]:
 def _step(test: str, doubts: list[Doubt], known: Known, ways: tuple[Way, ...]) -> Step:
     names = {doubt.name for doubt in doubts}
     measuring = [way for way in ways if test in way.tests and not way.computes]
-    telling = [way for way in measuring if names & set(way.gives)] or measuring[:1]
-    experiments = tuple(dict.fromkeys(way.experiment for way in telling))
+    informative = [way for way in measuring if names & set(way.gives)] or measuring[:1]
+    experiments = tuple(dict.fromkeys(way.experiment for way in informative))
     ordered = sorted(doubts, key=lambda doubt: (-doubt.weight, doubt.name))
     return Step(test, test in known.tests, tuple(ordered), experiments)
 

@@ -30,18 +30,18 @@ class Quantity(NamedTuple):
     """A quantity that constants of several methods give: value = factor * constant [unit]."""
 
     name: str
-    factor: float
     unit: str
+    factor: float = 1.0
 
 
 # The torque constant is 1.5 p psi in the amplitude-invariant frame.
 QUANTITIES: Mapping[str, Quantity] = {
-    "pole_pairs": Quantity("pole_pairs", 1.0, "1"),
-    "ke_phase_peak_v_s_rad": Quantity("p·psi", 1.0, "V·s/rad"),
-    "kt_peak_nm_a": Quantity("p·psi", 1.0 / 1.5, "V·s/rad"),
-    "r_phase_ohm": Quantity("r_phase_ohm", 1.0, "ohm"),
-    "ld_h": Quantity("ld_h", 1.0, "H"),
-    "lq_h": Quantity("lq_h", 1.0, "H"),
+    "pole_pairs": Quantity("pole_pairs", "1"),
+    "ke_phase_peak_v_s_rad": Quantity("p·psi", "V·s/rad"),
+    "kt_peak_nm_a": Quantity("p·psi", "V·s/rad", 1.0 / 1.5),
+    "r_phase_ohm": Quantity("r_phase_ohm", "ohm"),
+    "ld_h": Quantity("ld_h", "H"),
+    "lq_h": Quantity("lq_h", "H"),
 }
 
 

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.lot_constant import Side
 
 NO_LOT = "(no lot)"
-REFERENCE_DEGC = 25.0
 SLACK_K = 0.5
 # What a constant scales with, and so which temperature its datasheet must state.
 WINDING = ("r_phase_ohm", "r_ll_ohm")

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Stations = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from pipeline.lots.assess import Assessment
 from pipeline.physics.notation import quantity
 from pipeline.records.limits import ConstantLimits
 from pipeline.records.lot_constant import (
+    MOST_RELATIVE,
     Conformity,
     ConstantResult,
     Equivalence,
@@ -196,14 +197,14 @@ def _outside(conformity: Conformity) -> str:
 
 
 def _moved(found: Assessment, unit: str) -> str:
-    """The change in words: relative where it can be."""
+    """The change in words: relative where it can be, and where that share says something."""
     if found.contrast is None:
         return "not compared with the baseline"
     before = sum(found.base_means) / len(found.base_means)
     change = found.contrast.difference
-    if before:
+    if before and abs(change) <= MOST_RELATIVE * abs(before):
         return f"{100.0 * change / abs(before):+.3g} %"
-    return quantity(change, unit, 3)
+    return f"{'+' if change > 0.0 else ''}{quantity(change, unit, 3)}"
 
 
 def _p(value: float | None) -> str:

@@ -34,7 +34,8 @@ def cluster_covariance(
     Notes
     -----
     V = c (X'X)⁻¹ (Σ_g X_g' e_g e_g' X_g) (X'X)⁻¹, X and e divided by sigma, with the small-sample
-    factor c = G/(G − 1) · (n − 1)/(n − k). A single cluster has no covariance: its scores sum to
+    factor c = G/(G − 1) · (n − 1)/(n − k). It is the product of a matrix with itself, so that no
+    rounding makes a variance negative. A single cluster has no covariance: its scores sum to
     zero, and so does V.
 
     References
@@ -55,5 +56,6 @@ def cluster_covariance(
     sums = np.zeros((count, k))
     np.add.at(sums, index, score)
     factor = count / max(count - 1, 1) * (n - 1) / max(n - k, 1)
-    covariance: Array = bread @ (sums.T @ sums) @ bread / np.outer(norm, norm) * factor
+    influence = sums @ bread / norm
+    covariance: Array = influence.T @ influence * factor
     return covariance, max(count - 1, 1)

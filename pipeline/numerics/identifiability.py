@@ -72,7 +72,7 @@ class Identified:
 
     def u_of_bent(self, gradient: Array) -> float:
         """The same for a function that is not linear, whose gradient is orthogonal to directions
-        without information as far as columns from finite differences can tell.
+        without information as far as columns from finite differences can show.
         """
         there = float(np.linalg.norm(gradient * self.sizes))
         moved = float(np.linalg.norm(gradient @ self.null))

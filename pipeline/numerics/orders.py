@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import linear_fit
+from pipeline.physics.units import TURN_RAD
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-TURN_RAD = 2.0 * np.pi
 NEIGHBOURS = 10
 DENSE = 64
 MOST_LINES = 40

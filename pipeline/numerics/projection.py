@@ -1,7 +1,7 @@
 """Projection of sampled residuals on smooth windows times harmonics of the shaft angle.
 
 Test functions that vanish smoothly at both ends move time derivatives off the noisy signal
-without taking any, and the harmonics tell at which order of the shaft an error sits.
+without taking any, and the harmonics show at which order of the shaft an error sits.
 
 References: [1] Messenger & Bortz, J. Comput. Phys. 443 (2021) 110525, section 3: test functions
 (1 − u²)^p.

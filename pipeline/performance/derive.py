@@ -28,13 +28,13 @@ from pipeline.performance.sources import (
     COPPER,
     ELECTRICAL,
     MECHANICAL,
-    REFERENCE_DEGC,
     Sources,
     heat_of,
     machine_at,
     missing,
     sources_of,
 )
+from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.datasheet import Datasheet
 from pipeline.records.estimate import Estimate
 from pipeline.records.performance import (

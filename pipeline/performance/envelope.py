@@ -8,7 +8,6 @@ References: T. M. Jahns, IEEE Trans. Ind. Appl. IA-23(4), 1987, 681, doi:10.1109
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 from pipeline.performance.machine import Machine, drag_nm, inductances_h, torque_nm, voltage_v
 
 Array = NDArray[np.float64]
-Regime = Literal["MTPA", "field weakening", "MTPV", "none"]
 COARSE_DEG, FINER, ROUNDS = 3.0, ((3.0, 41), (0.15, 13)), 8
 LEAST_DEG, MOST_DEG = -45.0, 90.0
 CLOSE = 2e-3

@@ -12,12 +12,12 @@ from pipeline.performance.draws import joint_draws
 from pipeline.performance.heat import Heat
 from pipeline.performance.machine import Machine
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.estimate import Estimate
 from pipeline.records.performance import Blank
 from pipeline.records.uncertainty import type_b
 
 Array = NDArray[np.float64]
-REFERENCE_DEGC = 25.0
 SEEN = 2.0
 """Standard deviations from which on an inductance is seen to go with the current."""
 ELECTRICAL = ("r_phase_ohm", "ld_h", "lq_h", "psi_pm_wb", "pole_pairs")

@@ -32,6 +32,8 @@ class Term:
         stated = SUFFIX_UNITS.get(suffix_of(self.name))
         if stated is not None and stated != self.unit:
             raise ValueError(f"{self.name} ends in the suffix of {stated} but states {self.unit}")
+        if self.low is not None and self.high is not None and self.low >= self.high:
+            raise ValueError(f"{self.name} is plausible from {self.low} to {self.high}: nowhere")
 
 
 def suffix_of(name: str) -> str:
@@ -59,6 +61,11 @@ def suffix_of(name: str) -> str:
         if tail in SUFFIX_UNITS:
             return tail
     return ""
+
+
+def unit_of(name: str) -> str:
+    """The unit that the suffix of a name stands for; `1` where it has none."""
+    return SUFFIX_UNITS.get(suffix_of(name), "1")
 
 
 def _columns() -> Iterable[Term]:

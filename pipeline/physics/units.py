@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+TURN_RAD = 2.0 * math.pi
+"""One turn."""
+REFERENCE_DEGC = 25.0
+"""The temperature that constants are given at."""
 SUFFIX_UNITS: dict[str, str] = {
     "s": "s",
     "v": "V",

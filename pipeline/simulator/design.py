@@ -171,7 +171,7 @@ class Bench:
     of fast captures on a clock of their own. `scope` records the current steps in place of the
     station's own sensors. Hidden faults of the recorder: its clock is fast or
     slow by the share `clock_rel` beyond what `u_rel_clock` states (stated where above 0), while the
-    speed that the bench tells goes by a clock of its own; torque and logged dq currents come
+    speed that the bench reports goes by a clock of its own; torque and logged dq currents come
     `late_torque_s` and `late_current_s` late. `dyno_hz` is the bandwidth of the dynamometer's speed
     loop, whose transducer then shows the reaction torque of its stator; 0 holds the shaft's far
     end at its speed, with the transducer in the coupling.

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from pipeline.simulator.design import EXTRA_SIGNALS, EXTRA_VARIABLES, Motor
 from pipeline.simulator.effects import active, cogging_order
 
-REFERENCE_DEGC = 25.0
-
-
 NUMBERS = """
     pole_pairs r_a_ohm r_b_ohm r_c_ohm alpha_copper skin skin_knee omega_elec_rated dead_v
     dead_knee_a psi_wb alpha_magnet h5 h7 h11 h13 p5 p7 p11 p13 ld_h lq_h nu_d nu_q nu_phase

@@ -27,7 +27,7 @@ class CurrentStep:
     Times are in electrical time constants. The edges fall on sampling instants unless
     `random_edges` puts each anywhere between two of them or `rise_s` gives the supply a ramp;
     `source_share` is the supply's resistance over the pair's. The rotor is `theta_off_deg` from
-    where it is said to be.
+    where it is stated to be.
     """
 
     pair: str = "ab"

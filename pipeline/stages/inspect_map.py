@@ -84,7 +84,7 @@ def folder(settings: InspectSettings) -> Outcome:
     lines += _known_lines(known)
     empty = [one.file for one in looked if one not in strangers and one not in known]
     lines += [f"no table of numbers: {printable(path)}" for path in empty] + unread
-    more = finish(settings, settings.file, strangers, None)
+    more = finish(settings, settings.file, strangers, None, known)
     result = {"files": [file_record(one.file, one.report) for one in looked], **more.result}
     return Outcome(more.exit_code, "\n".join(lines) + "\n" + more.text, more.errors, result=result)
 
@@ -124,18 +124,24 @@ def finish(
     root: str,
     strangers: Sequence[Looked],
     only: tuple[str, ...] | None,
+    known: Sequence[Looked] = (),
 ) -> Outcome:
-    """The map of all shapes, previewed, written and checked as far as the settings ask for it."""
+    """The map of all shapes, previewed, written and checked as far as the settings ask for it.
+
+    Files that a map reads already, the `known`, get that map with the answers in its metadata.
+    """
+    from pipeline.io.inspection.adopted import adopted_text
     from pipeline.io.inspection.file_names import name_patterns
     from pipeline.io.inspection.starter_map import map_text
+    from pipeline.io.maps.places import map_file
 
     lines: list[str] = []
     text = ""
     asked: dict[str, str] = {}
+    metadata = {key: value for key, value in settings.answers.items() if "." not in key}
     if strangers:
         groups = _groups(strangers)
         names = name_patterns([one.file for one in strangers], frozenset(settings.answers))
-        metadata = {key: value for key, value in settings.answers.items() if "." not in key}
         by_name = any("contract" in dict(one.report.metadata) for one in strangers)
         text = map_text([shape for shape, _ in groups], names, metadata, by_name=by_name)
         if only is None:
@@ -146,18 +152,24 @@ def finish(
         tasks = [PreviewTask(root, file, _read_limits(settings), text) for file in firsts]
         for preview in in_workers(preview_of, tasks):
             lines += preview
-        if settings.map:
-            write_whole(Path(settings.map), text.encode())
-            lines.append(f"written: {settings.map}; `run input={root} source={settings.map}`")
-        elif only is None:
-            lines += ["the source map (map=PATH writes it):", "", text.rstrip("\n")]
+    sources = {
+        name: None for one in known for name in (one.report.source or "").split(", ") if name
+    }
+    files = {name.partition("/")[0]: None for name in sources}
+    if files and (metadata or settings.map or text):
+        text = adopted_text([map_file(name, settings.config_dir) for name in files], metadata, text)
+    if text and settings.map:
+        write_whole(Path(settings.map), text.encode())
+        lines.append(f"written: {settings.map}; `run input={root} source={settings.map}`")
+    elif text and only is None:
+        lines += ["the source map (map=PATH writes it):", "", text.rstrip("\n")]
     result = {"asked": asked, "map": text or None, "motors": None}
     if not settings.check:
         return Outcome(0, "\n".join(lines) + "\n" if lines else "", result=result)
     checked = _check(settings, root, text, only)
-    told = "\n".join([*lines, checked.text]) + "\n"
+    text = "\n".join([*lines, checked.text]) + "\n"
     result |= checked.result
-    return Outcome(checked.exit_code, told, checked.errors, result=result)
+    return Outcome(checked.exit_code, text, checked.errors, result=result)
 
 
 def _groups(strangers: Sequence[Looked]) -> list[tuple[Shape, list[str]]]:
@@ -227,7 +239,7 @@ def _check(
     from pipeline.stages.steps.campaigns import campaigns
 
     with TemporaryDirectory() as place:
-        source = settings.map or "auto"
+        source = (settings.map if text else None) or "auto"
         if text and not settings.map:
             source = str(Path(place) / "proposed.yaml")
             write_whole(Path(source), text.encode())

@@ -60,7 +60,7 @@ class ComparisonView:
     """One comparison, every text ready to be shown.
 
     `added` are sizes of the effects that were asked for; `unknown` parameters that these captures
-    do not determine, `together` what they tell of them; `places` what errors depend on.
+    do not determine, `together` what they determine of them; `places` what errors depend on.
     """
 
     headline: str

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pipeline.physics.glossary import suffix_of
+from pipeline.physics.glossary import suffix_of, unit_of
 from pipeline.physics.notation import plain, scale_for
 from pipeline.records.estimate import Conditions
-from pipeline.views.names import quantity_words, unit_of
+from pipeline.views.names import quantity_words
 
 _LOW, _HIGH = "low", "high"
 

@@ -118,7 +118,7 @@ def _row(
     failed = tuple((c.name, c.status) for c in sheet.checks if c.status in ("fail", "marginal"))
     common = {reason.text: number for number, reason in enumerate(reasons, 1)}
     parted = [(reason, kind_of_reason(sheet, reason)) for reason in current.why]
-    own = [reason for reason, kind in parted if kind not in common]
+    own = [_less_badge(reason, failed) for reason, kind in parted if kind not in common]
     return MotorRow(
         sheet,
         current,
@@ -128,6 +128,13 @@ def _row(
         model_words(sheet.model, sheet.motor_id),
         tuple(_cell(sheet.constants.get(column.name), column.scale) for column in columns),
     )
+
+
+def _less_badge(reason: str, failed: Sequence[tuple[str, str]]) -> str:
+    """A failed check's reason without the name that the check's badge shows beside it."""
+    for name, _ in failed:
+        reason = reason.removeprefix(f"check {name} failed: ")
+    return reason
 
 
 def _cell(estimate: Estimate | None, scale: Scale) -> Cell:

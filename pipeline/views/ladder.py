@@ -6,11 +6,12 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, number_text, quantity, significant
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
 from pipeline.records.model_verdict import number
 from pipeline.views.constants import sentence
-from pipeline.views.names import quantity_words, unit_of
+from pipeline.views.names import quantity_words
 
 TONES = {"adequate": "pass", "missing": "marginal", "unknown": "fail"}
 SPEED, CURRENT = "omega_mech_rad_s", "iq_a"
@@ -51,7 +52,7 @@ class RungView:
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """An effect that was found, what else it could be, and the tests that would tell, with the
+    """An effect that was found, what else it could be, and the tests that would decide, with the
     power that they are predicted to have.
     """
 

@@ -1,11 +1,11 @@
-"""Lots held against lots, for people: what changed first, by how much, and why, told once."""
+"""Lots held against lots, for people: what changed first, by how much, and why."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from pipeline.physics.notation import quantity, reading
-from pipeline.records.lot_constant import ConstantResult, Side
+from pipeline.records.lot_constant import MOST_RELATIVE, ConstantResult, Side
 from pipeline.records.lot_regression import LotRegression
 from pipeline.views.constants import constant_words, symbol
 from pipeline.views.reasons import Reason, shared_reasons
@@ -14,8 +14,6 @@ NONE = "–"
 RANKS = ("fail", "CONFOUNDED", "INSUFFICIENT_HISTORY", "undecided", "marginal")
 TONES = {"pass": "pass", "marginal": "marginal", "fail": "fail"}
 MARKS = {"pass": "✓", "fail": "✗", "marginal": "⚠"}
-MOST_RELATIVE = 2.0
-"""Change over the baseline from which on it is told in the constant's own unit."""
 
 
 @dataclass(frozen=True, slots=True)

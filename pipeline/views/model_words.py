@@ -23,7 +23,7 @@ OLD = ModelVerdict("not_tested", note="the datasheet is older than the residual 
 class ModelWords:
     """Verdict and residual in `short`, and each by itself; one sentence without a full stop; what
     the two numbers of noise floors are `over`, where they differ; the
-    command that tells more and the one that adds what was found (empty where there is none);
+    command that shows more and the one that adds what was found (empty where there is none);
     `rows` of name and text; a number to `sort` by.
     """
 

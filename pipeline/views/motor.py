@@ -62,6 +62,10 @@ class Row:
     parts: tuple[Part, ...]
     alternatives: tuple[Alternative, ...]
 
+    def shares(self, least: float = 0.0) -> str:
+        """The parts of u² that have at least this share of it, in words."""
+        return ", ".join(f"{p.kind} {p.percent}" for p in self.parts if p.share >= least)
+
 
 def motor_rows(datasheet: Datasheet, own: Mapping[str, Term] | None = None) -> dict[str, Row]:
     """The constants of a datasheet by name, sorted; `own` are terms that the glossary lacks."""

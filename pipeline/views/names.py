@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.physics.glossary import suffix_of
+from pipeline.physics.glossary import suffix_of, unit_of
 from pipeline.physics.notation import unit_text
-from pipeline.physics.units import SUFFIX_UNITS
 
 _SPOKEN = {
     "t": "time",
@@ -14,11 +13,6 @@ _SPOKEN = {
     "temp": "temperature",
 }
 _AXES = {"ia", "ib", "ic", "id", "iq", "va", "vb", "vc", "vd", "vq", "vab", "vbc", "vca", "vdc"}
-
-
-def unit_of(name: str) -> str:
-    """The unit that the suffix of a name stands for; `1` where it has none."""
-    return SUFFIX_UNITS.get(suffix_of(name), "1")
 
 
 def quantity_words(name: str) -> str:

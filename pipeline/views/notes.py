@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pipeline.records.diagnosis import Diagnosis, Unexcited
 
 FEW = 3
-"""So many effects that no test excites are told in full."""
+"""So many effects that no test excites are listed in full."""
 
 
 def shown_and_folded(result: Diagnosis) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Notes to tell, and those on single effects that a few lines among the former stand for.
+    """Notes to show, and those on single effects that a few lines among the former stand for.
 
     Each effect goes with one test that would excite it, the tests that would excite most first.
     """

@@ -74,7 +74,7 @@ def _row(one: Derived) -> NumberRow:
 
 
 def _conditions(one: Operation) -> tuple[tuple[str, str, str], ...]:
-    told = [
+    stated = [
         ("DC bus voltage", quantity(one.vdc_v, "V", 3), "vdc_v"),
         ("share of it that is used", f"{one.voltage_share:g}", "voltage_share"),
         ("current limit, phase peak", quantity(one.current_a, "A", 3), "current_a"),
@@ -83,7 +83,7 @@ def _conditions(one: Operation) -> tuple[tuple[str, str, str], ...]:
         ("ambient", quantity(one.temp_ambient_degc, "degC", 3), "temp_ambient_degc"),
         ("winding's limit", quantity(one.temp_limit_degc, "degC", 3), "temp_limit_degc"),
     ]
-    return tuple((words, value, one.origin.get(name, "stated")) for words, value, name in told)
+    return tuple((words, value, one.origin.get(name, "stated")) for words, value, name in stated)
 
 
 def _spread(cells: tuple[MapCell, ...]) -> list[MapCell]:

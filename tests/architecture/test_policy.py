@@ -25,7 +25,7 @@ IN_POLICY = (
     "machine",
 )
 ARITHMETIC = {
-    "discovery/bases.py": {"TURN_RAD", "_EDGE"},  # a turn; beside zero and not at it
+    "discovery/bases.py": {"_EDGE"},  # beside zero and not at it
     "discovery/description.py": {"_POINTS", "_TURN_POINTS", "_DENSE", "_A_WAVE"},  # of a picture
     "discovery/dictionary.py": {"SHAPES", "_ABOVE_DEGC"},  # formulas; the model's temperature
     "discovery/matching_pursuit.py": {"_RIDGE"},  # against rounding
@@ -44,10 +44,10 @@ ARITHMETIC = {
     "regression/parallel.py": {"_THREADS"},  # how work is run
     "validation/free_run.py": {"_SEED"},
     # cells of a picture, when its waves are laid over each other; a turn
-    "validation/signature.py": {"_CELLS", "_FEWEST", "_TURN", "_MANY_WAVES", "_FINE"},
+    "validation/signature.py": {"_CELLS", "_FEWEST", "_MANY_WAVES", "_FINE"},
     "validation/trajectories.py": {"_PAD", "_START_S", "_PROBE"},  # samples kept; differences
     "data/clocks.py": {"_REACH"},  # a cubic goes through four samples
-    "data/segment.py": {"PAIR_RAD", "_REFERENCE_DEGC"},  # a turn; the model's temperature
+    "data/segment.py": {"PAIR_RAD"},  # a turn
     # the grid of a search for a step; rounding
     "data/sensor_noise.py": {
         "_LOOKED_AT",

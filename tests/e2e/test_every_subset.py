@@ -84,7 +84,8 @@ def _alike(one: Estimate, other: Estimate) -> bool:
 def judged(found: Iterable[Estimate], true: Mapping[str, float], least: int) -> None:
     """No constant misses more often than chance lets a sound one, and none by far.
 
-    Subsets that leave an estimate about as it is are one draw, which is counted once.
+    Subsets that leave an estimate about as it is are one draw, which is counted once. `least`
+    constants are known by some subset, so that silence is no pass.
     """
     drawn: dict[tuple[str, str], list[Estimate]] = {}
     for one in found:
@@ -105,7 +106,7 @@ def judged(found: Iterable[Estimate], true: Mapping[str, float], least: int) -> 
         if missed[name] and bdtrc(missed[name] - 1, n, LEVEL) < SURE
     }
     assert often == {}
-    assert tried.total() >= least
+    assert len(tried) >= least, sorted(tried)
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +121,7 @@ def rig() -> tuple[pipeline.Recordings, Campaign, dict[str, float]]:
 @needs_p0
 def test_every_set_of_tests_of_the_rig(rig):
     recordings, whole, true = rig
-    judged(fitted(recordings, of_kinds(whole)), true, 60)
+    judged(fitted(recordings, of_kinds(whole)), true, 23)
 
 
 @pytest.mark.slow
@@ -128,8 +129,8 @@ def test_every_set_of_tests_of_the_rig(rig):
 @pytest.mark.parametrize(
     ("path", "least"),
     [
-        ("drive_0", 40),
-        ("torque_map_0", 20),
+        ("drive_0", 5),
+        ("torque_map_0", 5),
         ("heat_run", 1),
         ("open_circuit_1", 5),
         ("cogging_cw", 0),

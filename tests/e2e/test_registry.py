@@ -132,6 +132,9 @@ def test_a_place_where_no_registry_can_be_is_said_before_any_work(bench: Bench) 
     assert not bench.output.exists()
 
 
+QUICK = ("report=false", "recordings=false", "diagnose=false")
+
+
 def test_the_readme_releases_and_exports_a_motor_of_the_demo(tmp_path: Path) -> None:
     """Its lines as they stand, in their order, on what a run of the demo's captures published."""
     root = Path(__file__).parents[2]
@@ -141,7 +144,7 @@ def test_the_readme_releases_and_exports_a_motor_of_the_demo(tmp_path: Path) -> 
     assert (approve[:2], export[0]) == (["registry", "approve"], "export")
     output, registry = f"output={tmp_path}", f"registry={tmp_path / 'registry'}"
     demo = root / "data" / "demo" / "G52-0601"
-    assert main(["run", f"input={demo}", output, "report=false", "recordings=false"]) == 0
+    assert main(["run", f"input={demo}", output, *QUICK]) == 0
     assert main([*export, output]) == 2
     assert main([*approve, registry]) == 0
     assert main([*export, output]) == 0

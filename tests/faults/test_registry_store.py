@@ -105,8 +105,8 @@ def test_the_commands_work_on_a_bucket(
     words = [f"registry={place}", *(f"registry_options.{k}={v}" for k, v in store.items())]
     folder, output = tmp_path / "in", tmp_path / "out"
     folder.mkdir()
-    rows = "".join(f"{n / 1000},{n // 50},{2 * (n // 50)},25.0\n" for n in range(400))
-    for scale in ("ia_a", "ib_a"):
+    for scale, sign in (("ia_a", 1), ("ib_a", -1)):
+        rows = "".join(f"{n / 1000},{n // 50},{2 * sign * (n // 50)},25.0\n" for n in range(400))
         head = "# contract: 1\n# motor_id: m/1\n# test: resistance\n# pair: ab\n"
         (folder / "r.csv").write_text(f"{head}t_s,vab_v,{scale},temp_winding_degc\n{rows}")
         run = ["run", f"input={folder}", f"output={output}", "recordings=false", "report=false"]

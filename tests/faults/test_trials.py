@@ -13,7 +13,7 @@ import pytest
 from tests.faults.bombs import BESIDE, BOMBS, write
 from tests.faults.damage import LAYOUTS, damage
 from tests.faults.fleet import CAPTURES, ROOT, cost, make_fleet, simulated
-from tests.faults.kills import full_disk, kill_runs
+from tests.faults.kills import begin, full_disk, kill_runs
 
 FULL = pytest.mark.slow
 
@@ -66,12 +66,16 @@ def test_a_killed_run_is_finished_by_the_next(one: Path, tmp_path: Path, kills: 
     assert found.orphans == 0
 
 
-@pytest.mark.parametrize(
-    "limit_bytes", [30_000, *(pytest.param(n, marks=FULL) for n in (500, 4000, 80_000, 120_000))]
-)
-def test_a_full_disk(one: Path, tmp_path: Path, limit_bytes: int) -> None:
-    """Exit 5, one line that says what to do, and no file that is not whole."""
+@pytest.mark.parametrize("share", [0.3, *(pytest.param(n, marks=FULL) for n in (0.005, 0.04, 1.0))])
+def test_a_full_disk(one: Path, tmp_path: Path, share: float) -> None:
+    """Exit 5, one line that says what to do, and no file that is not whole.
+
+    The disk takes no file beyond a share of the largest one that a run writes, less a byte.
+    """
     folder = make_fleet(one, tmp_path / "in", 1)
+    begin(folder, tmp_path / "whole", tmp_path / "home").communicate()
+    largest = max(p.stat().st_size for p in (tmp_path / "whole").rglob("*") if p.is_file())
+    limit_bytes = int(share * largest) - 1
     found = full_disk(folder, tmp_path / "out", tmp_path / "home", limit_bytes)
     assert (found.torn, found.left_over) == ((), ())
     assert found.code == 5, found

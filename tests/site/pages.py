@@ -24,6 +24,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "Tutorials": ("notebooks/*", "tutorial-effect"),
     "How to": (
         "source-maps",
+        "drive-logs",
         "recorder-forms",
         "review",
         "registry",

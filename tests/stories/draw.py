@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
+from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.policy.policy import DEFAULT
-from tests.stories.fits import REAL, campaign, fit
+from tests.sectors import sector_errors
+from tests.stories.fits import REAL, campaign, fit, without
 from tests.stories.svg import COLOURS, INK, Panel, page
 
 BLUE, RED, GREEN, VIOLET, OCHRE = COLOURS
@@ -51,6 +52,7 @@ def holding() -> str:
 def timing() -> str:
     """The recorded speed behind the angle's, and the resistance as effects are added."""
     found = campaign("laas_solo")
+    blind = fit(without(found, "theta_mech_rad"), kinds=("q",), on_time=True)
     plain = fit(found, kinds=("q",))
     late = fit(found, "sample_delay", kinds=("q",))
     both = fit(found, "sample_delay", "dead_time", kinds=("q",))
@@ -62,8 +64,8 @@ def timing() -> str:
     at = np.arange(segment.size)[rows] * segment.ts_s
     left.add("dots", at, _calm(from_angle)[rows], OCHRE, "from the angle")
     left.add("line", at, seen[1][rows], BLUE, "as recorded")
-    names = ("as recorded", "+ timing", "+ dead time", "standstill")
-    ohm = [f.values["r_ohm"] for f in (plain, late, both)] + [0.485]
+    names = ("by its own speed", "by the angle", "+ dead time", "standstill")
+    ohm = [f.values["r_ohm"] for f in (blind, late, both)] + [0.485]
     right = Panel("Resistance along the ladder", "", "R [Ω]", x_labels=names)
     for n, value in enumerate(ohm):
         right.add("bars", [n], [value], (BLUE, BLUE, BLUE, INK)[n])

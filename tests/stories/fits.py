@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.library.named_models import model_of
-from pipeline.criticism.machine.model import Model
+from pipeline.criticism.machine.model import LATE_SPEED, Model
 from pipeline.criticism.regression.goodness import leave_out, signal_errors
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import measured, residual
@@ -59,11 +59,32 @@ def campaign(folder: str, motor: str | None = None) -> Campaign:
     return campaigns(str(REAL / folder), motor=motor)[0][0]
 
 
-def fit(found: Campaign, *effects: str, kinds: tuple[str, ...] = (), offsets: bool = True) -> Fit:
-    """The ideal model with effects, optional terms left out where they do not pay."""
+def without(found: Campaign, column: str) -> Campaign:
+    """The recordings without one of their columns."""
+    captures = (
+        replace(one, tables=tuple(t.drop(column, strict=False) for t in one.tables))
+        for one in found.captures
+    )
+    return replace(found, captures=tuple(captures))
+
+
+def fit(
+    found: Campaign,
+    *effects: str,
+    kinds: tuple[str, ...] = (),
+    offsets: bool = True,
+    on_time: bool = False,
+) -> Fit:
+    """The ideal model with effects, optional terms left out where they do not pay.
+
+    `on_time`: a drive's own speed is taken as it stands where no angle is beside it.
+    """
     start = start_constants(found)
     machine = machine_of(found, start)
     parts = tuple(s for s in segments(found, machine) if not kinds or s.kind in kinds)
+    if on_time:
+        fixed = [{k: v for k, v in s.fixed.items() if k != LATE_SPEED} for s in parts]
+        parts = tuple(replace(s, fixed=kept) for s, kept in zip(parts, fixed, strict=True))
     if not offsets:
         parts = tuple(replace(s, disturbances=replace(s.disturbances, offsets=None)) for s in parts)
     model = model_of(ModelSpec("ideal", effects), machine)

@@ -9,8 +9,10 @@ from pipeline.records.diagnosis import (
     LadderRung,
     RankedEffect,
     Remainder,
+    ReportedParameter,
     RungError,
     Signature,
+    SketchTerm,
     Unexcited,
     UnknownStructure,
 )
@@ -47,9 +49,9 @@ def make_signature() -> Signature:
 
 
 def make_rung(effects: tuple[str, ...], scale: float) -> LadderRung:
-    parameters = {"coulomb_friction.torque_nm": (0.004, 1e-5, "N·m")}
+    parameters = {"coulomb_friction.torque_nm": ReportedParameter(0.004, 1e-5, "N·m")}
     if effects:
-        parameters["dead_time.loss_v"] = (0.1799, 1.2e-4, "V")
+        parameters["dead_time.loss_v"] = ReportedParameter(0.1799, 1.2e-4, "V")
     errors = {"vq_v": RungError(0.13 * scale, 2e-3, "V"), "v_pair_v": RungError(5e-4, 5e-4, "V")}
     edges = tuple(np.linspace(-8.0, 8.0, 9).tolist())
     return LadderRung(
@@ -73,11 +75,12 @@ def make_diagnosis(motor_id: str = "joint-P1", *, unknown: bool = False) -> Diag
         ("phase_imbalance",),
         "each phase loses V; offset at small current",
         "low-speed current steps",
-        {"loss_v": (0.1799, 1.2e-4, "V")},
+        {"loss_v": ReportedParameter(0.1799, 1.2e-4, "V")},
         headline="voltage lost in the inverter, 179.90 ± 0.24 mV a phase",
     )
     other = RankedEffect("windage", -12.0, 0.0, 0.3, (), "c ω|ω|", "a spin-down", {})
-    sketch = UnknownStructure("vq_v", ("iq_a",), "odd in iq_a", (("at iq_a = 4", 0.12, "V"),))
+    terms = (SketchTerm("at iq_a = 4", 0.12, "V"),)
+    structure = UnknownStructure("vq_v", ("iq_a",), "odd in iq_a", terms)
     return Diagnosis(
         motor_id,
         "standard",
@@ -85,7 +88,7 @@ def make_diagnosis(motor_id: str = "joint-P1", *, unknown: bool = False) -> Diag
         ("dead_time",),
         (found, other),
         (make_rung((), 1.0), make_rung(("dead_time",), 0.02)),
-        sketch if unknown else None,
+        structure if unknown else None,
         (Remainder("drive_0.mcap", "vq_v", 0, 3.5, 4e-3),),
         (),
         (Unexcited("compliance", ("torque_map",), "a torque step"),),

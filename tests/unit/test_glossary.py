@@ -162,6 +162,8 @@ def test_every_number_has_a_range(term: Term) -> None:
 def test_a_suffix_of_another_unit_is_refused() -> None:
     with pytest.raises(ValueError, match="ends in the suffix of N·m"):
         Term("torque_shaft_nm", "mN·m", "wrong", "column")
+    with pytest.raises(ValueError, match="nowhere"):
+        Term("x_nm", "N·m", "a torque", "constant", 1.0, -1.0)
 
 
 def _sources() -> Iterator[Path]:

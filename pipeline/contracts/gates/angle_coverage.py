@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_VOLTAGES, TERMINAL_VOLTAGES
-from pipeline.contracts.rotation import TURN_RAD, line_voltage_vector, turned_rad, turning
+from pipeline.contracts.rotation import line_voltage_vector, turned_rad, turning
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 

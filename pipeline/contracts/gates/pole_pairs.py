@@ -69,7 +69,7 @@ GATE = Gate(
     ("open_circuit", "hand_turn"),
     check,
     {
-        # Fewer cycles do not tell neighbouring counts apart.
+        # Fewer cycles do not separate neighbouring counts.
         "cycles": 3.0,
         # Five standard uncertainties within half a count; an angle this poor is not counted on.
         "largest_u": 0.1,

@@ -9,9 +9,10 @@ import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
 from pipeline.contracts.requirements import LINE_CURRENTS
-from pipeline.contracts.rotation import TURN_RAD, turning
+from pipeline.contracts.rotation import turning
 from pipeline.contracts.waveform import noise_of, samples_per_time_constant
 from pipeline.physics.mechanics import cogging_order
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 

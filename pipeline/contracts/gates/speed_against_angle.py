@@ -8,8 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.contracts.protocol import Gate, Passed, warning
-from pipeline.contracts.rotation import TURN_RAD, integral
+from pipeline.contracts.rotation import integral
 from pipeline.contracts.waveform import Array, noise_of
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 
@@ -35,12 +36,16 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
 
     Notes
     -----
-    The ratio of `speed_over_angle` off 1 by more than `warn` [1] warns, by more than `refuse` [1]
-    refuses, with the unit or count that it lands on within 2 %.
+    The ratio of `speed_over_angle` off 1 by more than `warn` [1] and twice its standard uncertainty
+    warns, by more than `refuse` [1] refuses, with the unit or count that it lands on within 2 %.
 
     """
-    ratio = speed_over_angle(capture, options["turns"])
-    if ratio is None or abs(ratio - 1.0) <= options["warn"]:
+    found = speed_over_angle(capture, options["turns"])
+    if found is None:
+        return Passed()
+    ratio, u = found
+    off = abs(ratio - 1.0)
+    if off <= options["refuse"] and off - 2.0 * u <= options["warn"]:
         return Passed()
     if ratio == 0.0 or math.isinf(ratio):
         raise CaptureError(CODE, *_standing(ratio))
@@ -48,7 +53,7 @@ def check(capture: Capture, options: Mapping[str, float]) -> Passed:
     suspect = _suspect(ratio, capture.meta.pole_pairs)
     words += f": {suspect}" if suspect else ""
     remedy = "map the unit or sign in conf/source"
-    if abs(ratio - 1.0) > options["refuse"]:
+    if off > options["refuse"]:
         raise CaptureError(CODE, words, remedy)
     return Passed(findings=(warning(capture, CODE, words, "the angle is used; " + remedy),))
 
@@ -62,8 +67,8 @@ def _standing(ratio: float) -> tuple[str, str]:
     return words, "check the sensor that stands still and its lead, and record again"
 
 
-def speed_over_angle(capture: Capture, turns: float) -> float | None:
-    """Integrated speed over angle, from block increments.
+def speed_over_angle(capture: Capture, turns: float) -> tuple[float, float] | None:
+    """Integrated speed over angle, from block increments, and its standard uncertainty.
 
     Parameters
     ----------
@@ -74,15 +79,16 @@ def speed_over_angle(capture: Capture, turns: float) -> float | None:
 
     Returns
     -------
-    float or None
-        [1]; 0 where the speed stands still while the angle moves, infinite where the angle does.
+    tuple of float or None
+        [1, 1]; 0 where the speed stands still while the angle moves, infinite where the angle does.
         None where a column is missing or the shaft hardly turns.
 
     Notes
     -----
-    r = Σ Δθ Δ∫ω dt/Σ Δθ² over `BLOCKS` blocks. A shaft rests where its angle passes less than
-    `turns` and its speed is noise: integrated, the noise makes turns that are no sign of a wrong
-    sign.
+    r = Σ Δθ Δ∫ω dt/Σ Δθ² over `BLOCKS` blocks, and its uncertainty is that of a slope: a shaft that
+    swings as fast as blocks follow each other scatters about it where its speed is filtered. A
+    shaft rests where its angle passes less than `turns` and its speed is noise: integrated, the
+    noise makes turns that are no sign of a wrong sign.
 
     """
     for table in capture.tables:
@@ -101,8 +107,11 @@ def speed_over_angle(capture: Capture, turns: float) -> float | None:
         if np.abs(by_angle).sum() < turns * TURN_RAD and is_noise(rows[:, 2]):
             continue
         if not np.any(by_angle):
-            return math.inf
-        return float(by_angle @ by_speed / (by_angle @ by_angle))
+            return math.inf, 0.0
+        power = by_angle @ by_angle
+        ratio = float(by_angle @ by_speed / power)
+        left = by_speed - ratio * by_angle
+        return ratio, math.sqrt(float(left @ left / (BLOCKS - 1) / power))
     return None
 
 

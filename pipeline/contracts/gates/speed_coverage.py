@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, warning
-from pipeline.contracts.rotation import TURN_RAD, turned_rad
+from pipeline.contracts.rotation import turned_rad
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 

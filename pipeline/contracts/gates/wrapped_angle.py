@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from pipeline.contracts.protocol import Gate, Passed, span_of
 from pipeline.physics.glossary import TESTS
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 from pipeline.records.errors import CaptureError
 from pipeline.records.naming import counted
 
 ANGLES = ("theta_mech_rad", "theta_elec_rad")
-TURN_RAD = 2.0 * np.pi
 GAP = 2.0
 REMEDY = (
     "count the turns on, as numpy.unwrap does, before the file is written, or log the angle "

@@ -41,7 +41,7 @@ def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
         for kind, name in gains[capture.path].items():
             u = used[kind]
             if u is not None or name != kind:
-                # a further instrument is known by its number here, so its gain is always told
+                # a further instrument is known by its number here, so its gain is always stated
                 found[name] = meta.instrument_u("u_rel_current") if u is None else u
         for name, one in (
             ("gain_torque", meta.u_rel_torque),

@@ -15,9 +15,9 @@ from pipeline.criticism.data.stated import stated_parameters
 from pipeline.criticism.data.traces import LINES_V, with_values
 from pipeline.criticism.effect import Array, Machine
 from pipeline.criticism.policy.policy import DEFAULT, Policy
-from pipeline.numerics.orders import TURN_RAD
 from pipeline.physics.frames import vector_of_lines
 from pipeline.physics.glossary import TESTS_WITHOUT_CLOCK
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.stated import stated_constants
@@ -51,7 +51,7 @@ def machine_of(campaign: Campaign, start: Constants, policy: Policy = DEFAULT) -
     Returns
     -------
     Machine or None
-        None where the shaft turned and nothing tells its pole pairs, without which no speed means
+        None where the shaft turned and nothing gives its pole pairs, without which no speed means
         anything to a winding.
 
     """
@@ -117,7 +117,7 @@ def _stated_torque(stated: Mapping[str, tuple[float, float]], speed: float) -> f
 
 
 def _travel_turns(capture: Capture) -> float:
-    """How far the shaft goes in a capture [turns]; infinite where no angle tells."""
+    """How far the shaft goes in a capture [turns]; infinite without an angle."""
     if capture.has("theta_mech_rad"):
         theta = capture.arrays("theta_mech_rad")["theta_mech_rad"]
         return float(np.nanmax(theta) - np.nanmin(theta)) / TURN_RAD if theta.size else 0.0
@@ -221,13 +221,17 @@ def _largest(captures: Iterable[Capture], names: tuple[str, ...]) -> float:
 
 
 def _speed(capture: Capture) -> float:
+    """The largest speed [rad/s] but for spikes; 0 of an angle that moves by its rounding alone."""
     if capture.has("omega_mech_rad_s"):
         speed = capture.arrays("omega_mech_rad_s")["omega_mech_rad_s"]
         return float(np.nanquantile(np.abs(speed), 0.999))
     if capture.has("t_s", "theta_mech_rad"):
         found = capture.arrays("t_s", "theta_mech_rad")
         if found["t_s"].size > 1 and (np.diff(found["t_s"]) > 0.0).all():
-            speed = np.gradient(found["theta_mech_rad"], found["t_s"])
+            theta = found["theta_mech_rad"]
+            if np.ptp(theta) <= theta.size * np.spacing(np.max(np.abs(theta))):
+                return 0.0
+            speed = np.gradient(theta, found["t_s"])
             return float(np.nanquantile(np.abs(speed), 0.999))
     return 0.0
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from pipeline.criticism.effect import Array, Machine
 from pipeline.numerics.projection import Projection
+from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Capture
 
 PAIR_RAD = {"ab": 0.0, "bc": 2 * math.pi / 3, "ca": 4 * math.pi / 3}
 """Where the voltage between two terminals stands beside that of ab [rad, electrical]."""
 UNSMOOTHED = "theta_recorded_rad"
 """The angle as it was recorded, where a smoother one took its place."""
-_REFERENCE_DEGC = 25.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ def segment_of(
 ) -> Segment:
     """A segment with what the capture's metadata says of it."""
     stated = capture.meta.ambient_degc
-    ambient = 0.0 if stated is None else stated - _REFERENCE_DEGC
+    ambient = 0.0 if stated is None else stated - REFERENCE_DEGC
     pwm_hz = capture.meta.pwm_hz
     if pwm_hz:
         fixed |= {"pwm_s": 1.0 / pwm_hz, "vdc_v": capture.meta.vdc_v or 0.0}

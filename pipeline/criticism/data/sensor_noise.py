@@ -18,7 +18,7 @@ _FIRST_WINDOW, _WIDER = 32, 4
 _PLACES = 16
 _SPACING, _FINEST = 0.2, 0.02
 _REACH = 1.5
-"""Parts of a record that tell a step sharper and sharper: samples of the first, and times as many
+"""Parts of a record that give a step sharper and sharper: samples of the first, and times as many
 in the next; number of the parts; spacing of trial steps, at first and at the end, in turns of the
 phase over a part; how many spacings they reach around the step before. A lobe of the coherence is
 a turn wide: a wider spacing misses it, a finer one costs time."""
@@ -206,7 +206,7 @@ def rounding_step(signal: Array, policy: SensorNoise) -> float:
     -----
     Third differences d of a rounded signal are whole steps q, so that their phase e^{j2πd/q} stays
     together at the right q, even where a number format has rounded it once more. Parts of the
-    record, longer and longer, tell q sharply enough to separate 4000 steps a turn from 4096.
+    record, longer and longer, give q sharply enough to separate 4000 steps a turn from 4096.
 
     """
     signal = signal[np.isfinite(signal)]
@@ -244,7 +244,7 @@ def _sharpened(signal: Array, step: float, together: float) -> tuple[float, Arra
     """The step near a rough one of which long parts of the record are whole multiples, and the
     longest parts [parts, samples] that are.
 
-    A part that spans m steps tells the step to 1/m of itself. So the parts grow, and each is
+    A part that spans m steps gives the step to 1/m of itself. So the parts grow, and each is
     searched only as far as the one before left the step open. Offsets of the parts are free.
     """
     known = step * math.log(8.0) / _STEPS

@@ -296,7 +296,7 @@ def window_of(period: float, size: int, policy: Cutting) -> int:
 
 
 def with_angle(capture: Capture, names: list[str]) -> list[str]:
-    """The columns and the first there is of those that tell of the angle."""
+    """The columns and the first there is of those that give the angle."""
     for name in ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s"):
         if capture.has(name):
             return [*names, name]
@@ -304,7 +304,7 @@ def with_angle(capture: Capture, names: list[str]) -> list[str]:
 
 
 def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> None:
-    """Puts `theta_mech_rad` [n] into the columns, from whatever tells of the angle."""
+    """Puts `theta_mech_rad` [n] into the columns, from whatever gives the angle."""
     if "theta_mech_rad" in found:
         return
     if "theta_elec_rad" in found:

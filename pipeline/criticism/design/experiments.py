@@ -2,7 +2,7 @@
 
 Around a fit everything is linear. What an effect does is a vector d of weak samples over the
 noise; what an alternative and all other constants can do is a plane. λ = |d|² (1 − cos²), the
-part of d off the plane, is the noncentrality of the test that tells the two apart [1]. Another
+part of d off the plane, is the noncentrality of the test that separates the two [1]. Another
 capture adds its rows to both, a calibration adds a prior.
 
 References: [1] Kay, Fundamentals of Statistical Signal Processing II (1998), section 6.5.

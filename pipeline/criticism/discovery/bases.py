@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
@@ -12,8 +11,8 @@ import numpy as np
 
 from pipeline.criticism.effect import Array, Machine, Operating
 from pipeline.criticism.policy.discovery import Discovery
+from pipeline.physics.units import TURN_RAD
 
-TURN_RAD = 2.0 * math.pi
 _EDGE = 1e-9
 """First hat, as a share of the range: beside zero and not at it, where friction jumps."""
 

@@ -13,7 +13,12 @@ from pipeline.criticism.discovery.matching_pursuit import Expression, Pursuit, c
 from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.discovery import Discovery
-from pipeline.records.diagnosis import CurvePoint, UnknownStructure
+from pipeline.records.diagnosis import (
+    AlternativeVariables,
+    CurvePoint,
+    SketchTerm,
+    UnknownStructure,
+)
 
 _POINTS, _TURN_POINTS, _DENSE = 17, 48, 2001
 """Points of a curve that is reported, of one over a turn at the least, and of one that is looked
@@ -21,7 +26,6 @@ at."""
 _A_WAVE = 8
 """Points a wave of a curve that is reported over a turn: with fewer its lines cut the tops off, and
 with less than two another order is seen."""
-_WORDS = {"torque": "drag", "drop": "voltage drop", "flux": "flux linkage"}
 _SYMBOLS = {"torque": "drag", "drop": "drop", "flux": "co-energy/1.5"}
 
 
@@ -48,13 +52,13 @@ def describe(
         variables=_columns(port, found),
         shape=shape,
         sketch=tuple(
-            (_term(port, found, n, size), float(found.amplitudes[n]), port.unit)
+            SketchTerm(_term(port, found, n, size), float(found.amplitudes[n]), port.unit)
             for n in range(len(found.terms))
         ),
         expression=_expression(port, found, size),
         curve=curve,
         times="" if not port.carriers else port.carriers[carrier].words,
-        alternatives=tuple(others),
+        alternatives=tuple(AlternativeVariables(*one) for one in others),
         effect=name,
         source=effect_source(port, found, name, shape, size, pursuit.policy),
     )

@@ -24,6 +24,7 @@ from pipeline.criticism.discovery.residual_inputs import Port
 from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.discovery import Discovery
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.normal_equations import unit_diagonal
 
 _RIDGE = 1e-9
 """Share of a curve's own information that is added to it: two curves of one shape do not run away,
@@ -100,7 +101,7 @@ class Pursuit:
         mine, prior_gradient = system.matrix[:, :own], system.prior_gradient[:own]
         root = weight[:, None]
         normal = mine.T @ (root * mine) + np.diag(system.prior_precision[:own])
-        inverse = np.linalg.pinv(_balanced(normal), hermitian=True)
+        inverse = np.linalg.pinv(unit_diagonal(normal), hermitian=True)
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         inverse = inverse / np.outer(scale, scale)
         cross = mine.T @ (root * hats)
@@ -170,12 +171,6 @@ class Pursuit:
                 break
             before = now
         return step[:own], step[own:], left, now
-
-
-def _balanced(normal: Array) -> Array:
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    balanced: Array = normal / np.outer(scale, scale)
-    return balanced
 
 
 def expression(pursuit: Pursuit) -> Expression:
@@ -329,7 +324,7 @@ def _inverse(normal: Array) -> Array:
     if not normal.size:
         return normal
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse: Array = np.linalg.pinv(_balanced(normal), hermitian=True) / np.outer(scale, scale)
+    inverse: Array = np.linalg.pinv(unit_diagonal(normal), hermitian=True) / np.outer(scale, scale)
     return inverse
 
 

@@ -230,7 +230,7 @@ def _held_out(
     """Deviance of every unit as predicted without it, by the columns at `places`.
 
     `left` [R] is the residual at their best fit, and gives the weights; rows of unit -1 keep it. A
-    coefficient that no other unit tells of stays at zero, by `ridge`.
+    coefficient that no other unit shows stays at zero, by `ridge`.
     """
     weight = system.weights(system.reduced_chi2(left))
     matrix = system.matrix[:, places]

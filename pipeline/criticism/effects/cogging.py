@@ -22,7 +22,7 @@ def orders(machine: Machine) -> tuple[int, ...]:
     """Orders a turn that magnets and slots can make, of those that stand out of a slow turn.
 
     Multiples of p, 2p or the number of slots; LCM(slots, 2p) is always among them, but where it is
-    out of all reason (`Machine.cogging_order`), and twice that where no slow turn tells of it.
+    out of all reason (`Machine.cogging_order`), and twice that where no slow turn shows it.
     """
     bases = [machine.pole_pairs] + ([machine.slots] if machine.slots else [])
     seen = {k for k in machine.torque_orders if any(k % base == 0 for base in bases)}

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from pipeline.criticism.effect import Array, Effect, Operating, Parameter, Values
-from pipeline.criticism.machine.two_masses import discriminator, far_drag, passed_on, spring_twist
+from pipeline.criticism.machine.two_masses import (
+    LINEAR_COUPLING,
+    discriminator,
+    far_drag,
+    passed_on,
+    spring_twist,
+)
 
 
 def _torque(x: Operating, q: Values) -> Array:
@@ -35,5 +41,6 @@ EFFECT = Effect(
         "backlash": "a drive log whose torque changes its sign: only a gap opens then",
     },
     torque=_torque,
+    linear=LINEAR_COUPLING,
     discriminator=discriminator,
 )

@@ -24,7 +24,6 @@ from pipeline.criticism.data.traces import (
 from pipeline.criticism.effect import Array, Complex, Machine, Operating, Values
 from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, ripple
-from pipeline.criticism.policy.captures import Cutting
 from pipeline.criticism.signals.shaft import (
     TORQUE_RIPPLES,
     moved_on,
@@ -56,10 +55,15 @@ TORQUE = "torque_shaft_nm"
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Voltages, currents and angle of a log; with its torque where the shaft turns."""
+    """Voltages, currents and angle of a log; with its torque where the shaft turns.
+
+    None without a record of the motion, but that a heat run is at rest.
+    """
     temperatures = [name for name in SMOOTHED if capture.has(name)]
     names = with_angle(capture, ["vd_v", "vq_v", "id_a", "iq_a", *temperatures])
     turning = len(names) > 4 and any("theta" in n or "omega" in n for n in names)
+    if not turning and capture.meta.test != "heat_run":
+        return None
     angle = not ANGLES.isdisjoint(names)
     torque = capture.has("torque_shaft_nm") and turning and angle
     names += ["torque_shaft_nm"] if torque else []
@@ -97,8 +101,7 @@ def state(
     volts = (signals["vd_v"] + 1j * signals["vq_v"]).astype(np.complex128)
     volts = volts / (1.0 + values[segment.instrument.meter])
     if segment.instrument.frame:
-        hold_s = _hold_s(segment, model.machine.policy.cutting)
-        turn = model.machine.pole_pairs * motion.omega_rad_s * hold_s
+        turn = model.machine.pole_pairs * motion.omega_rad_s * x.supply.hold_s
         volts = volts * np.exp(-1j * segment.instrument.frame * turn)
     return at_true_angle(segment, x.fed(volts_v=volts), model, values)
 
@@ -172,17 +175,11 @@ def _shortened(lost: Array) -> Array:
     return left
 
 
-def _hold_s(segment: Segment, policy: Cutting) -> float:
-    """Time [s] for which a voltage vector is held: a PWM period, or that of a log as fast."""
-    pwm_s = segment.fixed.get("pwm_s", math.inf)
-    return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
-
-
 def _pace(
     segment: Segment, x: Operating, difference: Callable[[Array, float], Array]
 ) -> tuple[Array, Array]:
     """Electrical speed [n, rad/s], and what it turns [n, rad] while a voltage vector is held."""
-    turn = x.machine.pole_pairs * x.omega_rad_s * _hold_s(segment, x.machine.policy.cutting)
+    turn = x.machine.pole_pairs * x.omega_rad_s * x.supply.hold_s
     return difference(x.machine.pole_pairs * x.theta_rad, segment.ts_s), turn
 
 
@@ -190,7 +187,8 @@ def _between(segment: Segment, x: Operating, pieces: Pieces, values: Values) -> 
     """Torque [n, N·m] of what current and flux do between samples.
 
     The current moves on for a part of a period; and while a held voltage turns, both are off their
-    means. A free shaft is turned by the means; what a transducer tells of a held one is its own.
+    means. A free shaft responds to sample-period means; a locked shaft's transducer has a
+    nuisance parameter of its own.
     """
     flux, current = ripple(x, values["ripple_held" if x.shaft.held else "ripple_mean"], values)
     torque = torque_of_current(x, pieces, moved_on(segment, x, values) - current)

@@ -11,7 +11,7 @@ from pipeline.criticism.data.drive_log import drive_log, in_time
 from pipeline.criticism.data.segment import Segment, segment_of
 from pipeline.criticism.data.traces import window_of
 from pipeline.criticism.effect import Array, Machine, Operating, Values
-from pipeline.criticism.equation import Channel, Equation, Observes, Use
+from pipeline.criticism.equation import Channel, Equation, Observes, Sensing, Use
 from pipeline.criticism.machine.model import STATE, Model, Pieces, values_of
 from pipeline.criticism.signals.true_state import (
     at_true_angle,
@@ -31,8 +31,8 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
     """The q voltage, and the drive's own speed beside an angle.
 
     The d current is taken as held at zero, which is what a drive that logs the q axis alone does.
-    If the log holds the drive's own speed, the voltage is predicted from it, since both share one
-    clock, and the speed itself is compared with the angle; `sample_delay` says how late it is.
+    Where there is an angle, the voltage is predicted from its speed, and the drive's own speed,
+    which comes late, is compared with it; `sample_delay` says how late.
     """
     log = None if capture.has(*_BOTH_AXES) else drive_log(capture, machine)
     if log is None:
@@ -56,12 +56,16 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True current, angle and speed [n]; the drive's own speed where it is recorded."""
+    """True current, angle and speed [n]; the drive's own speed where nothing records the angle.
+
+    The ripple of a held vector is left out: it needs the d axis.
+    """
     motion = motion_of(segment, signals, model.machine)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
-    motion = replace(motion, omega_rad_s=signals.get(SPEED, motion.omega_rad_s))
+    if SPEED not in segment.channels:
+        motion = replace(motion, omega_rad_s=signals.get(SPEED, motion.omega_rad_s))
     x = operating(segment, signals, model, values, current, motion)
-    return at_true_angle(segment, x.fed(q_alone=True), model, values)
+    return at_true_angle(segment, x.fed(q_alone=True, hold_s=0.0), model, values)
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Values) -> Array:
@@ -72,7 +76,7 @@ def measured(segment: Segment, signals: Mapping[str, Array], _: Model, __: Value
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """The q voltage [V], and the angle's speed as the drive's estimate tells it [rad/s]: [C, n].
+    """The q voltage [V], and the angle's speed as the drive's estimate gives it [rad/s]: [C, n].
 
     Notes
     -----
@@ -89,7 +93,7 @@ def predicted(
 
 
 def _recorded_speed(segment: Segment, x: Operating, model: Model, values: Values) -> Array:
-    """Speed [n] of the angle as a drive's own estimate tells it [rad/s]."""
+    """Speed [n] of the angle as a drive's own estimate gives it [rad/s]."""
     speed: Array = central(x.theta_rad, segment.ts_s)
     for effect in model.effects:
         if effect.speed is not None:
@@ -115,5 +119,6 @@ EQUATION = Equation(
         form="affine",
     ),
     recorder="log",
+    sensing=Sensing(errors=frozenset({"late_speed", "voltage_jumps"})),
     use=Use(shows=frozenset({"current", "turning"}), warms=frozenset({"drop", "flux"})),
 )

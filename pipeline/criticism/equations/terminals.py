@@ -135,5 +135,5 @@ EQUATION = Equation(
         sensors=frozenset({"current", "voltage", "clock"}),
     ),
     recorder="step",
-    use=Use(shows=frozenset({"current"})),
+    use=Use(shows=frozenset({"current"}), warms=frozenset({"drop"}), at_rest=True),
 )

@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.criticism.effect import Effect
 from pipeline.physics.notation import number_text
-from pipeline.records.diagnosis import ToldParameter
+from pipeline.records.diagnosis import ReportedParameter
 
 UNKNOWN_SIZE = "unknown size"
 _SIZE = re.compile(r"\{([^{}]+)\}")
 _WAVE = re.compile(r"(?:sin|cos)_(\d+)_\w+")
 
 
-def headline(effect: Effect, parameters: Mapping[str, ToldParameter]) -> str:
+def headline(effect: Effect, parameters: Mapping[str, ReportedParameter]) -> str:
     """The effect in words, each size in braces filled in.
 
     Parameters
@@ -38,38 +38,39 @@ def headline(effect: Effect, parameters: Mapping[str, ToldParameter]) -> str:
     return _SIZE.sub(lambda found: _size(found[1], parameters), effect.headline)
 
 
-def _size(wanted: str, parameters: Mapping[str, ToldParameter]) -> str:
+def _size(wanted: str, parameters: Mapping[str, ReportedParameter]) -> str:
     if wanted == "largest":
         return _largest(parameters)
     names, percent = wanted.removesuffix("%"), wanted.endswith("%")
-    parts = [parameters.get(name.strip(), (None, None, "1")) for name in names.split("&")]
+    nothing = ReportedParameter(None, None, "1")
+    parts = [parameters.get(name.strip(), nothing) for name in names.split("&")]
     value, u, unit = amplitude(parts)
     if value is None or u is None:
         return UNKNOWN_SIZE
     return number_text(100.0 * value, 100.0 * u, "%") if percent else number_text(value, u, unit)
 
 
-def amplitude(parts: Sequence[ToldParameter]) -> ToldParameter:
+def amplitude(parts: Sequence[ReportedParameter]) -> ReportedParameter:
     """Length of a vector of parameters, and its u to first order; one alone keeps its sign."""
     values = [(value, u or 0.0) for value, u, _ in parts if value is not None]
     if len(values) < len(parts):
-        return None, None, parts[0][2]
+        return ReportedParameter(None, None, parts[0].unit)
     if len(parts) == 1:
         return parts[0]
     length = math.hypot(*(value for value, _ in values))
     spread = math.hypot(*(value * u for value, u in values))
-    return length, spread / length if length > 0 else 0.0, parts[0][2]
+    return ReportedParameter(length, spread / length if length > 0 else 0.0, parts[0].unit)
 
 
-def _largest(parameters: Mapping[str, ToldParameter]) -> str:
+def _largest(parameters: Mapping[str, ReportedParameter]) -> str:
     """The largest of the waves `sin_ORDER_nm` and `cos_ORDER_nm`, with its order."""
-    waves: dict[str, list[ToldParameter]] = {}
+    waves: dict[str, list[ReportedParameter]] = {}
     for name, one in parameters.items():
         if found := _WAVE.fullmatch(name):
             waves.setdefault(found[1], []).append(one)
     sizes = {order: amplitude(parts) for order, parts in waves.items()}
-    known = {order: one for order, one in sizes.items() if one[0] is not None}
+    known = {order: one for order, one in sizes.items() if one.value is not None}
     if not known:
         return UNKNOWN_SIZE
-    order = max(known, key=lambda name: known[name][0] or 0.0)
+    order = max(known, key=lambda name: known[name].value or 0.0)
     return f"{number_text(*known[order])}, {order} a turn"

@@ -228,8 +228,8 @@ def _fault(error: BaseException, path: Path, what: str, q: Mapping[str, float]) 
         return UsageError(
             asked, f"its parameters are {', '.join(q)}; scales are {', '.join(SCALES)}"
         )
-    said = (error.msg if isinstance(error, SyntaxError) else str(error)).splitlines()
-    words = ": ".join(filter(None, [type(error).__name__, said[0] if said else ""]))
+    lines = (error.msg if isinstance(error, SyntaxError) else str(error)).splitlines()
+    words = ": ".join(filter(None, [type(error).__name__, lines[0] if lines else ""]))
     return UsageError(f"{where}: {words}", _MEND)
 
 

@@ -93,13 +93,13 @@ def lost_shares(
     induced = 1j * x.machine.pole_pairs * x.omega_rad_s * x.flux_wb
     turn = turning(eps_rad)
     winding = phases_of((x.base["r_ohm"] * x.i_a + induced) * turn)
-    told = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
+    recorded = None if supply.volts_v is None else phases_of(supply.volts_v * turn)
     late = keeps = (current_a > 0.0).astype(float)
     per_volt = supply.pwm_s / (2.0 * inductance)
     ramp = 4.0 / 3.0 * loss_v * per_volt
     dead = loss_v / supply.vdc_v
     for _ in range(_ROUNDS):
-        volts = winding + loss_v * (late + keeps - 1.0) if told is None else told
+        volts = winding + loss_v * (late + keeps - 1.0) if recorded is None else recorded
         middle = 0.5 * (volts.max(axis=0) + volts.min(axis=0))
         duty = np.clip(0.5 + (volts - middle) / supply.vdc_v, 0.0, 1.0)
         low, before = _beside(volts, loss_v, late, -1.0)

@@ -79,18 +79,25 @@ BASE: tuple[Constant, ...] = (
     Constant("unlogged_d_share", "1", "reluctance torque of an unlogged i_d", hook="gain"),
     Constant("unlogged_winding_k", "K", "unrecorded winding over ambient", hook="gain"),
     Constant("unlogged_magnet_k", "K", "unrecorded magnet over ambient", hook="gain"),
+    Constant("late_speed_s", "s", "lateness of a speed that no angle is beside", hook="gain"),
+    Constant("unlogged_rest_k", "K", "the same of a winding in tests at rest", hook="gain"),
 )
 UNLOGGED = {"temp_winding_degc": "unlogged_winding_k", "temp_magnet_degc": "unlogged_magnet_k"}
 """Nuisance that stands for a temperature where a test that warms the machine did not record it."""
+UNLOGGED_AT_REST = "unlogged_rest_k"
+"""That of the winding in tests at rest: they warm it little, and show nothing of one that turns."""
+LATE_SPEED = "late_speed_s"
+"""Nuisance of a log whose motion is known by an observer's or a tachometer's speed alone."""
+UNLOGGED_K = (*UNLOGGED.values(), UNLOGGED_AT_REST)
 _SHARED_PRIORS = {
     "zero_alpha_a": "zero_a",
     "zero_beta_a": "zero_a",
     "unlogged_winding_k": "unlogged_k",
     "unlogged_magnet_k": "unlogged_k",
+    "unlogged_rest_k": "unlogged_k",
 }
 """Fields of `policy.priors` that stand for several nuisances."""
 STATE = tuple(constant.name for constant in BASE if constant.hook == "state")
-GAINS = tuple(constant.name for constant in BASE if constant.hook == "gain")
 PHYSICAL = ("r_ohm", "ld_h", "lq_h", "psi_wb", "j_kgm2", "b_nm_s_rad")
 """The base's constants of the station, and of the motor; the others are nuisances of a log."""
 
@@ -339,13 +346,14 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
 
     Notes
     -----
-    A voltage v that is held while the rotor turns by φ = ω_e T_s in a period makes the flux ripple
-    by v T_s φ; the means are `part` of that below, −j v T_s φ with v = R i + j ω_e ψ.
+    A voltage v that is held for T while the rotor turns by φ = ω_e T makes the flux ripple by
+    v T φ; the means are `part` of that below, −j v T φ with v = R i + j ω_e ψ.
 
     """
-    turn = x.machine.pole_pairs * x.omega_rad_s * x.ts_s
-    flux = part * turn * (turn * base_flux(x, values) - 1j * x.ts_s * values["r_ohm"] * x.i_a)
-    # what no capture tells stands at zero
+    hold_s = x.supply.hold_s
+    turn = x.machine.pole_pairs * x.omega_rad_s * hold_s
+    flux = part * turn * (turn * base_flux(x, values) - 1j * hold_s * values["r_ohm"] * x.i_a)
+    # what no capture determines is zero
     l_d, l_q = values["ld_h"] or math.inf, values["lq_h"] or math.inf
     return flux, flux.real / l_d + 1j * flux.imag / l_q
 

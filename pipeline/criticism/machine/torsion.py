@@ -102,15 +102,15 @@ def law_of_twist(shafts: Iterable[Shaft], policy: Torsion) -> Law | None:
         None where no torque changes its sign.
 
     """
-    told: list[_Window] = []
+    windows: list[_Window] = []
     inertia = 0.0
     for shaft in shafts:
         inertia = shaft.inertia_kgm2
-        told += _windows(shaft, policy)
-    turning = [one.power for one in told if one.turns]
+        windows += _windows(shaft, policy)
+    turning = [one.power for one in windows if one.turns]
     if not turning:
         return None
-    found, spread = _fitted(told, inertia, policy)
+    found, spread = _fitted(windows, inertia, policy)
     return Law(
         float(found[1]),
         math.sqrt(spread[1, 1]),
@@ -122,7 +122,7 @@ def law_of_twist(shafts: Iterable[Shaft], policy: Torsion) -> Law | None:
 
 
 def _windows(shaft: Shaft, policy: Torsion) -> Iterable[_Window]:
-    """Every window, half overlapping, in which the torque moves enough to tell of the twist."""
+    """Every window, half overlapping, in which the torque moves enough to show the twist."""
     block, theta, through, turned, least = _smoothed(shaft, policy)
     size = max(round(policy.window_s / (block * shaft.ts_s)), policy.window_blocks)
     closed = _closed(through, least)
@@ -243,7 +243,7 @@ class _Noise:
         return added
 
 
-def _fitted(told: Sequence[_Window], inertia: float, policy: Torsion) -> tuple[Array, Array]:
+def _fitted(windows: Sequence[_Window], inertia: float, policy: Torsion) -> tuple[Array, Array]:
     """Coefficients [3] of the columns, and their covariance [3, 3].
 
     Noise is little beside what the coupling's damping does, for which there is no column. So a
@@ -251,14 +251,14 @@ def _fitted(told: Sequence[_Window], inertia: float, policy: Torsion) -> tuple[A
     Weights that redescend have more than one end: the fit begins with each of a few gaps, and the
     end stays that leaves most windows near their noise.
     """
-    normal = np.array([one.columns.T @ one.columns for one in told])
+    normal = np.array([one.columns.T @ one.columns for one in windows])
     size = np.sqrt(np.einsum("ijj->j", normal))
     normal /= np.outer(size, size)
-    slope = np.array([one.columns.T @ one.angle for one in told]) / size
-    turns = np.array([one.turns for one in told])
-    power = np.array([one.angle @ one.angle for one in told])
-    count = np.array([one.angle.size for one in told])
-    noise = np.array([one.noise for one in told])
+    slope = np.array([one.columns.T @ one.angle for one in windows]) / size
+    turns = np.array([one.turns for one in windows])
+    power = np.array([one.angle @ one.angle for one in windows])
+    count = np.array([one.angle.size for one in windows])
+    noise = np.array([one.noise for one in windows])
     clean = normal - noise[:, :, :3] / np.outer(size, size)
     pull = slope - noise[:, :, 3] / size
     ends = []
@@ -274,7 +274,7 @@ def _fitted(told: Sequence[_Window], inertia: float, policy: Torsion) -> tuple[A
                 break
         spreads = np.maximum(_spreads(normal, slope, power, count, found), 1.0)
         score = weight[:, None] * (pull - clean @ found)
-        # windows overlap by half: two of them tell as much as one
+        # windows overlap by half: two of them count as one
         spread = 2.0 * inverse @ (score.T @ score) @ inverse / np.outer(size, size)
         ends.append((float((count * np.log(spreads)).sum()), found / size, spread))
     _, best, covariance = min(ends, key=lambda end: end[0])

@@ -26,6 +26,7 @@ from pipeline.criticism.effect import (
     Discrimination,
     Effect,
     FullLog,
+    LinearForm,
     Machine,
     Operating,
     Parameter,
@@ -110,48 +111,56 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
     return drag
 
 
-LINEAR_COUPLING = Effect(
-    name="linear_coupling",
-    words="f J twist″ of a spring, linear in f J/k and f J (1 − f) J/k",
-    signature="a resonance after torque steps",
-    tests=("drive", "torque_map"),
-    experiment="torque steps",
-    reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
-    parameters=(Parameter("torque_s2", "s²", 1e-5, 0.0), Parameter("angle_s2", "s²", 1e-5, 0.0)),
-    torque=linear_far_drag,
-)
-"""A start of `compliance`; its name is never reported."""
-
-
 def inertia_scale(machine: Machine) -> float:
     """Order of magnitude of an inertia [kg·m²]: a tenth of a second to full speed."""
     return 0.1 * machine.scales["torque_nm"] / machine.scales["speed_rad_s"]
 
 
-def spring_of(q: Values, j_kgm2: float, machine: Machine) -> dict[str, float] | None:
-    """Share at the far end and twist at the machine's torque, from `linear_far_drag`.
+def spring_of(q: Values, base: Values, machine: Machine) -> Values | None:
+    """Parameters of `compliance` from those of `linear_far_drag`.
 
     Parameters
     ----------
     q
         Parameters of `linear_far_drag`.
-    j_kgm2
-        Inertia of both parts [kg·m²].
+    base
+        `j_kgm2`: inertia of both parts [kg·m²].
     machine
         Its scales.
 
     Returns
     -------
     mapping or None
-        `share` = f [1] and `twist_rad` = T/k [rad] at the machine's torque T; None where no two
-        masses have such parameters.
+        `share` = f [1] and `twist_rad` = T/k [rad] at the machine's torque T, without damping, on a
+        dynamometer that gives way; None where no two masses have such parameters.
 
     """
-    soft, bent = q["torque_s2"], q["angle_s2"] * inertia_scale(machine)
+    soft, bent, j_kgm2 = q["torque_s2"], q["angle_s2"] * inertia_scale(machine), base["j_kgm2"]
     if min(soft, bent, j_kgm2) <= 0.0 or bent >= soft * j_kgm2:
         return None
     share = 1.0 - bent / (soft * j_kgm2)
-    return {"share": share, "twist_rad": machine.scales["torque_nm"] * soft / (share * j_kgm2)}
+    twist_rad = machine.scales["torque_nm"] * soft / (share * j_kgm2)
+    return {"share": share, "twist_rad": twist_rad, "damping_s": 0.0, "between": -1.0}
+
+
+LINEAR_COUPLING = LinearForm(
+    Effect(
+        name="linear_coupling",
+        words="f J twist″ of a spring, linear in f J/k and f J (1 − f) J/k",
+        signature="a resonance after torque steps",
+        tests=("drive", "torque_map"),
+        experiment="torque steps",
+        reference="Ellis & Lorenz, IEEE Ind. Appl. Conf. (2000), resonant load control",
+        parameters=(
+            Parameter("torque_s2", "s²", 1e-5, 0.0),
+            Parameter("angle_s2", "s²", 1e-5, 0.0),
+        ),
+        torque=linear_far_drag,
+    ),
+    "torque_shaft_nm",
+    spring_of,
+)
+"""A start of `compliance`."""
 
 
 def spring_twist(x: Operating, q: Values, through_nm: Array) -> Array:

@@ -275,6 +275,10 @@ class Priors:
         1e-3, "rad", "electrical zero of the drive's encoder",
         source="the negligible size of `angle_offset`, which names what is beyond",
     )  # fmt: skip
+    late_speed_s: float = chosen(
+        5e-3, "s", "lateness of a speed that no angle is beside",
+        why="observers and filters of drives are 1 to 10 ms late",
+    )  # fmt: skip
     gain: float = chosen(
         0.01, "1", "gain of a sensor or instrument", why="an instrument of class 1"
     )

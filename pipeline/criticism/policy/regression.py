@@ -143,6 +143,10 @@ class NoiseFloors:
         on="its twenty ties: with none seven were named wrong, with this two; 1/√12 = 0.29 for an "
         "instant that may be anywhere in between",
     )  # fmt: skip
+    speed_periods: float = derived(
+        1.0, "sample periods", "what a drive's own speed is late by",
+        source="the difference of two angles is late by half a period and waits for the next row",
+    )  # fmt: skip
     creep: float = chosen(
         1e-3, "machine scales", "speed below which friction may hold the shaft",
         why="a resting shaft's recorded speed is noise of that size",

@@ -51,7 +51,7 @@ def limits_of(model: Model) -> dict[str, tuple[float, float]]:
 
 
 class Step(Protocol):
-    """What a best step along some columns has to tell."""
+    """What a best step along some columns comes to."""
 
     @property
     def step(self) -> Array:

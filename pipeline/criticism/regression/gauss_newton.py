@@ -162,8 +162,8 @@ def rough_fit(segments: Sequence[Segment], model: Model, known: Values | None = 
 def _pinned(model: Model) -> Model:
     """The model with stated constants all but fixed, until the others are near.
 
-    From orders of magnitude a step moves an inertia that nothing but its prior tells, and the way
-    back is a narrow curve of friction over inertia.
+    From orders of magnitude a step moves an inertia that nothing but its prior determines, and the
+    way back is a narrow curve of friction over inertia.
     """
     share = model.policy.fit.pinned
     stated = {n: (value, share * u) for n, (value, u) in model.machine.stated.items()}

@@ -16,6 +16,7 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
+from pipeline.criticism.regression.normal_equations import unit_diagonal
 from pipeline.criticism.residuals.channels import (
     channel_of,
     channel_scale,
@@ -81,7 +82,7 @@ def leave_out(system: LinearSystem) -> HeldOut:
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(system.prior_precision[places])
     slope = weighted.T @ system.residual + system.prior_gradient[places]
-    spread = np.diag(np.linalg.pinv(_unit(normal), hermitian=True))
+    spread = np.diag(np.linalg.pinv(unit_diagonal(normal), hermitian=True))
     left = np.full(system.size, np.nan)
     steps: dict[int, Array] = {}
     for number in sorted(set(unit.tolist())):
@@ -159,12 +160,6 @@ def _units(system: LinearSystem) -> NDArray[np.int64]:
     return units
 
 
-def _unit(normal: Array) -> Array:
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    unit: Array = normal / np.outer(scale, scale)
-    return unit
-
-
 def _lost(less: Array, normal: Array, policy: Goodness) -> bool:
     """Whether some constant keeps next to nothing of its information."""
     return bool((np.diag(less) < policy.lost_share * np.diag(normal)).any())
@@ -234,6 +229,45 @@ def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
     over = _over(system, as_whitened)
     significant[[place for place, _, _, matters in over if matters]] = True
     return significant
+
+
+def misfit(system: LinearSystem) -> Array:
+    """How wrong a model's form may have made the parameters.
+
+    Parameters
+    ----------
+    system
+        Around a fit.
+
+    Returns
+    -------
+    array [own, own]
+        Factor F of the covariance F' F of the gradient of the deviance by the fit's own parameters.
+        Zeros where every group is as good as its floor.
+
+    Notes
+    -----
+    What a group leaves over its floor is no noise: it repeats itself where the motor does, and no
+    number of windows takes it away. Its sum Σ w x r lies between ∓ √(Σ w² x² · Σ r²) by Cauchy and
+    Schwarz, and where, nobody knows; a uniform density between these bounds has a third of their
+    square as its variance.
+
+    References
+    ----------
+    JCGM 100:2008 (GUM), 4.3.7. doi:10.59161/JCGM100-2008E
+
+    """
+    own = system.own.size
+    weight = system.weights(system.reduced_chi2(system.residual))
+    factor = np.zeros((own, own))
+    for place, _, _, matters in _over(system, system.noise_ratio):
+        if matters:
+            mine = system.group == place
+            rows = system.matrix[mine, :own] * weight[mine, None]
+            left = float((system.residual[mine] ** 2 - system.noise_ratio[mine] ** 2).sum())
+            bound = math.sqrt(max(left, 0.0) / 3.0) * rows
+            _, factor = np.linalg.qr(np.vstack([factor, bound]))
+    return factor
 
 
 def _over(

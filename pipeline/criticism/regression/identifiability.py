@@ -14,7 +14,7 @@ from pipeline.criticism.machine.model import BASE, PHYSICAL, Model, base_of
 from pipeline.criticism.policy.regression import GaussNewton
 from pipeline.criticism.regression.bounds import limits_of
 from pipeline.criticism.regression.fit import Fit
-from pipeline.criticism.regression.goodness import HeldOut
+from pipeline.criticism.regression.goodness import HeldOut, misfit
 from pipeline.criticism.regression.linear_system import LinearSystem, linear_system
 from pipeline.criticism.regression.linearise import Column
 from pipeline.numerics.identifiability import (
@@ -40,12 +40,14 @@ class Known:
 
     `found` is what the rows and the priors of the station say of them, `steps` [K, own] how far
     they move without each capture that can be left out, `rest` [own] the step that the equations
-    still ask for where a bound or the end of the iterations keeps it from being done.
+    still ask for where a bound or the end of the iterations keeps it from being done. `misfit`
+    [own, own]: the factor of `goodness.misfit`, or zeros where the form is taken for right.
     """
 
     found: Identified
     steps: Array
     rest: Array
+    misfit: Array
 
     def u_of(self, gradient: Array, bent: bool = False) -> float:
         """Standard uncertainty of a function of the parameters.
@@ -61,7 +63,8 @@ class Known:
         -------
         float
             The larger one of the samples' noise and of leaving out one capture at a time, with the
-            step that is still to be done; infinite where the function is not identifiable.
+            step that is still to be done and what a wrong form may do; infinite where the function
+            is not identifiable.
 
         Notes
         -----
@@ -79,7 +82,9 @@ class Known:
         between = 0.0
         if count > 1:
             between = math.sqrt((count - 1) * float(np.var(moves)))
-        return math.hypot(max(noise, between), float(self.rest @ gradient))
+        pull = self.found.root @ (self.found.root.T @ gradient)
+        form = float(np.linalg.norm(self.misfit @ pull))
+        return math.hypot(max(noise, between), float(self.rest @ gradient), form)
 
     @property
     def u(self) -> Array:
@@ -115,7 +120,12 @@ def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
     found = identify(rows, sizes)
     slope = matrix.T @ (weight * system.residual) + system.prior_gradient[:own]
     steps = np.array(list(held.steps.values())).reshape(-1, own)
-    return Known(found, steps, -found.root @ (found.root.T @ slope))
+    return Known(found, steps, -found.root @ (found.root.T @ slope), np.zeros((own, own)))
+
+
+def _reported(system: LinearSystem, held: HeldOut) -> Known:
+    """The same with what a form that misses the recordings may do to the numbers."""
+    return replace(known(system, held), misfit=misfit(system))
 
 
 def surely_there(system: LinearSystem, held: HeldOut, least: float) -> set[str]:
@@ -165,10 +175,10 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
     Determined is what is known better than to its own size. A constant that no motor is without
     must have an interval without zero, and no bound that holds it; another parameter's interval
     must be narrower than sizes that are seen on real benches. A number that was chosen of a few, or
-    told by a discriminator, is determined where an amplitude of its effect is.
+    given by a discriminator, is determined where an amplitude of its effect is.
     """
     fit, model, own = system.fit, system.fit.model, system.columns[: system.own.size]
-    sure_of = known(system, held)
+    sure_of = _reported(system, held)
     u = dict(zip((c.name for c in own), sure_of.u.tolist(), strict=True))
     beyond = _beyond(sure_of.u, system.prior_precision[: len(own)], fit.policy.fit)
     determined = within(beyond, sure_of.found.sizes)
@@ -193,7 +203,7 @@ def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelP
 
 
 def _or_stated(one: ModelParameter, stated: tuple[float, float] | None) -> ModelParameter:
-    """The parameter, or what is stated of it where nothing else tells it."""
+    """The parameter, or what is stated of it where nothing else determines it."""
     if one.known or stated is None:
         return one
     return replace(one, value=stated[0], u=stated[1], stated=True)
@@ -208,20 +218,20 @@ def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
     θ/u² − s/u_s², and data and prior agree within √(u_data² + u_s²).
 
     """
-    stated, sure_of, notes = system.fit.model.stated(), known(system, held), []
+    stated, sure_of, notes = system.fit.model.stated(), _reported(system, held), []
     policy = system.policy.fit
     for place, column in enumerate(system.columns[: system.own.size]):
         if column.name not in stated:
             continue
-        (said, u_said), u = stated[column.name], float(sure_of.u[place])
-        alone = _beyond(np.array([u]), np.array([u_said**-2.0]), policy)[0]
+        (stated_value, u_stated), u = stated[column.name], float(sure_of.u[place])
+        alone = _beyond(np.array([u]), np.array([u_stated**-2.0]), policy)[0]
         if not math.isfinite(alone):
             continue
-        value = alone**2 * (system.fit.values[column.name] / u**2 - said / u_said**2)
-        if abs(value - said) > policy.contradicted * math.hypot(alone, u_said):
+        value = alone**2 * (system.fit.values[column.name] / u**2 - stated_value / u_stated**2)
+        if abs(value - stated_value) > policy.contradicted * math.hypot(alone, u_stated):
             notes.append(
-                f"{column.name} is stated as {said:.4g} ± {u_said:.2g}, and without that these "
-                f"captures say {value:.4g} ± {alone:.2g}"
+                f"{column.name} is stated as {stated_value:.4g} ± {u_stated:.2g}, and without that "
+                f"these captures say {value:.4g} ± {alone:.2g}"
             )
     return tuple(notes)
 
@@ -229,7 +239,7 @@ def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
 def _beyond(u: Array, prior_precision: Array, policy: GaussNewton) -> Array:
     """Standard uncertainties [P] without the priors of inverse variance `prior_precision` [P],
     infinite
-    where nothing else tells: what handbooks say is not measured.
+    where nothing else does: what handbooks say is not measured.
     """
     information = np.maximum(u, 1e-300) ** -2.0 - prior_precision
     informed = information > policy.least_information * prior_precision
@@ -249,14 +259,14 @@ def _at(value: float, limits: tuple[float, float] | None) -> bool:
 
 
 def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCombination, ...]:
-    """What the captures tell of parameters that they do not determine one by one.
+    """Combinations that the captures determine of parameters that they do not, one by one.
 
     A matrix speaks of where the fit stands. So the directions without information are walked: what
     is reported must be all there is to know far from here as well.
     """
     fit, policy = system.fit, system.policy.fit
     names = [c.name for c in system.columns[: system.own.size]]
-    sure_of = known(system, held)
+    sure_of = _reported(system, held)
     found = sure_of.found
     values = np.array([fit.values[name] for name in names])
     physical = {**dict.fromkeys(PHYSICAL), **fit.model.parameters()}

@@ -16,8 +16,9 @@ from pipeline.criticism.data.segment import Segment, projected, row_index
 from pipeline.criticism.effect import Array, Complex, Effect, Machine, Operating, Values
 from pipeline.criticism.library.equations import equation_of
 from pipeline.criticism.machine.model import (
+    LATE_SPEED,
     STATE,
-    UNLOGGED,
+    UNLOGGED_K,
     Model,
     Pieces,
     base_of,
@@ -62,7 +63,7 @@ class Column:
 
     @property
     def key(self) -> tuple[str, tuple[tuple[str, float], ...]]:
-        """What tells columns apart."""
+        """What separates columns."""
         return self.name, self.at
 
 
@@ -271,7 +272,7 @@ class _Sampler:
             "gain_torque": observes_sensor(self.segment, "load"),
             "gain_lcr": observes_sensor(self.segment, "lcr"),
             "offset_temp_k": any(name.startswith("temp_") for name in self.segment.recorded),
-            **{n: n in self.segment.fixed for n in ("unlogged_d_share", *UNLOGGED.values())},
+            **{n: n in self.segment.fixed for n in ("unlogged_d_share", LATE_SPEED, *UNLOGGED_K)},
             "gain_clock": observes_sensor(self.segment, "clock"),
             self.segment.instrument.meter: observes_sensor(self.segment, "voltage"),
             self.segment.instrument.ammeter: observes_sensor(self.segment, "current"),
@@ -281,7 +282,12 @@ class _Sampler:
         if column.name == "gain_clock":
             return self._along_time(column.step)
         moved = {**self.values, column.name: self.values[column.name] + column.step}
-        if column.name in (self.segment.instrument.ammeter, "offset_temp_k", *UNLOGGED.values()):
+        if column.name in (
+            self.segment.instrument.ammeter,
+            "offset_temp_k",
+            LATE_SPEED,
+            *UNLOGGED_K,
+        ):
             return (residual(self.segment, self.model, moved) - self.here) / column.step
         there = predicted(self.segment, self.x, self.pieces, self.model, moved)
         return -(there - self.start) / column.step

@@ -24,6 +24,7 @@ from pipeline.criticism.residuals.channels import (
 from pipeline.criticism.residuals.residual import operate, residual
 
 VOLTS = ("vd_v", "vq_v")
+SPEED = "omega_mech_rad_s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,9 +202,9 @@ def reading_error(
     -----
     5e-5 of the reading in a window, since no sensor is more linear, and for what happens between
     samples a part of the machine's own scale: 1e-4 under a drive, 2e-5 on a bench. Then what a
-    drive's log may have besides: jumps of the voltage, lines of the encoder, friction at
-    standstill. An effect that hides in this is nobody's concern, and smaller structure names
-    nothing.
+    drive's log may have besides: jumps of the voltage, a speed of a period ago, lines of the
+    encoder, friction at standstill. An effect that hides in this is nobody's concern, and smaller
+    structure names nothing.
 
     """
     weak, policy = segment.weak, model.policy.noise_floors
@@ -229,6 +230,10 @@ def reading_error(
         * np.array(scales)[:, None, None]
     )
     both: Array = np.hypot(reading, own)
+    if "late_speed" in sensing.errors and SPEED in segment.channels:
+        place, slope = segment.channels.index(SPEED), np.gradient(segment.recorded[SPEED])
+        late = np.abs(weak.project(policy.speed_periods * slope[None])[0])
+        both[place] = np.hypot(both[place], late)
     if "torque_shaft_nm" in segment.channels:
         place = segment.channels.index("torque_shaft_nm")
         both[place] = np.hypot(both[place], _of_torque(segment, model, values, state))
@@ -241,6 +246,8 @@ def reading_error(
             x = operate(segment, segment.recorded, model, values) if state is None else state
             steep = steep_drops(model, values, x)
             for channel, axis in (("vd_v", steep.real), ("vq_v", steep.imag)):
+                if channel not in segment.channels:
+                    continue
                 place = segment.channels.index(channel)
                 both[place] = np.hypot(both[place], np.abs(weak.project(axis[None])[0]))
     return both

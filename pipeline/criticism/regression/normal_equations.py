@@ -16,8 +16,8 @@ from pipeline.criticism.policy.regression import GaussNewton
 
 _TIE = 1e-11
 """Share of the largest information below which a direction has none, far above the rounding of
-doubles (1e-16). Larger, and constants that captures barely tell are held; smaller, and rounding
-moves them."""
+doubles (1e-16). Larger, and constants that captures barely determine are held; smaller, and
+rounding moves them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +195,7 @@ def pseudo_inverse(normal: Array) -> Array:
     Returns
     -------
     array [k, k]
-        A parameter that no row tells of has a row and a column of zeros.
+        A parameter that no row observes has a row and a column of zeros.
 
     Notes
     -----
@@ -204,7 +204,7 @@ def pseudo_inverse(normal: Array) -> Array:
 
     """
     information = np.diag(normal)
-    # a parameter that no capture tells of stays where it is, exactly
+    # a parameter that no capture observes stays where it is, exactly
     size = np.sqrt(np.where(information > 0.0, information, 1.0))
     power, axes = np.linalg.eigh(normal / np.outer(size, size))
     good = power > _TIE * max(float(power[-1]), 1.0)
@@ -224,3 +224,10 @@ def prior_costs(gradient: Array, precision: Array) -> Array:
     """Squared distances [k] from the priors' centres in standard uncertainties."""
     costs: Array = gradient**2 / np.where(precision > 0, precision, np.inf)
     return costs
+
+
+def unit_diagonal(normal: Array) -> Array:
+    """A normal matrix [k, k] with each column in its own size, so that its diagonal is 1."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    unit: Array = normal / np.outer(scale, scale)
+    return unit

@@ -1,4 +1,4 @@
-"""What the equation of a segment can tell of constants, hooks and sensors."""
+"""What the equation of a segment observes of constants, hooks and sensors."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from pipeline.criticism.data.traces import PAD, with_values
 from pipeline.criticism.effect import Machine
 from pipeline.criticism.equation import Equation
 from pipeline.criticism.library.equations import equations
-from pipeline.criticism.machine.model import UNLOGGED
+from pipeline.criticism.machine.model import LATE_SPEED, UNLOGGED, UNLOGGED_AT_REST
 from pipeline.records.capture import Campaign, Capture
 
 
@@ -48,17 +48,25 @@ def _cut(capture: Capture, machine: Machine) -> Iterator[Segment]:
             continue
         segment = equation.cut(capture, machine)
         if segment is not None and (segment.weak is None or segment.weak.starts.size):
-            yield replace(segment, fixed={**segment.fixed, **_unlogged(segment, equation)})
+            lacks = {**_unlogged(segment, equation), **_late_speed(segment, capture)}
+            yield replace(segment, fixed={**segment.fixed, **lacks})
 
 
 def _unlogged(segment: Segment, equation: Equation) -> dict[str, float]:
     """Nuisances of the temperatures that such a test changes and the capture did not record."""
     hooks = {"temp_winding_degc": "drop", "temp_magnet_degc": "flux"}
     return {
-        UNLOGGED[name]: 1.0
+        UNLOGGED_AT_REST if hook == "drop" and equation.use.at_rest else UNLOGGED[name]: 1.0
         for name, hook in hooks.items()
         if hook in equation.use.warms and name not in segment.recorded
     }
+
+
+def _late_speed(segment: Segment, capture: Capture) -> dict[str, float]:
+    """The nuisance of a motion that is known by a drive's own speed alone."""
+    told = capture.has("theta_mech_rad") or capture.has("theta_elec_rad")
+    own = segment.instrument.name == "drive" and capture.has("omega_mech_rad_s")
+    return {LATE_SPEED: 1.0} if own and not told else {}
 
 
 def _by_instruments(segment: Segment, gains: Mapping[str, str]) -> Segment:

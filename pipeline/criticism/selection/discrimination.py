@@ -66,7 +66,7 @@ def sharing_discriminator(effect: Effect, library: Mapping[str, Effect]) -> tupl
 
 
 def settled(effect: Effect, found: Discrimination) -> Effect:
-    """The effect with the shapes that whole logs tell: they are known, and no fit moves them."""
+    """The effect with the shapes that whole logs give: they are known, and no fit moves them."""
     return replace(effect, parameters=tuple(_known(p, found) for p in effect.parameters))
 
 
@@ -77,8 +77,8 @@ def _known(p: Parameter, found: Discrimination) -> Parameter:
 
 
 def renamed(system: LinearSystem, name: str, library: Mapping[str, Effect]) -> LinearSystem:
-    """The fit with the effect `name` exchanged for the one that whole logs tell, of those that
-    share its discriminator, and with the numbers that these logs tell.
+    """The fit with the effect `name` exchanged for the one that whole logs show, of those that
+    share its discriminator, and with the numbers that these logs give.
     """
     fit = system.fit
     effect = fit.effect(name)

@@ -9,10 +9,21 @@ Reference: Stone, J. R. Stat. Soc. B 36 (1974) 111, doi:10.1111/j.2517-6161.1974
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline.criticism.effect import Array
+from pipeline.criticism.regression.goodness import HeldOut, predicted_chi2
 from pipeline.criticism.regression.linear_system import LinearSystem
+
+
+def rests_on(systems: Sequence[LinearSystem], held: Sequence[HeldOut]) -> str | None:
+    """`only_capture` of the step from the first of two systems to the second, by what each predicts
+    of captures held out.
+    """
+    without, after = (predicted_chi2(one, out) for one, out in zip(systems, held, strict=True))
+    return only_capture(systems[-1], without, after)
 
 
 def only_capture(tried: LinearSystem, before: Array, after: Array) -> str | None:

@@ -30,8 +30,8 @@ from pipeline.criticism.policy.selection import OrderScan
 from pipeline.criticism.regression.goodness import material_size
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
-from pipeline.numerics.orders import TURN_RAD
 from pipeline.numerics.projection import Projection, bump
+from pipeline.physics.units import TURN_RAD
 
 
 def orders_left(system: LinearSystem) -> tuple[float, ...]:

@@ -217,7 +217,7 @@ def searched(offered: Sequence[Candidate]) -> float:
 @dataclass(frozen=True, slots=True)
 class _Scoring:
     """What every candidate is held against: a system, the model's own columns in it and how these
-    alone fit, groups [G] that are then told as a remainder.
+    alone fit, groups [G] that are then reported as a remainder.
     """
 
     system: LinearSystem

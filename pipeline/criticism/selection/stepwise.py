@@ -24,9 +24,9 @@ from pipeline.criticism.regression.linear_system import LinearSystem, linear_sys
 from pipeline.criticism.regression.noise_floors import form_tolerance
 from pipeline.criticism.regression.normal_equations import NormalEquations
 from pipeline.criticism.selection.choices import reconsidered
-from pipeline.criticism.selection.coupled_start import with_coupled_start
 from pipeline.criticism.selection.discrimination import renamed
 from pipeline.criticism.selection.far_starts import with_starts
+from pipeline.criticism.selection.linear_start import with_linear_start
 from pipeline.criticism.selection.pruning import trimmed, with_all_terms
 from pipeline.criticism.selection.score_test import (
     Score,
@@ -66,7 +66,7 @@ def search(fit: Fit, library: Mapping[str, Effect]) -> tuple[LadderStep, ...]:
         significant = significant_groups(wide)
         scores = score_all(wide, offered, significant)
         scores = with_starts(wide, offered, scores, significant)
-        scores = with_coupled_start(wide, offered, scores, significant)
+        scores = with_linear_start(wide, offered, scores, significant)
         added = tuple(e.name for e in fit.model.effects[base:])
         steps.append(LadderStep(added, wide, scores))
         if len(steps) == policy.most_steps:
@@ -92,8 +92,9 @@ def _floored_anew(fit: Fit) -> Fit:
 
     If no floor changes by half and nothing is left over them, the fit stays as it is. If a rough
     fit finds another inertia, a fit is begun there as well and the better one stays. Undoing a
-    sensor's lag adds noise, so does a twist told by an angle, and so do the edges of a dead time.
-    An encoder off its centre drives J to next to nothing, and the floors were made with that J.
+    sensor's lag adds noise, so does a twist derived from an angle, and so do the edges of a
+    dead time. An encoder off its centre drives J to next to nothing, and the
+    floors were made with that J.
     """
     policy = fit.policy.selection
     floor = floors(fit.segments, fit.model, fit.values)

@@ -1,4 +1,4 @@
-"""True currents, angle and speed of a segment: what the sensors said, their effects taken out."""
+"""True currents, angle and speed of a segment: what the sensors recorded, less their effects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,14 @@ from pipeline.criticism.effect import (
     Values,
     between,
 )
-from pipeline.criticism.machine.model import UNLOGGED, Model, clock_gain, values_of
+from pipeline.criticism.machine.model import (
+    LATE_SPEED,
+    UNLOGGED,
+    UNLOGGED_AT_REST,
+    Model,
+    clock_gain,
+    values_of,
+)
 from pipeline.criticism.policy.captures import Cutting
 
 
@@ -94,7 +101,11 @@ def operating(
         inverter=False,
         ts_s=segment.ts_s,
         freq_hz=motion.freq_hz,
-        supply=Supply(segment.fixed.get("pwm_s", 0.0), segment.fixed.get("vdc_v", 0.0)),
+        supply=Supply(
+            segment.fixed.get("pwm_s", 0.0),
+            segment.fixed.get("vdc_v", 0.0),
+            hold_s=hold_s(segment, model.machine.policy.cutting),
+        ),
         shaft=ShaftState(
             held=segment.test == "torque_map",
             alone="torque_shaft_nm" not in signals,
@@ -105,8 +116,16 @@ def operating(
     )
 
 
+def hold_s(segment: Segment, policy: Cutting) -> float:
+    """Time [s] for which a voltage vector is held: a PWM period, or that of a log as fast."""
+    pwm_s = segment.fixed.get("pwm_s", math.inf)
+    return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
+
+
 def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) -> Operating:
     """The state with the errors of the angle's sensor taken out of angle, speed and frame."""
+    if late := segment.fixed.get(LATE_SPEED, 0.0) * values[LATE_SPEED]:
+        x = _in_time(segment, x, late)
     zero = zero_angle(segment, values)
     if not zero and not any(effect.angle is not None for effect in model.effects):
         return x
@@ -126,6 +145,18 @@ def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) 
         eps_rad=x.eps_rad - error,
         theta_rad=theta - turned,
         omega_rad_s=x.omega_rad_s - _speed(turned, segment.ts_s, finer, policy),
+    )
+
+
+def _in_time(segment: Segment, x: Operating, late_s: float) -> Operating:
+    """The state with a motion that was recorded late taken ahead, to the first order."""
+    period = segment.ts_s * segment.size / x.theta_rad.size
+    ahead = late_s * x.omega_rad_s
+    return replace(
+        x,
+        eps_rad=x.eps_rad + x.machine.pole_pairs * ahead,
+        theta_rad=x.theta_rad + ahead,
+        omega_rad_s=x.omega_rad_s + np.gradient(ahead, period),
     )
 
 
@@ -169,8 +200,9 @@ def _warmth(
     segment: Segment, signals: Mapping[str, Array], name: str, size: int, values: Values
 ) -> Array:
     if name not in signals:
-        warmed = segment.fixed.get(UNLOGGED[name], 0.0)
-        return np.full(size, segment.fixed["ambient_k"] + warmed * values[UNLOGGED[name]])
+        known = [UNLOGGED[name], *([UNLOGGED_AT_REST] if name == "temp_winding_degc" else [])]
+        warmed = sum(segment.fixed.get(one, 0.0) * values[one] for one in known)
+        return np.full(size, segment.fixed["ambient_k"] + warmed)
     warm = signals[name] - 25.0 - values["offset_temp_k"]
     return np.repeat(warm, size // warm.size)
 

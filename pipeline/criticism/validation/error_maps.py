@@ -19,8 +19,7 @@ from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.channels import reported_signal
 from pipeline.criticism.residuals.residual import residual
 from pipeline.numerics.cell_means import cell_means, visits_of
-from pipeline.physics.glossary import suffix_of
-from pipeline.physics.units import SUFFIX_UNITS
+from pipeline.physics.glossary import unit_of
 from pipeline.records.error_map import Bins, ErrorMap, Histogram
 
 CURVES = (
@@ -40,7 +39,7 @@ class Errors:
     """A signal's errors as window means [n, its unit], with their noise and where they were made.
 
     `segment` [n] numbers the captures, `window` [n] their windows, `at` holds window means [n] of
-    what an error may depend on, NaN where a capture does not tell.
+    what an error may depend on, NaN where a capture does not record it.
     """
 
     signal: str
@@ -49,11 +48,6 @@ class Errors:
     segment: NDArray[np.int64]
     window: NDArray[np.int64]
     at: Mapping[str, Array]
-
-
-def unit_of(signal: str) -> str:
-    """The unit that a signal's name ends in."""
-    return SUFFIX_UNITS.get(suffix_of(signal), "1")
 
 
 def window_errors(system: LinearSystem, whitened: Array) -> tuple[Errors, ...]:
@@ -117,7 +111,7 @@ def window_variables(segment: Segment) -> dict[str, Array]:
 
 
 def speed_current_map(errors: Errors, policy: Validation) -> ErrorMap | None:
-    """Mean error over cells of speed and q current; None where a capture tells only one."""
+    """Mean error over cells of speed and q current; None where a capture has only one."""
     if "iq_a" not in errors.at or "omega_mech_rad_s" not in errors.at:
         return None
     speed, current = errors.at["omega_mech_rad_s"], errors.at["iq_a"]

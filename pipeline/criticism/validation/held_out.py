@@ -17,8 +17,9 @@ from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.goodness import HeldOut
 from pipeline.criticism.regression.linear_system import LinearSystem
 from pipeline.criticism.residuals.residual import residual
-from pipeline.criticism.validation.error_maps import disjoint, unit_of
+from pipeline.criticism.validation.error_maps import disjoint
 from pipeline.criticism.validation.free_run import Run, free_run
+from pipeline.physics.glossary import unit_of
 from pipeline.records.comparison import SignalError, Trace
 
 Split = Literal["fit", "held_out"]

@@ -1,7 +1,7 @@
 """What an effect shows: a signal's error over the variable that orders it best, without and with.
 
 A Stribeck bump is an error of torque over speed, an encoder off its centre one of voltage over the
-angle of the shaft. Which signal and which variable is not said by the effect: the pair is drawn in
+angle of the shaft. Which signal and which variable the effect does not state: the pair is drawn in
 which the change of the error is largest beside what is left of it.
 """
 
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.effect import Array
 from pipeline.criticism.selection.stepwise import LadderStep
-from pipeline.criticism.validation.error_maps import Errors, unit_of, window_errors
+from pipeline.criticism.validation.error_maps import Errors, window_errors
+from pipeline.physics.glossary import unit_of
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.diagnosis import LadderRung, Signature
 from pipeline.records.error_map import ErrorMap
 
@@ -25,7 +27,6 @@ _CELLS, _FEWEST = 48, 6
 """Cells of a curve, and the fewest that make one. By judgement, for people to look at."""
 _MANY_WAVES, _FINE = 6, 72
 """Waves a turn from which on they are laid over each other, and cells of one wave."""
-_TURN = 2.0 * math.pi
 _VARIABLES = (
     "omega_mech_rad_s",
     "iq_a",
@@ -150,9 +151,9 @@ def _values(segment: Segment, errors: Errors, mine: NDArray[np.bool_]) -> Mappin
     """What a window's error may depend on [n]: means, and the angles at the window's middle."""
     values = {name: errors.at[name][mine] for name in _VARIABLES if name in errors.at}
     theta = segment.recorded.get("theta_mech_rad")
-    if theta is not None and segment.weak is not None and float(np.ptp(theta)) > _TURN:
+    if theta is not None and segment.weak is not None and float(np.ptp(theta)) > TURN_RAD:
         middle = segment.weak.starts + segment.weak.length // 2
-        values["theta_mech_rad"] = np.mod(theta[middle][errors.window[mine]], _TURN)
+        values["theta_mech_rad"] = np.mod(theta[middle][errors.window[mine]], TURN_RAD)
     return values
 
 
@@ -164,7 +165,7 @@ def _cells(variable: str, value: Array) -> tuple[NDArray[np.int64], Array]:
     """
     fine = np.isfinite(value)
     if variable == "theta_mech_rad":
-        edges = np.linspace(0.0, _TURN, _CELLS + 1)
+        edges = np.linspace(0.0, TURN_RAD, _CELLS + 1)
     elif fine.sum() < _FEWEST:
         return np.full(value.size, -1), np.empty(0)
     else:
@@ -208,12 +209,14 @@ def _folded(curve: _Curve, cells: int) -> _Curve | None:
     cells are too few to see the shape of a wave.
     """
     change = np.zeros(cells)
-    change[np.floor(curve.at / _TURN * cells).astype(np.int64) % cells] = curve.before - curve.after
+    change[np.floor(curve.at / TURN_RAD * cells).astype(np.int64) % cells] = (
+        curve.before - curve.after
+    )
     order = 1 + int(np.argmax(np.abs(np.fft.rfft(change))[1:]))
     if order < _MANY_WAVES:
         return curve
-    phase = np.mod(order * curve.at, _TURN)
-    _, cell = np.unique(np.round(phase / _TURN * _FINE) % _FINE, return_inverse=True)
+    phase = np.mod(order * curve.at, TURN_RAD)
+    _, cell = np.unique(np.round(phase / TURN_RAD * _FINE) % _FINE, return_inverse=True)
     count: Array = np.bincount(cell, curve.count).astype(np.float64)
     if np.count_nonzero(count) < _FEWEST:
         return None
@@ -223,7 +226,7 @@ def _folded(curve: _Curve, cells: int) -> _Curve | None:
         return summed
 
     # an angle on a circle has no mean of its own where the first and the last cell meet
-    at = mean(np.where(phase > _TURN * (1.0 - 0.5 / _FINE), phase - _TURN, phase))
+    at = mean(np.where(phase > TURN_RAD * (1.0 - 0.5 / _FINE), phase - TURN_RAD, phase))
     before, after = mean(curve.before), mean(curve.after)
     noise = np.zeros(at.size)
     return _Curve(curve.signal, curve.variable, None, at, before, after, count, noise, order)

@@ -29,7 +29,7 @@ _STATE = ("id_a", "iq_a", "theta_mech_rad")
 _PAD = 23
 """Samples kept around a window: one less than a thinned log has there (`traces.PAD`)."""
 _START_S = 0.002
-"""Length [s] of the straight line that tells the first speed, as of `true_state._SPEED_S`."""
+"""Length [s] of the straight line that gives the first speed, as of `true_state._SPEED_S`."""
 _PROBE = 1e-3
 """Step of the finite differences, as a share of the machine's scale [A, rad/s], and in electrical
 radians: small against what bends the equations, large against rounding."""

@@ -30,7 +30,7 @@ def check(constants: Constants, campaign: Campaign, options: Mapping[str, float]
 
 
 def _suspect(counted: Estimate, wrong: list[int], campaign: Campaign) -> str:
-    """The odd files where most nameplates are right, else what the ratio tells."""
+    """The odd files where most nameplates are right, else what the ratio suggests."""
     plates = [c for c in campaign.captures if c.meta.pole_pairs]
     odd = [c.path for c in plates if c.meta.pole_pairs in wrong]
     if 2 * len(odd) < len(plates):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.numerics.integrals import trapezoid
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.physics.conventions import copper_resistance_ohm, terminal_inductance_h
 from pipeline.records.capture import Campaign, Capture
@@ -103,7 +104,7 @@ def step_time_constant_s(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, flo
     if not spans:
         return None
     volts, amps = v_v - v_v[: edges[0]].mean(), i_a - i_a[: edges[0]].mean()
-    areas = [[_integral(t_s[s], x[s]) for s in spans] for x in (volts, amps)]
+    areas = [[trapezoid(t_s[s], x[s]) for s in spans] for x in (volts, amps)]
     own = np.repeat(np.eye(len(spans)), [s.stop - s.start for s in spans], axis=0)
     columns = np.column_stack([np.concatenate(areas[0]), np.concatenate(areas[1]), own])
     current = np.concatenate([amps[s] for s in spans])
@@ -113,11 +114,6 @@ def step_time_constant_s(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, flo
     if not fit.full_rank or rate * longest < 3.0 or np.ptp(current) < 20.0 * left:
         return None
     return 1.0 / rate, fit.u(1) * math.sqrt(autocorrelation_time(fit.residuals)) / rate**2
-
-
-def _integral(t_s: Array, y: Array) -> Array:
-    """Running integral [n] by trapezoids."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t_s))])
 
 
 def _smallest_steps(campaign: Campaign) -> list[Capture]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.crosscheck.judge import Ratio, judge_ratio, not_evaluated
 from pipeline.crosscheck.protocol import Rule
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import Check
@@ -19,8 +20,7 @@ Array = NDArray[np.float64]
 NAME = "time_base"
 TESTS = ("spin_down", "drive", "open_circuit", "torque_map", "cogging", "hand_turn")
 COLUMNS = ("t_s", "theta_mech_rad", "omega_mech_rad_s")
-TURN_RAD = 2.0 * math.pi
-# Blocks that a capture is cut into, and rows that each needs. By judgement: their scatter tells u.
+# Blocks that a capture is cut into, and rows that each needs. By judgement: their scatter gives u.
 BLOCKS, LEAST_ROWS = 40, 4
 NAMED = 3
 MISSING = "needs a turning capture with t_s, theta_mech_rad and omega_mech_rad_s"

@@ -21,12 +21,12 @@ from pipeline.numerics.harmonics import hermite, whole_cycles
 from pipeline.numerics.least_squares import autocorrelation_time
 from pipeline.numerics.plateaus import true_runs, white_noise_sigma
 from pipeline.physics.conventions import PAIR_AXES_RAD
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Capture
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
-TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
 
     """
     lines = {f"v{p}_v": (math.sqrt(3.0), PAIR_AXES_RAD[p]) for p in PAIRS}
-    phases = {f"v{p}_v": (1.0, k * TURN / 3.0) for k, p in enumerate("abc")}
+    phases = {f"v{p}_v": (1.0, k * TURN_RAD / 3.0) for k, p in enumerate("abc")}
     chosen = next(
         (
             {n: g for n, g in kind.items() if capture.has(n)}
@@ -224,7 +224,7 @@ def _stretches(spin: Spin, change: float) -> tuple[list[Stretch], int]:
 def _unbroken(t_s: Array, vector: Complex, moving: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Runs of moving rows, parted where rows are missing for more than half a cycle.
 
-    Across such a gap the phase cannot be unwrapped. Half a cycle is told by nine tenths of the
+    Across such a gap the phase cannot be unwrapped. Half a cycle is seen by nine tenths of the
     advances from row to row.
     """
     both = np.flatnonzero(moving[1:] & moving[:-1])
@@ -250,7 +250,7 @@ def _one_way(phase: Array) -> list[tuple[int, int]]:
         forward = phase[start:stop] * (1.0 if phase[stop - 1] >= phase[start] else -1.0)
         back = np.maximum.accumulate(forward) - forward
         low = int(np.argmax(back))
-        if back[low] < TURN:
+        if back[low] < TURN_RAD:
             found.append((start, stop))
             continue
         high = int(np.argmax(forward[: low + 1]))
@@ -261,10 +261,9 @@ def _one_way(phase: Array) -> list[tuple[int, int]]:
 
 def _smooth_phase(t_s: Array, phase: Array) -> tuple[Array, Array, Rows] | None:
     """Phase and its rate [n] from means over whole cycles, and the cycle's number of each row."""
-    if phase.size < 12 or abs(phase[-1] - phase[0]) < TURN * policy().back_emf.least_cycles:
+    if phase.size < 12:
         return None
-    sense = math.copysign(1.0, phase[-1] - phase[0])
-    cuts = whole_cycles(sense * phase)
+    cuts = whole_cycles(phase)
     cuts = cuts[np.concatenate([[True], np.diff(cuts) >= 4])]
     if cuts.size < policy().back_emf.least_cycles + 1:
         return None

@@ -15,9 +15,11 @@ from pipeline.estimation.electrical.terminals import (
     pair_of,
     pair_signals,
 )
+from pipeline.estimation.policy import policy
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
     current_source,
+    instrument_uncertainties,
     temperature_source,
     voltage_source,
 )
@@ -26,6 +28,7 @@ from pipeline.numerics.plateaus import find_plateaus
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 
 TEST = "resistance"
+UNLOGGED = "assumed:temp_winding_degc"
 POINT_OPTIONS = {"zero_crossing": 0.03, "temp_assumed_degc": 25.0}
 Array = NDArray[np.float64]
 
@@ -42,6 +45,15 @@ class Point:
     u_v: float
     u_i: float
     meta: CaptureMeta
+    temp_logged: bool = True
+
+    @property
+    def temperature_source(self) -> str:
+        """The source of the error of its temperature: a thermometer, or what stands in for one.
+
+        That is one error in all captures without: they were recorded one after the other.
+        """
+        return temperature_source(self.meta) if self.temp_logged else UNLOGGED
 
 
 def direct_current_points(
@@ -78,7 +90,8 @@ def direct_current_points(
             continue
         ambient = capture.meta.ambient_degc
         if first_temperature(capture, "winding") is None:
-            notes.append(f"{capture.path}: no temp_winding_degc, taken at ambient")
+            about = f"ambient ± {policy().magnet.unlogged_k:g} K"
+            notes.append(f"{capture.path}: no temp_winding_degc, taken at {about}")
         try:
             points += _points_of(
                 capture, index, pair, temp_assumed_degc if ambient is None else ambient
@@ -99,7 +112,8 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> lis
     column = first_temperature(capture, "winding")
     data = pair_signals(capture, pair, *((column,) if column else ()))
     temps = np.full(data["t_s"].size, temp_degc)
-    if column is not None and np.isfinite(data[column]).any():
+    logged = column is not None and bool(np.isfinite(data[column]).any())
+    if column is not None and logged:
         temps = bridged(data["t_s"], data[column])
     points = []
     for plateau in find_plateaus(data["i_a"]):
@@ -107,8 +121,16 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> lis
         temp = float(temps[plateau.rows].mean())
         errors = (_standard_error(v), _standard_error(i))
         means = (float(v.mean()), float(i.mean()))
-        points.append(Point(index, pair, *means, temp, *errors, capture.meta))
+        points.append(Point(index, pair, *means, temp, *errors, capture.meta, logged))
     return points
+
+
+def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> dict[str, float]:
+    """Standard uncertainty of each source of `shifted`: gains relative, temperatures [K]."""
+    found = instrument_uncertainties(captures)
+    if any(not point.temp_logged for point in points):
+        found[UNLOGGED] = policy().magnet.unlogged_k
+    return found
 
 
 def _standard_error(samples: Array) -> float:
@@ -132,7 +154,7 @@ def shifted(points: Sequence[Point], shift: Shift) -> list[Point]:
             p,
             v_v=p.v_v * (1.0 + shift.get(voltage_source(p.meta), 0.0)),
             i_a=p.i_a * (1.0 + shift.get(current_source(p.meta), 0.0)),
-            temp_degc=p.temp_degc + shift.get(temperature_source(p.meta), 0.0),
+            temp_degc=p.temp_degc + shift.get(p.temperature_source, 0.0),
         )
         for p in points
     ]

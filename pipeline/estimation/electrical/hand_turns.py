@@ -14,8 +14,8 @@ from pipeline.estimation.electrical.back_emf import Channel, Spin
 from pipeline.numerics.integrals import REST, cubic
 from pipeline.numerics.least_squares import LinearFit, autocorrelation_time, linear_fit
 from pipeline.numerics.plateaus import white_noise_sigma
+from pipeline.physics.units import TURN_RAD
 
-TURN = 2.0 * math.pi
 Array = NDArray[np.float64]
 
 
@@ -88,7 +88,7 @@ def _quiet(v: Array) -> NDArray[np.bool_]:
 
 def _by_angle(spin: Spin, loud: Sequence[Channel], theta: Array) -> list[Turn]:
     """Cycles a turn as a real number: a scan of whole ones by the first voltage, then each own."""
-    if float(np.ptp(theta)) < 0.5 * TURN:
+    if float(np.ptp(theta)) < 0.5 * TURN_RAD:
         return []
     rows = _knots(theta, float(np.ptp(theta)) / 1200.0)
     if rows.size < 50:
@@ -130,7 +130,7 @@ def _steps_fit(t_s: Array, flux: Array, phase: Array) -> LinearFit:
 def _amplitude(
     spin: Spin, channel: Channel, flux: Array, phase: Array, cycles: float
 ) -> Turn | None:
-    rows = _knots(phase, TURN / 24.0)
+    rows = _knots(phase, TURN_RAD / 24.0)
     if rows.size < 12:
         return None
     fit = _steps_fit(spin.t_s[rows], flux[rows], phase[rows])
@@ -157,7 +157,7 @@ def _by_vector(spin: Spin) -> list[Turn]:
     flux = cubic(spin.t_s, vector)
     flux = flux - flux.mean()
     time = (spin.t_s - spin.t_s.mean()) / float(np.ptp(spin.t_s))
-    rows = _knots(np.unwrap(np.angle(flux)), TURN / 24.0)
+    rows = _knots(np.unwrap(np.angle(flux)), TURN_RAD / 24.0)
     for _ in range(3):
         f, t = flux[rows], time[rows]
         design = np.column_stack(
@@ -166,7 +166,7 @@ def _by_vector(spin: Spin) -> list[Turn]:
         c = linear_fit(design, np.abs(f) ** 2).coefficients
         flux = flux - (complex(c[0], c[1]) + complex(c[2], c[3]) * time)
     phase = np.unwrap(np.angle(flux))
-    cycles = abs(float(phase[-1] - phase[0])) / TURN
+    cycles = abs(float(phase[-1] - phase[0])) / TURN_RAD
     found = (
         _amplitude(spin, channel, _flux_of(spin, channel), phase, cycles)
         for channel in spin.channels
@@ -297,7 +297,7 @@ def _cycles(ends: LinearFit, extremes: int, sense: float, reversal: float) -> fl
     A whole number p has 2 p extremes and the same flux at both ends within three of its own
     uncertainties; or, both ends on an extreme that noise hides or shows, one more or less. Else
     the broken ends count by arc cosine. A record that falls short by whole electrical cycles, or
-    by less than its uncertainty, closes as well: only an angle could tell it from one turn.
+    by less than its uncertainty, closes as well: only an angle could separate it from one turn.
     """
     _, amplitude, start, end = (float(c) for c in ends.coefficients)
     scale = 3.0 * math.sqrt(max(1.0, _excess(ends)))
@@ -318,7 +318,7 @@ def _cycles(ends: LinearFit, extremes: int, sense: float, reversal: float) -> fl
         math.acos(float(np.clip(side * level / amplitude, -1.0, 1.0)))
         for side, level in ((sense, start), (last, end))
     ]
-    return (math.pi * (extremes - 1) + sum(pieces)) / TURN
+    return (math.pi * (extremes - 1) + sum(pieces)) / TURN_RAD
 
 
 def _extremes(flux: Array, reversal: float) -> NDArray[np.intp]:

@@ -19,13 +19,13 @@ UNPOWERED = ("open_circuit", "hand_turn")
 
 
 def magnet_column(capture: Capture) -> str | None:
-    """The column that tells the magnets' temperature; without current also one near them."""
+    """The column of the magnets' temperature; without current also one near them."""
     near = NEAR if capture.meta.test in UNPOWERED else ()
     return first_temperature(capture, "magnet", *near)
 
 
 def assumed_temperature(capture: Capture, otherwise_degc: float = 25.0) -> float:
-    """Where nothing tells the magnets' temperature: the ambient one, else `otherwise_degc`."""
+    """Where nothing records the magnets' temperature: the ambient one, else `otherwise_degc`."""
     ambient = capture.meta.ambient_degc
     return otherwise_degc if ambient is None else ambient
 

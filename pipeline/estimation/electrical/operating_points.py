@@ -266,15 +266,15 @@ def _whole_cycles(rows: slice, data: Mapping[str, Array], pole_pairs: int | None
 def _point(capture: Capture, data: Mapping[str, Array], rows: slice) -> Point:
     t, theta = data["t_s"][rows], data["theta_mech_rad"][rows]
     cos_turn = sin_turn = 0.0
-    if np.all(np.isfinite(theta)):
+    has_angle = bool(np.all(np.isfinite(theta)))
+    if has_angle:
         cos_turn, sin_turn = float(np.mean(np.cos(theta))), float(np.mean(np.sin(theta)))
         omega = float(np.polyfit(t - t.mean(), theta - theta.mean(), 1)[0])
     else:
         omega = float(np.mean(data["omega_mech_rad_s"][rows]))
     travel = abs(omega) * np.array([t[-1] - t[0], data["t_s"][-1] - data["t_s"][0]]) / TURN_RAD
     still = policy().points
-    no_angle = cos_turn == 0.0
-    if travel[0] < still.still_turn and (no_angle or travel[1] < still.still_capture_turn):
+    if travel[0] < still.still_turn and (not has_angle or travel[1] < still.still_capture_turn):
         omega = 0.0
     means = {name: float(np.mean(data[name][rows])) for name in MEANS}
     u = {name: _error_of_mean(data[name][rows]) for name in ("torque_shaft_nm", "vd_v", "vq_v")}

@@ -64,7 +64,7 @@ def solve(model: StepModel, axes: Sequence[str]) -> Solution:
     model
         The records and their equation.
     axes
-        `ld_h`, `lq_h` or both: which inductances the rotor angles tell apart.
+        `ld_h`, `lq_h` or both: which inductances the rotor angles separate.
 
     Returns
     -------

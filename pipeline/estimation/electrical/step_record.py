@@ -157,7 +157,7 @@ def integrated_form(t_s: Array, v_v: Array, i_a: Array) -> tuple[float, float] |
     Returns
     -------
     (L, R) or None
-        [H] and [ohm]; None where the two integrals cannot be told apart.
+        [H] and [ohm]; None where the two integrals cannot be separated.
 
     Notes
     -----

@@ -14,7 +14,6 @@ from pipeline.estimation.policy import policy
 from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import instrument_uncertainties, unstated_note
 from pipeline.numerics.orders import (
-    TURN_RAD,
     OrderLine,
     Spectrum,
     Turn,
@@ -28,6 +27,7 @@ from pipeline.numerics.orders import (
     whole_turns,
 )
 from pipeline.physics.mechanics import cogging_order
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate, Order
@@ -301,7 +301,7 @@ def _variance_of_mean(
 
 
 def _speed(captures: Sequence[Capture]) -> float | None:
-    """Mean speed of the slow turns [rad/s], either sense; None where no angle tells it.
+    """Mean speed of the slow turns [rad/s], either sense; None where no angle gives it.
 
     Rows without an angle are left out. The path is summed over a few hundred points, so that the
     angle's noise does not lengthen it.

@@ -186,7 +186,7 @@ def _records(captures: Sequence[Capture]) -> tuple[list[StepRecord], list[str]]:
 
 
 def _axes_told(records: Sequence[StepRecord], least_share: float) -> tuple[str, ...]:
-    """Which of Ld and Lq these rotor angles tell apart: L = 2 (cos² Ld + sin² Lq)."""
+    """Which of Ld and Lq these rotor angles separate: L = 2 (cos² Ld + sin² Lq)."""
     if not records:
         return ()
     cos2 = np.array([math.cos(r.axis_rad) ** 2 for r in records])

@@ -1,4 +1,4 @@
-"""Back-EMF constant and resistance from the voltages of an everyday drive log."""
+"""Back-EMF constant and resistance from the voltages of an everyday drive log, or a torque map."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ EXPERIMENT = (
 )
 HOLD = "assumed:voltage_hold"
 D_FLUX = "d flux"
-CANDIDATES = ("zero", "acceleration", "turned", "cross flux")
+LATE = "acceleration"
+CANDIDATES = ("zero", LATE, "turned", "cross flux")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,7 @@ class VoltageRows:
 
 
 def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
-    """Ke and R by `q_voltage` over the windows of all drives.
+    """Ke and R by `q_voltage` over the windows of all drives, or of torque maps without a drive.
 
     The weak form takes w and di_q/dt without differentiating; w is the angle's own rate, since a
     bench's speed estimate lags. The flux of the d current stands in the equation wherever i_d is
@@ -90,7 +91,7 @@ def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> F
     temperatures the values hold for those of the log.
     """
     pole_pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
-    rows = _rows(campaign.of("drive"), pole_pairs)
+    rows = _rows(campaign.of("drive") or campaign.of("torque_map"), pole_pairs)
     if rows is None or rows.voltage_v.size < 20 or float(np.ptp(rows.speed_rad_s)) == 0.0:
         return METHOD.nothing(GIVES, EXPERIMENT)
     magnet, magnet_parts = magnet_coefficient(known)
@@ -169,9 +170,10 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
     if angle == "omega_mech_rad_s":
         theta = trapezoid(t, theta)
     period = float(np.median(np.diff(t)))
-    window, least = policy().inverter, 3 * LEAST_SAMPLES * period
+    window, usual = policy().inverter, 3 * LEAST_SAMPLES * period
+    width = min(max(window.shortest_window_s, usual), window.longest_window_s)
     try:
-        weak = weak_rows(t, min(max(window.shortest_window_s, least), window.longest_window_s))
+        weak = weak_rows(t, max(width, (LEAST_SAMPLES + 1) * period))
         speed = smooth_speed(t, theta, max(0.005, 10.0 * period))
     except ValueError:
         return None
@@ -198,7 +200,7 @@ def _of_capture(capture: Capture, index: int, pole_pairs: int | None) -> dict[st
         "period": np.full(weak.count, period),
         "hold": np.full(weak.count, _hold_doubt(capture, speed, pole_pairs, period)),
         "cross flux": weak.integral(speed * i_q**2),
-        "acceleration": weak.integral(theta, 2),
+        LATE: weak.integral(theta, 2),
     }
     if capture.has("id_a"):
         found[D_FLUX] = weak.integral(speed * i_d)
@@ -292,13 +294,29 @@ def q_voltage(
 
 
 def _chosen(rows: VoltageRows, magnet: float, level: float) -> list[str]:
-    base = q_voltage(rows, magnet, [], {})
+    """The nuisances of a fit: what the data demand, and the lateness of an observer's speed.
+
+    On a free shaft that lateness reads as resistance, and no remainder shows it.
+    """
+    sure = [LATE] if any(not c.has("theta_mech_rad") for c in rows.captures) else []
+    base = q_voltage(rows, magnet, sure, {})
     candidates = {name: rows.columns[name] for name in CANDIDATES if name in rows.columns}
+    candidates = {name: column for name, column in candidates.items() if name not in sure}
     candidates = {n: c for n, c in candidates.items() if n == "zero" or float(np.ptp(c)) > 0.0}
     sigma = np.ones(rows.voltage_v.size)
     rich = np.column_stack([base, *candidates.values()])
     tau = autocorrelation_time(linear_fit(rich, rows.voltage_v).residuals, 200)
-    return needed_columns(base, candidates, rows.voltage_v, sigma, level, None, tau)
+    return sure + needed_columns(base, candidates, rows.voltage_v, sigma, level, None, tau)
+
+
+def _unlogged_flux(rows: VoltageRows, residuals: Array) -> float:
+    """Standard uncertainty of Ke [V s/rad] for the flux of a d current that was not logged.
+
+    What of it varies is in the remainder. As large as that, its mean may be, which reads as Ke.
+    """
+    if all(c.has("id_a") for c in rows.captures):
+        return 0.0
+    return float(np.sqrt(np.mean(residuals**2) / np.mean(rows.speed_rad_s**2)))
 
 
 def _estimates(
@@ -348,6 +366,9 @@ def _estimates(
             note += f"; {place[name]} not logged, taken as 25 ± {policy().magnet.unlogged_k:g} K"
         if i == 0:
             parts.append(Contribution(HOLD, value * rows.hold_doubt, "B"))
+            if flux := _unlogged_flux(rows, found.residuals):
+                parts.append(Contribution("assumed:id_a:flux", flux, "B"))
+                note += "; id_a not logged, taken as 0 but for what varies"
         at = {place[name]: 25.0, "omega_mech_rad_s": float(np.max(np.abs(rows.speed_rad_s)))}
         estimates.append(METHOD.measured(name, value, parts, paths, at, note))
     return tuple(estimates)
@@ -363,7 +384,7 @@ def _moved(
     unless it is what it stands for: a lateness that drives have, Ke tau dw/dt and p tau w v_d.
     """
     latest = policy().inverter.latest_periods * rows.period_s
-    most = {"acceleration": abs(float(values[0])) * latest, "turned": pole_pairs * latest}
+    most = {LATE: abs(float(values[0])) * latest, "turned": pole_pairs * latest}
     moved = np.zeros(len(GIVES))
     for name, size in zip(chosen, values[len(values) - len(chosen) :], strict=True):
         if abs(float(size)) <= most.get(name, 0.0):
@@ -383,7 +404,7 @@ def _evidence(rows: VoltageRows, found: LinearFit) -> tuple[Evidence, ...]:
 ESTIMATOR = Estimator(
     name=METHOD.name,
     gives=GIVES,
-    tests=("drive",),
+    tests=("drive", "torque_map"),
     experiment=EXPERIMENT,
     fit=fit,
     uses=("pole_pairs", "temp_coeff_magnet_1_k"),

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.electrical.back_emf import read_spin
 from pipeline.estimation.electrical.hand_turns import Turn, turns_of
@@ -46,8 +45,6 @@ EXPERIMENT = (
     "record a hand_turn: terminals open, shaft turned by hand through exactly one turn from rest "
     "to rest, a line voltage, theta_mech_rad if there is a sensor"
 )
-TURN = 2.0 * math.pi
-Array = NDArray[np.float64]
 
 
 def fit_hand_turn(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:

@@ -153,7 +153,7 @@ def _slope_budget(line: Line, options: Mapping[str, float]) -> Budget:
     """Contributions to dR/dT: scatter, gains, and a thermometer that lags.
 
     A lag tau_l behind a temperature that settles at rate k changes the slope by k tau_l; one
-    exponential does not tell it from alpha, so a slow thermometer has to be stated (`u_lag_s`).
+    exponential does not separate it from alpha, so a slow thermometer has to be stated (`u_lag_s`).
     """
     slope = line.slope_ohm_k
     parts = [
@@ -221,7 +221,7 @@ def _alpha(
 
 
 def _resistance(line: Line, options: Mapping[str, float], notes: Sequence[str]) -> Estimate:
-    """R at 25 degC by the run's line; an inverter's drop is not told from it at one current."""
+    """R at 25 degC by the run's line; one current does not separate an inverter's drop from it."""
     meta = line.record.capture.meta
     commanded = meta.voltage_kind == "commanded"
     drop = options["drop_commanded_v" if commanded else "drop_measured_v"]

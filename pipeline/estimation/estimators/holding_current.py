@@ -21,7 +21,6 @@ from pipeline.numerics.bootstrap import block_bootstrap, block_length
 from pipeline.numerics.harmonics import harmonic_design
 from pipeline.numerics.least_squares import linear_fit
 from pipeline.numerics.orders import (
-    TURN_RAD,
     OrderLine,
     Spectrum,
     Turn,
@@ -35,6 +34,7 @@ from pipeline.numerics.orders import (
 )
 from pipeline.physics.glossary import Term
 from pipeline.physics.mechanics import cogging_order
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate

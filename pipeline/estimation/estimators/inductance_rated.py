@@ -186,7 +186,7 @@ def _quadrature(fluxes: Sequence[Flux], magnet: float) -> Result | None:
     if rated <= 0.0:
         return None
     used = [f for f in near if f.iq_a > (1.0 - same) * rated]
-    weights = np.array([1.0 / max(f.u_q_wb, 1e-300) ** 2 for f in used])
+    weights = np.array([1.0 / max(f.u_q_wb, 1e-150) ** 2 for f in used])
     weights /= weights.sum()
     value = float(sum(w * f.psi_q_wb / f.iq_a for w, f in zip(weights, used, strict=True)))
     u = float(

@@ -73,7 +73,7 @@ NUISANCES = (
 
 
 RELUCTANCE = "d q current"
-"""What reluctance adds to the torque, where nothing tells how much."""
+"""What reluctance adds to the torque, where nothing shows how much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,6 +346,7 @@ def _estimates(
         parts.append(Contribution("assumed:drag_form", float(found.u_form[i]), "B"))
         parts += doubts.parts(i, float(constants[i]), logged)
         parts += _of_a_speed(rows, float(constants[i]))
+        parts += _of_a_d_current(rows, float(per_kt[i]) * torque.kt_nm_a)
         budget = propagate(
             [
                 (1.0, (*parts, *type_b[i])),
@@ -366,6 +367,14 @@ def _of_a_speed(rows: ShaftRows, value: float) -> list[Contribution]:
     return [Contribution("assumed:speed_estimate", policy().drag.speed_share * value, "B")]
 
 
+def _of_a_d_current(rows: ShaftRows, per_torque: float) -> list[Contribution]:
+    """What the reluctance torque of a d current that was not logged may add to a constant."""
+    if all(c.has("id_a") for c in rows.captures if c.meta.test == "drive"):
+        return []
+    share = policy().torque_map.unlogged_d_share
+    return [Contribution("assumed:id_a:torque", per_torque * share, "B")]
+
+
 def _slopes(
     values: Callable[[Mapping[str, float]], Array], torque: Torque
 ) -> tuple[Array, Array, Array]:
@@ -384,6 +393,8 @@ def _words(rows: ShaftRows, torque: Torque, found: DragFit) -> list[str]:
     words.append(f"{rows.count} windows, {rows.dropped} near standstill left out")
     if _of_a_speed(rows, 1.0):
         words.append("motion by the bench's own speed, which may lag or be smoothed")
+    if _of_a_d_current(rows, 1.0):
+        words.append("id_a not logged, its torque taken as none")
     if not np.any(rows.kind == COAST):
         words.append("no spin_down: friction from driven motion alone")
     unstated = unstated_note(rows.captures, ("current", "torque"))

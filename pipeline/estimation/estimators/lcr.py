@@ -100,7 +100,7 @@ def fit_lcr(campaign: Campaign, known: Constants, options: Mapping[str, float]) 
 
     A and B are free, so that a rotor zero that is off is found instead of shrinking the saliency;
     within its own error of zero it is taken as zero, and A alone is fitted. With angles unknown
-    the low inductance is taken as Ld, which is true of interior magnets and said in the note.
+    the low inductance is taken as Ld, which holds for interior magnets; the note says so.
     """
     del known
     captures = campaign.of("lcr")
@@ -202,10 +202,10 @@ def _over_angle(table: Table, options: Mapping[str, float]) -> Found | None:
 def _at_unknown_angle(table: Table) -> Found | None:
     """Mean over the rotor positions at which all three pairs were read.
 
-    Where the angle is stated it tells the axes: the low inductance is Lq if its place lies nearer
-    to a quarter period from the stated angle than to the angle itself. Where it is not stated, the
-    low one is low by its noise as well: a swing that scatters as noise alone does is none, and
-    both are their mean, to half of it.
+    Where the angle is stated it separates the axes: the low inductance is Lq if its place lies
+    nearer to a quarter period from the stated angle than to the angle itself. Where it is not
+    stated, the low one is low by its noise as well: a swing that scatters as noise alone does is
+    none, and both are their mean, to half of it.
     """
     first, second, has_angle = [], [], []
     for row in np.unique(table.row):

@@ -231,7 +231,7 @@ def _instrument_shares(
     groups: Sequence[Group], used: Sequence[Capture]
 ) -> dict[str, list[tuple[str, float]]]:
     """Each source's standard uncertainty times the share of the weight read through it."""
-    weights = np.array([1.0 / max(g.flux.u_psi_wb, 1e-300) ** 2 for g in groups])
+    weights = np.array([1.0 / max(g.flux.u_psi_wb, 1e-150) ** 2 for g in groups])
     weights = weights / weights.sum()
     shares: dict[str, list[tuple[str, float]]] = {"voltage": [], "temperature": []}
     for source, u in instrument_uncertainties(used, ("voltage",)).items():

@@ -16,6 +16,7 @@ from pipeline.estimation.electrical.direct_current import (
     captures_of,
     direct_current_points,
     shifted,
+    uncertainties_of,
 )
 from pipeline.estimation.electrical.terminals import PAIRS
 from pipeline.estimation.method import Method, over_x
@@ -23,7 +24,6 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
     contributions,
-    instrument_uncertainties,
     unstated_note,
     voltage_source,
 )
@@ -86,7 +86,7 @@ class Columns:
 
 
 def columns_of(points: Sequence[Point]) -> Columns:
-    """The coefficients that these plateaus can tell apart."""
+    """The coefficients that these plateaus can separate."""
     pairs = tuple(p for p in PAIRS if any(point.pair == p for point in points))
     offsets, drops = [], set()
     for index in sorted({p.capture for p in points}):
@@ -271,7 +271,7 @@ def fit_resistance(campaign: Campaign, known: Constants, options: Mapping[str, f
         )
         return np.array(list(_results(columns, moved.coefficients).values()))
 
-    uncertainties = instrument_uncertainties(used) | {COPPER_SOURCE: options["u_rel_copper"]}
+    uncertainties = uncertainties_of(points, used) | {COPPER_SOURCE: options["u_rel_copper"]}
     shared = contributions(evaluate, uncertainties)
     matrix = np.column_stack([[*_results(columns, row).values()] for row in np.eye(columns.size)])
     covariance = matrix @ fit.covariance @ matrix.T
@@ -297,7 +297,7 @@ def _allowances(
     matrix: Array,
     options: Mapping[str, float],
 ) -> dict[str, list[Contribution]]:
-    """Type B allowances for what the captures cannot tell: V0 and the pairs not measured.
+    """Type B allowances for what the captures do not determine: V0 and the pairs not measured.
 
     `matrix` [names, columns] holds the published values' shares of the pairs. V0 is that of one
     inverter and one set of leads, so what it adds to the pairs adds up in what is made of them.

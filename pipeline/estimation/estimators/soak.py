@@ -12,6 +12,7 @@ from pipeline.estimation.electrical.direct_current import (
     captures_of,
     direct_current_points,
     shifted,
+    uncertainties_of,
 )
 from pipeline.estimation.estimators.resistance import columns_of, fit_direct_current
 from pipeline.estimation.method import Method
@@ -19,7 +20,6 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.estimation.uncertainty.instruments import (
     Shift,
     contributions,
-    instrument_uncertainties,
     unstated_note,
 )
 from pipeline.records.capture import Campaign
@@ -61,7 +61,7 @@ def fit_soak(campaign: Campaign, known: Constants, options: Mapping[str, float])
         return np.array([fit_direct_current(shifted(points, shift), columns, np.inf).alpha_1_k])
 
     used = captures_of(campaign, points)
-    shared = contributions(evaluate, instrument_uncertainties(used))[0]
+    shared = contributions(evaluate, uncertainties_of(points, used))[0]
     parts = [METHOD.scatter(GIVEN, fit.u_alpha_1_k, fit.dof), *shared]
     temps = [p.temp_degc for p in points]
     at = {"temp_winding_degc": 25.0, "temp_low_degc": min(temps), "temp_high_degc": max(temps)}

@@ -209,7 +209,9 @@ def _coast(path: str, t: Array, y: Array, sense: int, speed: Array, of_angle: bo
     t, y = block_means(t - start, block), block_means(y, block)
     travelled = (y - y[0]) * sense if of_angle else y * sense
     theta = y if of_angle else np.cumsum(np.gradient(t) * y)
-    return Coast(path, start, t, travelled, theta, sense, float(speed[0]), of_angle, float(sigma))
+    least = float(np.ptp(travelled) * np.finfo(np.float32).eps)
+    noise = max(float(sigma), least)
+    return Coast(path, start, t, travelled, theta, sense, float(speed[0]), of_angle, noise)
 
 
 def _ripple(name: str, theta: Array) -> Array:

@@ -179,15 +179,16 @@ def _balance(record: HeatRecord, losses_w: Array, ambient: float) -> Balance | N
         return None
     covered = float(t[-1] - t[0]) * rate
     rth = inverse_c / rate
-    gradient = np.array([0.0, 1.0 / rate, -rth / rate])
-    u = math.sqrt(float(gradient @ single.covariance @ gradient) * tau)
+    slopes = np.array(
+        [[1.0 / rate, -rth / rate], [-1.0 / inverse_c**2, 0.0], [0.0, -1.0 / rate**2]]
+    )
+    covariance = slopes @ single.covariance[1:, 1:] @ slopes.T * tau
+    u = math.sqrt(covariance[0, 0])
     # One exponential is a guess about what follows the end of the record: its weight there.
     u = math.hypot(u, rth * math.exp(-covered))
     words = f"one time constant of {1.0 / rate:.3g} s, {covered:.1f} of them recorded"
     fitted = winding - single.residuals
     values = np.array([rth, 1.0 / inverse_c, 1.0 / rate])
-    slopes = np.array([gradient, [0.0, -1.0 / inverse_c**2, 0.0], [0.0, 0.0, -1.0 / rate**2]])
-    covariance = slopes @ single.covariance @ slopes.T * tau
     covariance[0, 0] = u**2
     scatter = _common_scatter(covariance)
     return Balance(rth, u, max(single.dof / tau, 1.0), fitted, covered, words, values, scatter)

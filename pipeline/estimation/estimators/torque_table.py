@@ -29,6 +29,7 @@ from pipeline.estimation.uncertainty.instruments import (
 )
 from pipeline.numerics.least_squares import LinearFit, linear_fit
 from pipeline.numerics.selection import needed_columns
+from pipeline.physics.units import REFERENCE_DEGC
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.constants import Constants
 from pipeline.records.evidence import Evidence
@@ -44,7 +45,6 @@ EXPERIMENT = (
 )
 LEAST_ROWS, LEAST_LEVELS = 5, 4
 SAME = 0.01
-REFERENCE_DEGC = 25.0
 STEP_1_K = 1e-5
 
 

@@ -62,7 +62,7 @@ CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
 class DragFit:
     """Coefficients of A = g T - sum a_m f_m(w) - nuisances, how sure, and what they mean.
 
-    `free` tells that the drag curve was left free (columns `CURVE`) as Coulomb and viscous drag
+    `free`: the drag curve was left free (columns `CURVE`) as Coulomb and viscous drag
     with the known additions did not hold. `u_form` [3] is the allowance for the form of drag on
     J, T_c, B; `reasons` [3] says why one of them is not identifiable, else is empty.
     """
@@ -261,7 +261,7 @@ def too_short(rows: ShaftRows) -> str:
     Notes
     -----
     The scatter s of ν degrees of freedom is itself known to 1/√(2ν): a quarter at
-    `drag.least_freedom`. Fewer tell neither how sure J is nor whether a nuisance is there.
+    `drag.least_freedom`. Fewer show neither how sure J is nor whether a nuisance is there.
 
     References
     ----------

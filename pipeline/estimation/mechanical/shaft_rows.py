@@ -171,7 +171,9 @@ def _part(capture: Capture) -> _Part | None:
 
 
 def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
-    """Windows long enough for the encoder's noise to be a fiftieth of the acceleration."""
+    """Windows long enough for the encoder's noise to be a fiftieth of the acceleration, and for
+    the samples that a window needs.
+    """
     if kind == COAST:
         share = policy().shaft_rows.coast_share * float(t_s[-1] - t_s[0])
         return weak_rows(
@@ -183,7 +185,9 @@ def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
             policy().shaft_rows.overlap,
         )
     sigma = white_noise_sigma(theta_rad)
-    for width in policy().shaft_rows.drive_windows_s:
+    least = (LEAST_SAMPLES + 1) * float(np.median(np.diff(t_s)))
+    widths = policy().shaft_rows.drive_windows_s
+    for width in widths:
         try:
             weak = weak_rows(t_s, width, policy().shaft_rows.overlap)
         except ValueError:
@@ -191,7 +195,7 @@ def _windows(t_s: Array, theta_rad: Array, kind: int) -> WeakRows:
         noise = sigma * weak.noise_gain(2)
         if noise < policy().shaft_rows.quiet_share * float(np.std(weak.integral(theta_rad, 2))):
             return weak
-    return weak_rows(t_s, policy().shaft_rows.drive_windows_s[-1], policy().shaft_rows.overlap)
+    return weak_rows(t_s, max(widths[-1], least), policy().shaft_rows.overlap)
 
 
 def _held(weak: WeakRows, speed: Array) -> NDArray[np.bool_]:

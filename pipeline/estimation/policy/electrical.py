@@ -143,7 +143,7 @@ class Inverter:
     )  # fmt: skip
     longest_window_s: float = chosen(
         0.1, "s", "longest window of the weak form of the voltage",
-        why="slower logs have too few samples for the current's derivative anyway",
+        why="a slower log's are as long as ten of its samples",
     )  # fmt: skip
     latest_periods: float = derived(
         2.0, "samples", "latest that a drive's voltage is against its angle",
@@ -154,7 +154,7 @@ class Inverter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Aligned:
-    """What torque tells of a current's delay."""
+    """What torque shows of a current's delay."""
 
     least_d_share: float = chosen(
         0.1, "1", "of the span of q current that the d current moves by to count",

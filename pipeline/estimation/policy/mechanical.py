@@ -129,7 +129,7 @@ class CoastDown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TorqueMap:
-    """What a torque map tells of drag."""
+    """What a torque map shows of drag."""
 
     untested_form_share: float = chosen(
         0.1, "1", "of the drag at the slowest speed that may have another form",

@@ -127,7 +127,7 @@ def _phase_shares(capture: Capture, known: Constants) -> tuple[float, float, flo
 def reference_resistance(record: HeatRecord, known: Constants) -> Estimate | None:
     """R at 25 degC of the mix of phases that this run's current saw, by the resistance test.
 
-    Where the phases or their mix are not known, the best R of the mean phase, whatever told it: a
+    Where the phases or their mix are not known, the best R of the mean phase, whatever gives it: a
     resistance test, else a heat run or a drive log. None where nothing did.
 
     Parameters

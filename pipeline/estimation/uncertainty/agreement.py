@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.estimation.policy import policy
 from pipeline.numerics.random_effects import between
 from pipeline.records.constants import Constants
 from pipeline.records.estimate import Estimate
 from pipeline.records.uncertainty import METHODS, Contribution, covariance
-
-Array = NDArray[np.float64]
 
 # One coupling: torque per ampere is 1.5 p psi at small current, whatever the motor.
 SAME = {"kt_peak_nm_a": ("kt_from_ke_nm_a",)}
@@ -29,7 +26,7 @@ def reconciled(constants: Constants) -> Constants:
     """The constants, each with the scatter between methods in its budget where they disagree.
 
     A measured value is judged by the other methods that hold for like conditions and are precise
-    enough to tell something of it. What they scatter beyond chance joins its budget with k - 1
+    enough to say something of it. What they scatter beyond chance joins its budget with k - 1
     degrees of freedom, and its note names methods and values.
 
     Parameters

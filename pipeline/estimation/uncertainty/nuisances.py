@@ -9,7 +9,7 @@ def allowed_for(terms: Sequence[str]) -> str:
     """The nuisance terms of a fit in words, or an empty string.
 
     They soak up what would else bend the constants, whatever it comes from, and one stands for
-    another. Which effects a motor shows is told by `diagnose`, which fits all tests at once.
+    another. Which effects a motor shows is for `diagnose` to find, which fits all tests at once.
     """
     if not terms:
         return ""

@@ -117,7 +117,7 @@ def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_
 
 
 def information(regression: Regression, column: int) -> Array:
-    """What each row [n] tells of one coefficient beside the others: its share of 1/variance.
+    """What each row [n] determines of one coefficient beside the others: its share of 1/variance.
 
     Parameters
     ----------

@@ -30,10 +30,10 @@ from pipeline.io.storage.code_version import closure_digest, libraries_version
 from pipeline.io.storage.publish import write_whole
 from pipeline.records.constants import Constants
 from pipeline.records.errors import PipelineError
-from pipeline.records.estimate import Estimate, Order
+from pipeline.records.estimate import Estimate
 from pipeline.records.evidence import Evidence, Series
 from pipeline.records.naming import file_stem
-from pipeline.records.uncertainty import Contribution
+from pipeline.records.plain_form import record_of
 
 _MAX_BYTES = 2**30
 
@@ -153,7 +153,7 @@ def _decoded(text: bytes, data: bytes) -> Fit:
         at += values.nbytes
         return values
 
-    estimates = tuple(_estimate(stored) for stored in document["estimates"])
+    estimates = tuple(record_of(Estimate, stored) for stored in document["estimates"])
     evidence = tuple(
         Evidence(
             **stored
@@ -167,13 +167,3 @@ def _decoded(text: bytes, data: bytes) -> Fit:
         for stored in document["evidence"]
     )
     return Fit(estimates, evidence)
-
-
-def _estimate(stored: Mapping[str, Any]) -> Estimate:
-    bounds = stored["bounds"]
-    values: dict[str, Any] = dict(stored)
-    values["budget"] = tuple(Contribution(**part) for part in stored["budget"])
-    values["captures"] = tuple(stored["captures"])
-    values["orders"] = tuple(Order(**order) for order in stored["orders"])
-    values["bounds"] = None if bounds is None else (bounds[0], bounds[1])
-    return Estimate(**values)

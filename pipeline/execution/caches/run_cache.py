@@ -25,6 +25,7 @@ from pipeline.io.storage.sealed import keep_sealed, read_sealed
 from pipeline.records.finding import Finding
 from pipeline.records.naming import file_stem
 from pipeline.records.outcome import Outcome
+from pipeline.records.plain_form import record_of
 
 FOLDER = ".cache"
 
@@ -137,7 +138,7 @@ class RunCache:
         files = tuple((name, sha256) for name, sha256 in entry["files"])
         if not all(self._outputs.holds(name, sha256) for name, sha256 in files):
             return None
-        return Finished(tuple(Finding.of(f) for f in entry["findings"]), files)
+        return Finished(tuple(record_of(Finding, f) for f in entry["findings"]), files)
 
     def outcome(self, key: str) -> Batch | None:
         """The finished batch of this key, or None where a file of it is missing or changed."""
@@ -197,7 +198,7 @@ def _answer_note(key: str, answer: Answer) -> dict[str, Any]:
 def _answer(
     path: str, sha256: str, note: Mapping[str, Any], sources: Mapping[str, SourceMap]
 ) -> Answer:
-    findings = tuple(Finding.of(document) for document in note["findings"])
+    findings = tuple(record_of(Finding, document) for document in note["findings"])
     found = note["entry"]
     if found is None:
         return Answer(path, sha256, None, findings)

@@ -24,6 +24,7 @@ from pipeline.records.errors import PipelineError
 from pipeline.records.finding import Finding
 from pipeline.records.ledger import Version, histories
 from pipeline.records.naming import file_stem
+from pipeline.records.plain_form import record_of
 
 Histories = Mapping[str, Sequence[Version]]
 Statuses = Mapping[str, CurrentStatus]
@@ -117,7 +118,7 @@ def _index(output: Path, versions: Histories) -> Iterable[str]:
     sheets = [replace(read_datasheet(path), alternatives=(), captures=()) for path in paths]
     statuses = {sheet.motor_id: status_now(output, sheet, versions) for sheet in sheets}
     documents = json.loads((output / "findings.json").read_bytes())["findings"]
-    findings = [Finding.of(document) for document in documents]
+    findings = [record_of(Finding, document) for document in documents]
     links = links_of(output, INDEX)
     after = render_fleet(sheets, findings, statuses, links).encode()
     if after == (output / INDEX).read_bytes():

@@ -18,13 +18,13 @@ import numpy as np
 
 from pipeline.export.curves import Array, Bump, Wave, bump_of, drag_polynomial, waves
 from pipeline.export.protocol import Exporter, Options, Source, Values, number_option
+from pipeline.physics.units import REFERENCE_DEGC
 
 PEAK_POWER = 1.5
 """Power of three phases over the product of peak voltage and current."""
 RIGID_RAD = 1e-4
 """Travel over which friction builds up where none was found: far below what a bench sees."""
 MASS_KG = 1e-3
-REFERENCE_DEGC = 25.0
 _SMALL = 0.01
 
 

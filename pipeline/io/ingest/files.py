@@ -75,7 +75,7 @@ def list_files(folder: Path) -> Listing:
 
 
 def _is_link(path: Path) -> bool:
-    """Whether it is a symbolic link; False where the system does not tell, which `_fault` says."""
+    """Whether it is a symbolic link; False where the system is silent, which `_fault` says."""
     try:
         return path.is_symlink()
     except OSError:

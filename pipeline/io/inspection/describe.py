@@ -111,7 +111,7 @@ def describe(
     """
     data = read_whole(path)
     look_at = _Look(path.name, data, sources, answers or {})
-    reader = _reader_of(path.name)
+    reader = _reader_of(path, data, sources)
     if reader is not None:
         report = _foreign(look_at, reader)
     elif data.startswith(MAGIC):
@@ -136,10 +136,23 @@ def _unused(path: Path, report: InspectReport, sources: Mapping[str, SourceMap])
     return [f"`run` takes it for no capture, for nothing states `contract`; {remedy}"]
 
 
-def _reader_of(name: str) -> Reader | None:
-    """The reader of a form that the suffix names, or None for MCAP and text."""
-    suffix = PurePosixPath(name).suffix.lower()
-    return next((one for one in readers().values() if suffix in one.suffixes), None)
+def _reader_of(path: Path, data: bytes, sources: Mapping[str, SourceMap]) -> Reader | None:
+    """The reader that the suffix names, or a map that recognises the file; None for MCAP and text.
+
+    A form without a suffix of its own, a table in JSON, is known by its map alone.
+    """
+    suffix = PurePosixPath(path.name).suffix.lower()
+    found = next((one for one in readers().values() if suffix in one.suffixes), None)
+    if found is not None or data.startswith(MAGIC):
+        return found
+    head = _head(data)
+    named = (one.reader for one in sources.values() if one.recognises(path.name, head, ()))
+    return next((readers()[name] for name in named if name in readers()), None)
+
+
+def _head(data: bytes) -> str:
+    """The beginning of a file as maps recognise it."""
+    return data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
 
 
 def _foreign(look_at: _Look, reader: Reader) -> InspectReport:
@@ -152,7 +165,8 @@ def _foreign(look_at: _Look, reader: Reader) -> InspectReport:
     except CaptureError as fault:
         look_at.faults.append(str(fault))
     topics = [stream.name for stream in streams]
-    look_at.source = _matched(look_at.name, None, topics, look_at.sources)
+    head = None if reader.suffixes else _head(look_at.data)
+    look_at.source = _matched(look_at.name, head, topics, look_at.sources)
     suffix = PurePosixPath(look_at.name).suffix
     shape = Shape(streams, suffixes=(suffix,), reader=reader.name)
     return look_at.report(shape, lacks=look_at.source is None, foreign=False)
@@ -198,7 +212,7 @@ def _text(look_at: _Look) -> InspectReport:
     try:
         check_text(data)
         look_at.metadata, begin = split_comments(data)
-        head = data[:MAX_HEAD_BYTES].decode("latin-1").replace("\r\n", "\n")
+        head = _head(data)
         start = data[begin : begin + MAX_HEAD_BYTES]
         encoding = encoding_of(start)
         found = sniff(start.decode(encoding, "replace"))

@@ -180,7 +180,9 @@ def _mechanical(part: FieldMap, pole_pairs: int | None) -> FieldMap:
 def _converted(
     values: NDArray[Any], part: FieldMap, units: Mapping[str, str]
 ) -> NDArray[np.float64]:
-    """Values in the column's unit; raises CaptureError for complex ones."""
+    """Values in the column's unit, infinite where no double holds one, which is a reading that is
+    missing; raises CaptureError for complex ones.
+    """
     if np.iscomplexobj(values):
         words = f"the field {part.field!r} holds complex numbers"
         remedy = "write its real and imaginary parts as two fields"
@@ -197,9 +199,10 @@ def _converted(
         scale = scale_to(unit, COLUMNS[part.column].unit)
         shift += factor * scale.shift
         factor *= scale.factor
-    if factor != 1.0:
-        numbers = numbers * factor
-    return numbers + shift if shift else numbers
+    with np.errstate(over="ignore"):
+        if factor != 1.0:
+            numbers = numbers * factor
+        return numbers + shift if shift else numbers
 
 
 def _time(

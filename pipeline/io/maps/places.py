@@ -49,6 +49,12 @@ def source_maps(source: str = AUTO, config_dir: str | None = None) -> dict[str, 
     return maps if source == AUTO else find_maps(maps, source)
 
 
+def map_file(name: str, config_dir: str | None = None) -> Path:
+    """The file of a map that `source_maps` found by name, of the nearest folder that has it."""
+    places = [folder / f"{name}.yaml" for folder in map_folders(config_dir)]
+    return [place for place in places if place.is_file()][-1]
+
+
 def _users() -> list[Path]:
     """The user's folder of source maps, as the XDG base directory specification names it."""
     named = os.environ.get("XDG_CONFIG_HOME", "")

@@ -143,7 +143,7 @@ class SourceMap:
         return tuple(p for p in self.captures if not p.files or _is_named(path, p.files))
 
     def metadata_for(self, path: str) -> dict[str, str]:
-        """Fixed metadata of one file; what is said of its name counts before the rest."""
+        """Fixed metadata of one file; what is stated for its name takes precedence."""
         found = dict(self.metadata) | self._from_name(path)
         name = PurePosixPath(path).name
         for pattern, values in reversed(self.per_file):
@@ -206,11 +206,12 @@ def parse_source_file(data: bytes, name: str) -> dict[str, SourceMap]:
         label = f"{name}/{number}"
         if not isinstance(variant, dict):
             raise UsageError(f"source map {label}: is no map of keys", "write `key: value` lines")
-        found[label] = _parsed(_laid_over(plain, variant), label)
+        found[label] = _parsed(laid_over(plain, variant), label)
     return found
 
 
-def _laid_over(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
+def laid_over(base: Mapping[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of both, those of `top` first; a map over a map key by key."""
     both = {
         key: {**base[key], **value}
         for key, value in top.items()

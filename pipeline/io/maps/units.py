@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from pipeline.physics.units import TURN_RAD
 from pipeline.records.errors import CaptureError
 
 _POUND_FORCE_N = 4.4482216152605
 _INCH_M = 0.0254
-_TURN_RAD = 2 * math.pi
 _KILOGRAM_FORCE_N = 9.80665
 
 
@@ -34,8 +34,8 @@ _ANGLE = {
     "rad": Scale(1.0),
     "mrad": Scale(1e-3),
     "deg": Scale(math.pi / 180),
-    "rev": Scale(_TURN_RAD),
-    "rotation": Scale(_TURN_RAD),
+    "rev": Scale(TURN_RAD),
+    "rotation": Scale(TURN_RAD),
     "arcmin": Scale(math.pi / 180 / 60),
 }
 _TORQUE = {
@@ -61,10 +61,10 @@ FOREIGN_UNITS: dict[str, dict[str, Scale]] = {
     "rad/s": {
         "rad/s": Scale(1.0),
         "deg/s": Scale(math.pi / 180),
-        "rpm": Scale(_TURN_RAD / 60),
-        "krpm": Scale(_TURN_RAD / 60 * 1e3),
-        "rev/s": Scale(_TURN_RAD),
-        "Hz": Scale(_TURN_RAD),
+        "rpm": Scale(TURN_RAD / 60),
+        "krpm": Scale(TURN_RAD / 60 * 1e3),
+        "rev/s": Scale(TURN_RAD),
+        "Hz": Scale(TURN_RAD),
     },
     "N·m": _TORQUE,
     "degC": {

@@ -164,7 +164,7 @@ def _regular(layout: Layout, chunk: rec.Chunk, buffer: bytes) -> Batch | None:
         or times.min() < chunk.start_time
         or times.max() > chunk.end_time
     ):
-        return None  # what is wrong with it, if anything, is said by the general way
+        return None  # what is wrong with it, if anything, is reported by the general way
     definitions, stop = layout.definitions, first + count * stride
     _walked(definitions, buffer, 0, first, allow_messages=False)
     _walked(definitions, buffer, stop, len(buffer), allow_messages=False)

@@ -44,7 +44,7 @@ Line = tuple[str, str, int]
 
 
 def capture_regimes(capture: Capture) -> tuple[Stretch, ...]:
-    """What the machine did over the rows of the capture's main table; empty where nothing tells."""
+    """What the machine did over the rows of the capture's main table; empty where unknown."""
     if not capture.tables or "t_s" not in capture.tables[0].columns:
         return ()
     table = capture.tables[0]

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.cell_means import cell_means, visits_of
-from pipeline.physics.glossary import suffix_of
-from pipeline.physics.units import SUFFIX_UNITS
+from pipeline.physics.glossary import unit_of
 from pipeline.records.capture import Capture
 from pipeline.records.error_map import Bins, ErrorMap
 from pipeline.records.evidence import Evidence
@@ -57,7 +56,7 @@ def residual_maps(capture: Capture, evidence: Evidence) -> ResidualMaps | None:
         return None
     return ResidualMaps(
         evidence.y_name,
-        _unit(evidence.y_name),
+        unit_of(evidence.y_name),
         signal_floor(series.measured),
         flat,
         turn,
@@ -143,7 +142,7 @@ def _map(signal: str, error: Array, cell: NDArray[np.int64], x: Bins, y: Bins | 
     means = np.where(found.count < FEWEST_SAMPLES, np.nan, found.mean)
     return ErrorMap(
         signal,
-        _unit(signal),
+        unit_of(signal),
         x,
         y,
         found.count.reshape(shape),
@@ -165,7 +164,3 @@ def _place(value: Array, bins: Bins) -> NDArray[np.int64]:
     low, high = bins.edges[0], bins.edges[-1]
     place = ((value - low) / (high - low) * bins.count).astype(np.int64)
     return np.clip(place, 0, bins.count - 1)
-
-
-def _unit(signal: str) -> str:
-    return SUFFIX_UNITS.get(suffix_of(signal), "1")

@@ -79,7 +79,7 @@ def entity_of(trace: Trace) -> str:
 
 
 def table_of(trace: Trace) -> Table:
-    """A trace as columns of float32; of a long one the rows that a screen could tell apart.
+    """A trace as columns of float32; of a long one the rows that a screen could separate.
 
     Every stretch keeps the extremes of what was measured, of the model and of the residual.
     """

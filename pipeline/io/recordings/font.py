@@ -32,6 +32,19 @@ SINGLE = "→←↑↓√∞≈≠≤≥−∂∆∑±×·✓✔✗⚠●■▲�
 _OTHER = re.compile("[^\n\t" + "".join(f"{chr(a)}-{chr(b)}" for a, b in RANGES) + SINGLE + "]")
 
 
+_NEGATIVE_POWER = re.compile("(×10)?⁻([⁰¹²³⁴-⁹]+)")
+_DIGITS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+
+
+def in_headings(unit: str) -> str:
+    """A unit for the heading of a table, whose font has no superscript minus: ×10⁻⁶ as 1e-6."""
+
+    def plain(found: re.Match[str]) -> str:
+        return ("1e-" if found[1] else "^-") + found[2].translate(_DIGITS)
+
+    return _NEGATIVE_POWER.sub(plain, unit)
+
+
 def drawable(text: str) -> str:
     """The text with every character that the viewer cannot draw as its code point, ‹1F600›."""
     return _OTHER.sub(lambda found: f"‹{ord(found.group()):X}›", text)

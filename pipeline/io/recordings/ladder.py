@@ -1,6 +1,6 @@
 """The ladder as a Rerun recording: drag the timeline `rung` and the residual map goes quiet.
 
-A recording holds, on the sequence timeline `rung` and for every SIGNAL whose error is told,
+A recording holds, on the sequence timeline `rung` and for every SIGNAL whose error is known,
 
     /sheet                 what this rung adds, with parameters and errors, as a markdown page
     /errors/SIGNAL         rms error of the rungs up to here (bars), in /floor/SIGNAL their floor

@@ -36,12 +36,14 @@ def rung_markdown(result: Diagnosis, place: int) -> str:
 
 
 def _table(view: LadderView, place: int) -> list[str]:
-    """The rungs so far, of the signals whose noise floor is known."""
+    """The rungs so far, the latest first, of the signals whose noise floor is known."""
     columns = [n for n, cell in enumerate(view.rungs[0].errors) if cell is not None and cell.floor]
     names = [cell.signal for cell in view.rungs[0].errors if cell is not None and cell.floor]
     lines = ["| rung | model | held out | " + " | ".join(map(plain, names)) + " |"]
     lines.append("| --- | --- | --- |" + " --- |" * len(names))
-    for rung in view.rungs[: place + 1]:
+    floors = [cell.floor if (cell := view.rungs[place].errors[n]) else "" for n in columns]
+    lines.append("|  | noise floor | 1 | " + " | ".join(floors) + " |")
+    for rung in reversed(view.rungs[: place + 1]):
         cells = [cell.rmse if (cell := rung.errors[n]) else "" for n in columns]
         last = "**" if rung.number == place else ""
         change = f" ({rung.change})" if rung.change else ""
@@ -50,6 +52,4 @@ def _table(view: LadderView, place: int) -> list[str]:
             + " | ".join(cells)
             + " |"
         )
-    floors = [cell.floor if (cell := view.rungs[place].errors[n]) else "" for n in columns]
-    lines.append("|  | noise floor | 1 | " + " | ".join(floors) + " |")
     return lines

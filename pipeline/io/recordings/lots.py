@@ -7,7 +7,8 @@ A recording holds the entities
     /cogging/SIDE         `mean`, `low`, `high` of the zero-current torque [mN·m] over 0.1°
     /orders/SIDE          its mean amplitude by order [mN·m]
     /drift/NAME           lot means as change from the baseline's [%], with ±U and control limits
-    /motors               one row a motor: lot, side, the value of each constant
+    /motors               one row a motor: its name, lot and side
+    /motors/NAME          a constant of it, in the unit of the histogram
 
 on one sequence timeline `place`: tenths of degrees, lots and motors all count from 0, and one
 timeline serves every view at once.
@@ -15,21 +16,22 @@ timeline serves every view at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.io.recordings.font import drawable
+from pipeline.io.recordings.font import drawable, in_headings
 from pipeline.io.recordings.lots_page import verdict_markdown
 from pipeline.io.recordings.lots_traces import (
     COLOURS,
+    MOTORS,
     PLACE,
     SIDES,
     band_trace,
+    constant_scale,
     drift,
     histogram,
 )
@@ -53,6 +55,8 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
 
 Array = NDArray[np.float64]
+DIGITS = 5
+"""Significant digits of a constant in the table of motors."""
 
 
 def lots_name(result: LotRegression) -> str:
@@ -115,25 +119,28 @@ def _send_orders(stream: RecordingStream, result: LotRegression) -> None:
 
 
 def _send_motors(stream: RecordingStream, result: LotRegression) -> None:
-    """A row a motor; a constant that it lacks stays empty."""
-    rows: dict[str, dict[str, Any]] = {}
+    """A row a motor, in the units of the histograms; a constant that it lacks stays empty.
+
+    The viewer makes a column as wide as its heading, so these are as long as what stands below.
+    """
     shown = compared(result)
-    for one in shown:
-        for motor in one.motors:
-            row = rows.setdefault(motor.motor_id, {})
-            row |= {"motor": motor.motor_id, "lot": motor.lot, "side": motor.side}
-            row[one.name] = motor.value
-    if not rows:
+    found = {motor.motor_id: motor for one in shown for motor in one.motors}
+    ordered = sorted(found.values(), key=lambda motor: (motor.side, motor.motor_id))
+    place = pl.Series(PLACE, np.arange(len(ordered), dtype=np.int64))
+    if not ordered:
         return
-    ordered = [rows[name] for name in sorted(rows, key=lambda n: (rows[n]["side"], n))]
-    texts: dict[str, Any] = {
-        key: [drawable(str(row[key])) for row in ordered] for key in ("motor", "lot", "side")
+    names = {
+        "motor_serial_number": [drawable(motor.motor_id) for motor in ordered],
+        "production_lot": [drawable(motor.lot) for motor in ordered],
+        "baseline_or_candidate": [motor.side for motor in ordered],
     }
-    numbers = {one.name: [row.get(one.name) for row in ordered] for one in shown}
-    frame = pl.DataFrame(texts | numbers, schema=_types(texts, numbers))
-    index = pl.Series(PLACE, np.arange(frame.height, dtype=np.int64))
-    send_trace(stream, Trace("/motors", PLACE, frame.insert_column(0, index)))
-
-
-def _types(texts: Sequence[str] | dict[str, Any], numbers: dict[str, Any]) -> dict[str, Any]:
-    return dict.fromkeys(texts, pl.String) | dict.fromkeys(numbers, pl.Float64)
+    send_trace(stream, Trace(MOTORS, PLACE, pl.DataFrame(names).insert_column(0, place)))
+    for one in shown:
+        scale, values = constant_scale(one), {m.motor_id: m.value for m in one.motors}
+        column = pl.Series(
+            in_headings(scale.unit) or "1",
+            [values.get(motor.motor_id) for motor in ordered],
+            pl.Float64,
+        )
+        frame = pl.DataFrame([place, (column / 10.0**scale.exponent).round_sig_figs(DIGITS)])
+        send_trace(stream, Trace(f"{MOTORS}/{one.name}", PLACE, frame))

@@ -15,6 +15,8 @@ from pipeline.records.lot_regression import CoggingBand, LotRegression
 Array = NDArray[np.float64]
 
 PLACE = "place"
+MOTORS = "/motors"
+"""Who the motors are; each of their constants stands below it."""
 SIDES: tuple[Side, ...] = ("baseline", "candidate")
 COLOURS = {"baseline": BASELINE, "candidate": CANDIDATE}
 BINS = 16
@@ -80,5 +82,5 @@ def band_trace(band: CoggingBand) -> Trace:
 
 
 def leading_order(result: LotRegression) -> int:
-    """The order of the largest mean amplitude on either side; 1 where none is told."""
+    """The order of the largest mean amplitude on either side; 1 where none is known."""
     return max(result.orders, key=lambda level: level.mean).order if result.orders else 1

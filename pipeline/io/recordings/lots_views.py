@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pipeline.io.recordings.lots_traces import (
     COLOURS,
     FILL,
+    MOTORS,
     PLACE,
     SIDES,
     constant_scale,
@@ -103,8 +104,9 @@ def _verdict_tab(result: LotRegression, shown: Sequence[ConstantResult]) -> Any:
     left: list[Any] = [page_view("/verdict", "Verdict")]
     shares = [1.4]
     if shown:
-        query = rrb.archetypes.DataframeQuery(timeline=PLACE)
-        left.append(rrb.DataframeView(origin="/motors", name="Motors", query=query))
+        order = [MOTORS, *(f"{MOTORS}/{one.name}" for one in shown)]
+        query = rrb.archetypes.DataframeQuery(timeline=PLACE, entity_order=order)
+        left.append(rrb.DataframeView(origin=MOTORS, name="Motors", query=query))
         shares.append(1.0)
     right: list[Any] = []
     if shown:

@@ -18,7 +18,6 @@ MODEL: Colour = (255, 143, 0)
 RESIDUAL: Colour = (229, 57, 53)
 BASELINE: Colour = (30, 136, 229)
 CANDIDATE: Colour = (255, 143, 0)
-GOOD: Colour = (67, 160, 71)
 PALETTE: tuple[Colour, ...] = (
     MEASURED,
     (30, 136, 229),

@@ -29,7 +29,6 @@ from pipeline.records.ledger import (
     Version,
     faults,
     histories,
-    in_force,
     select,
 )
 
@@ -232,13 +231,6 @@ class Registry:
     def _table_is_there(self) -> bool:
         folder = self._table.folder
         return folder is not None and (folder / "_delta_log").is_dir()
-
-    def latest(self, motor_id: str, *, released: bool = False) -> Version | None:
-        """A motor's newest version, or its newest released one; None if there is none."""
-        history = self.history(motor_id)
-        if released:
-            return in_force(history)
-        return history[-1] if history else None
 
     def select(self, wanted: Selection) -> tuple[Version, ...]:
         """Every version that is meant, by motor and revision; `newest` keeps one a motor."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pipeline.records.datasheet import CaptureReference, Check, Datasheet, Superseded
 from pipeline.records.errors import UsageError
-from pipeline.records.estimate import Estimate, Order
+from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import ModelVerdict
+from pipeline.records.plain_form import record_of
 from pipeline.records.uncertainty import Budget, Contribution, effective_dof
 
 SCHEMA = "motor-datasheet/1"
@@ -46,12 +48,12 @@ def read_datasheet(path: Path) -> Datasheet:
 def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
     """The record that `Datasheet.document` wrote; the inverse of it.
 
-    A document of before contributions told their own degrees of freedom gives those of type A
+    A document of before contributions had degrees of freedom of their own gives those of type A
     what makes the published total (GUM eq. G.2b); one of before the residual test has no model.
     Raises LookupError, TypeError or ValueError
     for anything else.
     """
-    provenance = document["provenance"]
+    provenance, superseded = document["provenance"], document.get("supersedes")
     return Datasheet(
         motor_id=document["motor_id"],
         motor_type=document["motor_type"],
@@ -59,69 +61,21 @@ def datasheet_of(document: Mapping[str, Any]) -> Datasheet:
         version=document["version"],
         status=document["status"],
         why=tuple(document.get("why", ())),
-        captures=tuple(
-            CaptureReference(
-                c["path"],
-                c["sha256"],
-                c["test"],
-                c["integrity"],
-                c.get("station"),
-                c.get("started_at"),
-                c.get("read_sha256"),
-            )
-            for c in provenance["captures"]
-        ),
+        captures=tuple(record_of(CaptureReference, c) for c in provenance["captures"]),
         config_sha256=provenance["config_sha256"],
         code_version=provenance["code_version"],
         constants={n: _estimate(n, e) for n, e in document["constants"].items()},
         alternatives=tuple(_estimate(e["name"], e) for e in document.get("alternatives", ())),
-        checks=tuple(_check(check) for check in document["checks"]),
+        checks=tuple(record_of(Check, check) for check in document["checks"]),
         libraries=provenance.get("libraries", ""),
-        supersedes=_superseded(document.get("supersedes")),
+        supersedes=None if superseded is None else record_of(Superseded, superseded),
         model=None if document.get("model") is None else ModelVerdict.of(document["model"]),
     )
 
 
-def _superseded(document: Mapping[str, Any] | None) -> Superseded | None:
-    return (
-        None
-        if document is None
-        else Superseded(document["version"], document["by"], document["why"])
-    )
-
-
-def _check(document: Mapping[str, Any]) -> Check:
-    return Check(
-        name=document["name"],
-        status=document["status"],
-        meaning=document["meaning"],
-        value=document["value"],
-        limit=document["limit"],
-        unit=document["unit"],
-        suspect=document["suspect"],
-    )
-
-
 def _estimate(name: str, document: Mapping[str, Any]) -> Estimate:
-    bounds = document.get("bounds")
-    return Estimate(
-        name=name,
-        value=document["value"],
-        unit=document["unit"],
-        status=document["status"],
-        method=document["method"],
-        budget=_budget(document),
-        at=document["at"],
-        captures=tuple(document["captures"]),
-        note=document["note"],
-        bounds=None if bounds is None else (bounds[0], bounds[1]),
-        at_bound=document.get("at_bound", False),
-        settled=document.get("settled", False),
-        orders=tuple(
-            Order(one["order"], one["amplitude"], one["u"], one["phase_rad"])
-            for one in document.get("orders", ())
-        ),
-    )
+    without = record_of(Estimate, {**document, "name": name, "budget": []})
+    return replace(without, budget=_budget(document))
 
 
 def _budget(document: Mapping[str, Any]) -> Budget:

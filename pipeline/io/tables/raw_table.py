@@ -15,7 +15,7 @@ class RawTable:
 
     `log_ns` [messages] counts from the capture's first message, or is None where the file has no
     log clock; `rows_each` [messages] is how many rows a message has, None for one; `blocks` says
-    that messages are blocks. `units` holds what a units row said.
+    that messages are blocks. `units` holds what a units row stated.
     """
 
     name: str

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, Scale, scale_for
-from pipeline.views.names import quantity_words, unit_of
+from pipeline.views.names import quantity_words
 
 Array = NDArray[np.float64]
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)

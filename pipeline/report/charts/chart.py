@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.numerics.thinning import cloud_points, line_points
+from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import quantity
 from pipeline.records.evidence import Evidence, Series
 from pipeline.report.charts.axis import Axis, axis_for, padded, symmetric_axis
 from pipeline.report.charts.band import filled, outlined
 from pipeline.report.charts.residual import ResidualScale, residual_of, residual_scale
 from pipeline.report.charts.ticks import x_ticks, y_ticks
-from pipeline.views.names import unit_of
 
 Array = NDArray[np.float64]
 WIDTH, TOP, LEFT, RIGHT, BOTTOM = 640.0, 24.0, 62.0, 14.0, 38.0
@@ -272,7 +272,7 @@ def _end_labels(series: tuple[Series, ...], panel: Panel) -> list[str]:
 
 
 def _tone(series: tuple[Series, ...], index: int) -> str:
-    """The colour class of a label: its curve's own where curves are told apart by colour."""
+    """The colour class of a label: its curve's own where colours separate the curves."""
     return "plain" if any(one.fitted.size for one in series) else f"t{index % PALETTE}"
 
 

@@ -30,7 +30,7 @@ def colour(share: float) -> str:
 
 
 def heatmap(one: ErrorMap, reach: float) -> str:
-    """SVG of a map of x and y; `reach` [unit] is full colour. Cells tell their numbers on hover.
+    """SVG of a map of x and y; `reach` [unit] is full colour. Cells show their numbers on hover.
 
     A dot marks a cell whose mean chance does not make: p below 0.05 over the number of cells.
     Raises ValueError for a map of one variable.

@@ -47,7 +47,7 @@ def _range(one: ConstantResult) -> Axis:
         low, high = min(low, centre - bounds.margin), max(high, centre + bounds.margin)
     reach = max(high - low, 1e-12 * abs(high))
     for limit in () if bounds is None else (bounds.lower, bounds.upper):
-        # A limit far away would flatten everything; it is then told in words alone.
+        # A limit far away would flatten everything; it is then given in words alone.
         if limit is not None and low - reach <= limit <= high + reach:
             low, high = min(low, limit), max(high, limit)
     return axis_for(one.name, *padded(low, high, 0.06), TOP + HEIGHT, TOP, 4)

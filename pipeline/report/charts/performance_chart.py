@@ -84,7 +84,7 @@ def _legend(curves: Sequence[Curve]) -> list[str]:
 def efficiency_chart(cells: Sequence[MapCell], envelope: Curve | None) -> str:
     """SVG of efficiency over speed and shaft torque, a cell an operating point; empty for none.
 
-    Cells tell speed, torque, efficiency and the losses by place on hover; the line is peak torque.
+    Cells show speed, torque, efficiency and the losses by place on hover; the line is peak torque.
     """
     if not cells:
         return ""

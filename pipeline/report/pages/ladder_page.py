@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.physics.glossary import unit_of
 from pipeline.physics.notation import MINUS, quantity, significant
 from pipeline.records.diagnosis import Diagnosis, LadderRung, RankedEffect, Signature
 from pipeline.records.evidence import Evidence, Series
@@ -26,7 +27,7 @@ from pipeline.views.ladder import (
     over_floor,
     reaches,
 )
-from pipeline.views.names import quantity_words, unit_of
+from pipeline.views.names import quantity_words
 from pipeline.views.notes import shown_and_folded
 
 MOST_RANKED = 12

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +14,12 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(template: str, **values: Any) -> str:
-    """HTML text of a template; a value that the template names and nobody gave is an error."""
-    return _environment().get_template(template).render(**values)
+    """HTML text of a template; a value that the template names and nobody gave is an error.
+
+    The indentation of the templates is not part of it.
+    """
+    text = _environment().get_template(template).render(**values)
+    return re.sub(r"\s*\n\s*", "\n", text)
 
 
 @cache

@@ -93,12 +93,15 @@ def nothing_usable(folder: str, *, refused: bool) -> str:
 
 
 def _tables(view: FleetView) -> list[str]:
-    """Tables no wider than a terminal, units as on the page; one alone for many motors."""
+    """Tables no wider than a terminal, units as on the page, ± U (k = 2) in the line below a value;
+    of many motors one table of values alone.
+    """
     head = ["motor", "lot", "status", "model", *map(_heading, view.columns)]
     units = ["", "", "", "[worst floors]", *(f"[{c.unit}]" if c.unit else "" for c in view.columns)]
-    rows = [head, units, *map(_row, view.rows)]
-    found = blocks(rows, right=range(3, len(head)))
-    return [one for n, one in enumerate(found) if n == 0 or len(view.rows) <= FEW]
+    few = len(view.rows) <= FEW
+    lines = [line for row in view.rows for line in (_row(row), _spreads(row))[: 2 if few else 1]]
+    found = blocks([head, units, *lines], right=range(3, len(head)))
+    return found if few else found[:1]
 
 
 def _heading(column: Column) -> str:
@@ -116,6 +119,11 @@ def _row(row: MotorRow) -> list[str]:
         row.model.short.replace("worst ", "").removesuffix(" floors"),
         *(cell.reading.value if cell.reading else NONE for cell in row.cells),
     ]
+
+
+def _spreads(row: MotorRow) -> list[str]:
+    readings = (cell.reading for cell in row.cells)
+    return [*[""] * 4, *(f"± {r.expanded}" if r and r.expanded else "" for r in readings)]
 
 
 def _short(text: str) -> str:

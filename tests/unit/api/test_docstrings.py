@@ -38,7 +38,7 @@ def methods() -> list[Any]:
         pytest.param(value, id=f"{name}.{key}")
         for name in RECORDS
         for key, value in inspect.getmembers(getattr(pipeline, name), inspect.isfunction)
-        if not key.startswith("_")
+        if not key.startswith("_") and value.__module__.startswith("pipeline.")
     ]
 
 

@@ -109,6 +109,20 @@ def test_frames_are_tidy_and_agree_with_the_records(recordings, fits):
     assert difference.abs().max() == 0.0
 
 
+def test_a_terminal_shows_a_table_and_no_arrays(recordings, fits, sheets):
+    for result, heading, column in (
+        (recordings, "Recordings: 1 motor, 0 findings", "test"),
+        (fits, "Fits: 1 motor", "constant"),
+        (sheets, "Datasheets: 1 motor", "status"),
+    ):
+        for text in (repr(result), result._repr_html_()):
+            assert heading in text
+            assert column in text
+            assert MOTOR in text
+        assert len(repr(result)) < 3000
+    assert dict(fits.items()) == dict(fits.motors)
+
+
 def test_part_of_the_recordings(recordings):
     few = recordings.only(tests=("spin_down",))
     assert set(few.captures["test"]) == {"spin_down"}

@@ -9,7 +9,12 @@ import polars as pl
 import pytest
 
 from pipeline.contracts.schemas import check_columns, check_tables
-from pipeline.contracts.validate import _slow_columns, _streams_apart, _without_blanks
+from pipeline.contracts.validate import (
+    _filled_rows,
+    _slow_columns,
+    _streams_apart,
+    _without_blanks,
+)
 from pipeline.records.errors import CaptureError
 from tests.unit.contracts.signals import OPTIONS
 from tests.unit.contracts.test_gate_limits import GATES, capture
@@ -81,3 +86,23 @@ def test_a_channel_with_values_in_half_of_the_rows_is_no_slow_one() -> None:
             assert masks == 0
             continue
         assert len(passed.masks) == masks
+
+
+def test_the_end_of_a_buffer_that_was_not_filled_is_left_out() -> None:
+    """Rows that repeat the last one, clock and all; a clock that stands elsewhere is a fault."""
+    t_s, iq_a = np.arange(40) * 1e-3, np.sin(np.arange(40))
+    iq_a[4] = np.nan
+    t_s[33:], iq_a[33:] = 0.033, 0.0
+    made, findings = _filled_rows(capture("drive", t_s=t_s, iq_a=iq_a))
+    assert [(f.code, f.rows) for f in findings] == [("unfilled_rows", (33, 39))]
+    assert made.tables[0]["t_s"].to_list() == t_s[:33].tolist()
+    check_tables(made)
+    blank = capture("drive", t_s=np.r_[0.0, 1.0, 2.0, 2.0], iq_a=np.full(4, np.nan))
+    assert _filled_rows(blank)[0].tables[0].height == 2
+    for row in (10, 38):
+        again = np.arange(40) * 1e-3
+        again[row + 1] = again[row]
+        kept = capture("drive", t_s=again, iq_a=np.arange(40.0))
+        assert _filled_rows(kept) == (kept, [])
+        with pytest.raises(CaptureError, match="does not increase"):
+            check_tables(kept)

@@ -183,6 +183,15 @@ def test_a_step_may_not_be_cut_at_all() -> None:
 # Rows and angles
 
 
+@pytest.mark.parametrize(("intervals", "expected"), [(1.46, ""), (1.54, "warned")])
+def test_a_gap_nearer_to_two_intervals_than_to_one_lost_a_sample(
+    intervals: float, expected: str
+) -> None:
+    rows = np.arange(1000.0)
+    made = capture("drive", t_s=rows + (intervals - 1.0) * (rows > 499), iq_a=rows)
+    assert said("dropped_samples", made) == expected
+
+
 @pytest.mark.parametrize(("share", "expected"), [(0.193, "warned"), (0.207, "refused")])
 def test_a_fifth_of_the_samples_may_be_lost(share: float, expected: str) -> None:
     """So many of the rows that are there and those that are not."""

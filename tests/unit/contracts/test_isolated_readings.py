@@ -50,3 +50,18 @@ def test_isolated_readings_need_rows_and_a_rate(rows: int, interval: float, expe
         passed = GATES["isolated_readings"].check(made, OPTIONS["isolated_readings"])
         assert "the first 0 between 51.99 and 52.01" in passed.findings[0].message
         assert np.flatnonzero(~passed.masks[0].keep).tolist() == [200]
+
+
+@pytest.mark.parametrize(("times", "expected"), [(7.8, ""), (8.2, "warned")])
+@pytest.mark.parametrize("other", [np.nan, np.inf])
+def test_a_reading_alone_beside_one_that_is_no_number(
+    times: float, expected: str, other: float
+) -> None:
+    """Of a ramp of one a row, whose neighbours are two apart."""
+    values = np.arange(1000.0)
+    values[500] = 500.0 + 2.0 * times + 1.0
+    found = isolated_readings.isolated(np.where(values == 700.0, other, values), 8.0)
+    assert found[500] == bool(expected)
+    values[700] = np.nan
+    made = capture("drive", t_s=np.arange(1000) * 1e-3, omega_mech_rad_s=values)
+    assert said("isolated_readings", made) == expected

@@ -60,6 +60,11 @@ def test_the_unit_that_a_ratio_is(name: str, factor: float) -> None:
     assert speed_against_angle._suspect(1.0, 1) == ""
 
 
+def over_angle(made):
+    found = speed_against_angle.speed_over_angle(made, 1.0)
+    return None if found is None else found[0]
+
+
 @pytest.mark.parametrize(("share", "resting"), [(0.27, True), (0.23, False)])
 def test_a_quarter_of_a_resting_speeds_power_is_white(share: float, resting: bool) -> None:
     """White noise of power 1 beside an offset of the rest."""
@@ -72,10 +77,10 @@ def test_a_quarter_of_a_resting_speeds_power_is_white(share: float, resting: boo
 def test_few_rows_say_nothing_of_the_speed() -> None:
     for rows, there in ((39, False), (40, True)):
         made = ratio_of(2.0, rows=rows)
-        assert (speed_against_angle.speed_over_angle(made, 1.0) is not None) is there
+        assert (over_angle(made) is not None) is there
     flat = capture("drive", theta_mech_rad=np.zeros(99), omega_mech_rad_s=np.full(99, 2e4))
-    assert speed_against_angle.speed_over_angle(flat, 1.0) == math.inf
-    assert speed_against_angle.speed_over_angle(ratio_of(1.7), 1.0) == pytest.approx(1.7)
+    assert over_angle(flat) == math.inf
+    assert over_angle(ratio_of(1.7)) == pytest.approx(1.7)
 
 
 def test_noise_of_a_resting_speed_is_no_motion() -> None:
@@ -85,14 +90,32 @@ def test_noise_of_a_resting_speed_is_no_motion() -> None:
     t_s = np.arange(4000) * 0.05
     resting = capture("drive", t_s=t_s, theta_mech_rad=np.zeros(4000), omega_mech_rad_s=white)
     assert np.abs(integral(t_s, white)).max() > TURN
-    assert speed_against_angle.speed_over_angle(resting, 1.0) is None
+    assert over_angle(resting) is None
     angle = 1.0 * t_s
     moving = capture("drive", t_s=t_s, theta_mech_rad=angle, omega_mech_rad_s=white)
-    assert speed_against_angle.speed_over_angle(moving, 1.0) is not None
+    assert over_angle(moving) is not None
 
 
 def test_a_table_without_angle_or_too_short_is_passed_over() -> None:
     made = ratio_of(1.7)
     other = pl.DataFrame({"t_s": [0.0, 1.0], "iq_a": [0.0, 1.0]})
-    late = replace(made, tables=(other, made.tables[0].head(9), *made.tables))
-    assert speed_against_angle.speed_over_angle(late, 1.0) == pytest.approx(1.7)
+    still = made.tables[0].with_columns(pl.col("^(theta|omega)_.*$") * 0.01)
+    late = replace(made, tables=(other, made.tables[0].head(9), still, *made.tables))
+    assert over_angle(late) == pytest.approx(1.7)
+
+
+@pytest.mark.parametrize(("ratio", "swing_rad", "warned"), [(0.95, 0.01, 1), (0.95, 0.6, 0)])
+def test_a_shaft_that_swings_scatters_about_its_ratio(
+    ratio: float, swing_rad: float, warned: int
+) -> None:
+    """It turns at 50 rad/s and swings seven times a record; a filter takes the speed's swing."""
+    t_s = np.linspace(0.0, 1.0, 2000)
+    swing = swing_rad * np.sin(2.0 * math.pi * 7.3 * t_s)
+    made = capture(
+        "drive",
+        t_s=t_s,
+        theta_mech_rad=50.0 * t_s + swing,
+        omega_mech_rad_s=np.full(t_s.size, 50.0 * ratio),
+    )
+    options = speed_against_angle.GATE.options
+    assert len(speed_against_angle.check(made, options).findings) == warned

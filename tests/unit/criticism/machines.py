@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.criticism.data.segment import Instrument, Segment, Sensors
 from pipeline.criticism.effect import Machine, Operating
 from pipeline.criticism.library.registry import effects
-from pipeline.criticism.machine.model import GAINS, STATE, Model
+from pipeline.criticism.machine.model import BASE, STATE, Model
 from pipeline.criticism.regression.fit import Fit, floors
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.numerics.projection import projection
@@ -29,7 +29,7 @@ BASE = {
     "ripple_held": 0.0,
     "bench_angle_rad": 0.0,
     "lead_share": 0.0,
-    **dict.fromkeys((*STATE, *GAINS), 0.0),
+    **dict.fromkeys((*STATE, *(one.name for one in BASE if one.hook == "gain")), 0.0),
 }
 
 

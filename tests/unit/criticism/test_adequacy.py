@@ -16,7 +16,7 @@ from pipeline.criticism.diagnosis import TOO_LITTLE, diagnose
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
-from pipeline.records.diagnosis import Unexcited
+from pipeline.records.diagnosis import ReportedParameter, Unexcited
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.stages.steps.campaigns import campaigns
 
@@ -118,7 +118,9 @@ def test_the_search_is_spared_only_where_its_end_is_sure(monkeypatch: pytest.Mon
 def test_the_record_comes_back_from_its_document() -> None:
     worst = Excess("a.csv", "torque_shaft_nm", 84, 250.0, 0.005, "N·m")
     found = ModelVerdict("missing", held_out=14.0, residual=250.0, worst=worst, over=9)
-    windage = FoundEffect({"loss_nm": (0.1, 0.01, "N·m")}, "windage", ("stribeck",), "spin it fast")
+    windage = FoundEffect(
+        {"loss_nm": ReportedParameter(0.1, 0.01, "N·m")}, "windage", ("stribeck",), "spin it fast"
+    )
     unseen = (Unexcited("backlash", ("drive",), "reverse it", ("torque_shaft_nm",)),)
     named = replace(
         found, missing={"windage": windage}, effects=("-x",), held_out_with=0.6, unexcited=unseen

@@ -333,10 +333,13 @@ def test_a_resistance_beside_the_magnetising_branch_is_the_iron_s_loss_in_both_e
 
 
 def test_a_constant_load_is_a_drag_only_where_no_transducer_records_it():
+    """One that acts before the transducer is a drag everywhere."""
     effect, x = LIBRARY["constant_load"], operating()
-    assert not effect.torque(x, {"torque_nm": 0.03}).any()
     alone = replace(x, shaft=ShaftState(alone=True))
-    assert effect.torque(alone, {"torque_nm": 0.03}) == pytest.approx(np.full(60, 0.03))
+    beyond, inside = ({"torque_nm": 0.03, "inside": n} for n in (0.0, 1.0))
+    assert not effect.torque(x, beyond).any()
+    for state, q in ((alone, beyond), (x, inside), (alone, inside)):
+        assert effect.torque(state, q) == pytest.approx(np.full(60, 0.03))
 
 
 def test_friction_of_its_own_in_each_sense_adds_to_one_and_takes_from_the_other():

@@ -12,9 +12,11 @@ from pipeline.criticism.machine.model import Model
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.gauss_newton import gauss_newton
 from pipeline.criticism.regression.goodness import (
+    HeldOut,
     in_common,
     leave_out,
     material_size,
+    misfit,
     over_floor,
     remainder,
 )
@@ -202,3 +204,51 @@ def test_one_capture_alone_has_the_error_of_its_fit_and_says_so():
     assert "of the fit" in held.notes[0]
     two = tuple(log(noise=1.0, seed=n) for n in (5, 6))
     assert leave_out(linear_system(fitted(two))).notes == ()
+
+
+def bent_line(count):
+    """A line through a parabola 40 floors deep, and beside it one through a line; noise of one."""
+    running = log()
+    fit = Fit((running,), Model(machine(), ()), dict(BASE), (np.ones(12),), dict(BASE))
+    system = linear_system(fit)
+    bent, straight = (system.labels.index((0, name, 0)) for name in ("vq_v", "torque_shaft_nm"))
+    x = np.linspace(0.0, 1.0, count)
+    noise = np.random.default_rng(count).standard_normal(2 * count)
+    measured = np.concatenate([3.0 * x + 40.0 * x**2, 5.0 * x]) + noise
+    matrix = -np.kron(np.eye(2), x[:, None])
+    return replace(
+        system,
+        columns=(Column("r_ohm", 1.0), Column("j_kgm2", 1.0)),
+        matrix=matrix,
+        residual=measured + matrix @ np.linalg.lstsq(-matrix, measured, rcond=None)[0],
+        group=np.repeat([bent, straight], count),
+        window=np.tile(np.arange(count), 2),
+        unit=np.ones(2 * count),
+        noise_ratio=np.ones(2 * count),
+        row_weight=np.ones(2 * count),
+        prior_precision=np.zeros(2),
+        prior_gradient=np.zeros(2),
+        own_count=2,
+    )
+
+
+def test_a_form_that_misses_is_no_noise_that_windows_average_away():
+    """The slope of the bent one stays unsure; the straight one is as sure as its samples."""
+    unsure = []
+    for count in (100, 3000):
+        whole = bent_line(count)
+        bare = known_by(whole, HeldOut(whole.residual, 1.0), np.ones(2))
+        sure = replace(bare, misfit=misfit(whole))
+        assert sure.u[1] == bare.u[1]
+        power = np.sum(whole.matrix[:, 0] ** 2)
+        left = np.sum(whole.residual[:count] ** 2)
+        # u² = u_noise² + bound²/3, the bound |r| / |x| over the floor of one
+        noise = left / count / power
+        assert sure.u[0] ** 2 == pytest.approx(noise + (left - count) / power / 3.0)
+        unsure.append(sure.u[0])
+    assert unsure[0] == pytest.approx(unsure[1], rel=0.1)
+
+
+def test_what_fits_to_its_floor_is_no_misfit():
+    system = linear_system(fitted((log(noise=1.0),)))
+    assert not misfit(system).any()

@@ -13,47 +13,47 @@ from pipeline.criticism.effects.angle_eccentricity import EFFECT as ECCENTRIC
 from pipeline.criticism.effects.cogging import EFFECT as COGGING
 from pipeline.criticism.library.headline import UNKNOWN_SIZE, amplitude, headline
 from pipeline.criticism.library.registry import effects
-from pipeline.records.diagnosis import ToldParameter
+from pipeline.records.diagnosis import ReportedParameter
 
 SCALES = dict.fromkeys(SCALED, 2.0)
 MACHINE = Machine(7, 12, SCALES, torque_orders=(84,))
 
 
 def test_an_amplitude_is_the_length_of_its_vector() -> None:
-    told: dict[str, ToldParameter] = {
-        "sine_rad": (0.0072, 2e-5, "rad"),
-        "cosine_rad": (0.0054, 2e-5, "rad"),
+    reported = {
+        "sine_rad": ReportedParameter(0.0072, 2e-5, "rad"),
+        "cosine_rad": ReportedParameter(0.0054, 2e-5, "rad"),
     }
-    words = headline(ECCENTRIC, told)
+    words = headline(ECCENTRIC, reported)
     assert words == "encoder disc off-centre by 9.000 ± 0.040 mrad"
-    value, u, _ = amplitude([(3.0, 0.1, "V"), (4.0, 0.2, "V")])
+    value, u, _ = amplitude([ReportedParameter(3.0, 0.1, "V"), ReportedParameter(4.0, 0.2, "V")])
     assert value == pytest.approx(5.0)
     assert u == pytest.approx(math.hypot(0.6 * 0.1, 0.8 * 0.2))
-    assert amplitude([(-3.0, 0.1, "V")]) == (-3.0, 0.1, "V")
+    assert amplitude([ReportedParameter(-3.0, 0.1, "V")]) == ReportedParameter(-3.0, 0.1, "V")
 
 
 def test_the_largest_wave_is_told_with_its_order() -> None:
-    told: dict[str, ToldParameter] = {
-        "sin_84_nm": (0.003, 1e-5, "N·m"),
-        "cos_84_nm": (-0.004, 1e-5, "N·m"),
-        "sin_12_nm": (0.001, 1e-5, "N·m"),
-        "cos_12_nm": (0.0, 1e-5, "N·m"),
+    reported = {
+        "sin_84_nm": ReportedParameter(0.003, 1e-5, "N·m"),
+        "cos_84_nm": ReportedParameter(-0.004, 1e-5, "N·m"),
+        "sin_12_nm": ReportedParameter(0.001, 1e-5, "N·m"),
+        "cos_12_nm": ReportedParameter(0.0, 1e-5, "N·m"),
     }
-    assert headline(COGGING, told) == "cogging torque of 5.000 ± 0.020 mN·m, 84 a turn"
+    assert headline(COGGING, reported) == "cogging torque of 5.000 ± 0.020 mN·m, 84 a turn"
 
 
 def test_what_is_not_determined_is_of_unknown_size() -> None:
-    told: dict[str, ToldParameter] = {
-        "sine_rad": (0.0072, 2e-5, "rad"),
-        "cosine_rad": (None, None, "rad"),
+    reported = {
+        "sine_rad": ReportedParameter(0.0072, 2e-5, "rad"),
+        "cosine_rad": ReportedParameter(None, None, "rad"),
     }
-    assert headline(ECCENTRIC, told).endswith(UNKNOWN_SIZE)
+    assert headline(ECCENTRIC, reported).endswith(UNKNOWN_SIZE)
     assert headline(COGGING, {}).endswith(UNKNOWN_SIZE)
 
 
 def test_an_effect_without_words_tells_its_name_and_its_numbers() -> None:
     own = replace(COGGING, name="seal_drag", headline="")
-    assert headline(own, {"torque_nm": (0.01, 1e-4, "N·m")}) == (
+    assert headline(own, {"torque_nm": ReportedParameter(0.01, 1e-4, "N·m")}) == (
         "seal_drag (torque_nm 10.00 ± 0.20 mN·m)"
     )
     assert headline(own, {}) == "seal_drag"
@@ -62,7 +62,7 @@ def test_an_effect_without_words_tells_its_name_and_its_numbers() -> None:
 @pytest.mark.parametrize("name", sorted(effects()))
 def test_every_effect_names_parameters_that_it_has(name: str) -> None:
     effect = effects()[name]
-    told = {p.name: (0.02, 1e-4, p.unit) for p in effect.every(MACHINE)}
-    words = headline(effect, told)
+    reported = {p.name: ReportedParameter(0.02, 1e-4, p.unit) for p in effect.every(MACHINE)}
+    words = headline(effect, reported)
     assert effect.headline and UNKNOWN_SIZE not in words
     assert "{" not in words

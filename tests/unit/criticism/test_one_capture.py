@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.criticism import search
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.selection.one_capture import only_capture
 
@@ -61,3 +62,35 @@ def test_no_other_capture_could_show_it():
 def test_what_another_parameter_absorbs_moves_nothing():
     after = np.array([4.0, 2.1, 2.1, 1.0])
     assert only_capture(system([3.0, 1.5, 1.5, 0.0], absorbed=True), LARGE, after) is None
+
+
+@pytest.mark.parametrize(
+    ("alone", "kept", "noted"),
+    [
+        ((), 3, set()),
+        ((2,), 2, {"saturation"}),
+        ((1, 2), 1, {"windage", "saturation"}),
+        ((1,), 3, set()),
+    ],
+)
+def test_trailing_effects_that_one_capture_alone_asks_for_are_notes_and_no_names(
+    alone, kept, noted, monkeypatch
+):
+    """Of an earlier one nothing is known any more: the fits after it hold it too."""
+    names = ("coulomb_friction", "windage", "saturation")
+    steps = []
+    for n, name in enumerate(names):
+        model = SimpleNamespace(effects=[SimpleNamespace(name=name)])
+        around = SimpleNamespace(number=n, fit=SimpleNamespace(model=model))
+        steps.append(SimpleNamespace(added=names[1 : n + 1], system=around, fit=around.fit))
+    monkeypatch.setattr(search, "search", lambda *_: tuple(steps))
+    monkeypatch.setattr(search, "leave_out", lambda system: system.number)
+    monkeypatch.setattr(search, "in_common", lambda _, held: list(held))
+    monkeypatch.setattr(search, "truncated", lambda steps, _: (tuple(steps), ()))
+    monkeypatch.setattr(
+        search, "rests_on", lambda _, held: "spin_down_0" if held[-1] in alone else None
+    )
+    ladder = search.ladder_from(SimpleNamespace(system=SimpleNamespace(fit=None)), {})
+    assert len(ladder.steps) == len(ladder.held) == kept
+    assert set(ladder.cut) == noted
+    assert all("spin_down_0" in note for note in ladder.cut.values())

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
+from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.diagnosis import diagnose
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.criticism.regression.goodness import signal_errors
 from pipeline.execution.tasks.start import start_constants
 from pipeline.records.comparison import ModelSpec
-from tests.stories.fits import REAL, campaign, fit
+from tests.sectors import sector_errors
+from tests.stories.fits import REAL, campaign, fit, without
 
 pytestmark = pytest.mark.skipif(not REAL.is_dir(), reason="shared real recordings are not here")
 IDEAL = ModelSpec("ideal")
@@ -117,13 +118,20 @@ def test_a_handful_of_orders_hold_the_rotor_and_all_below_160_are_a_trap():
 
 
 def test_a_late_speed_is_what_the_resistance_was_hiding():
-    """R from 0.72 down towards the 0.485 ohm of standstill; the lag is that of speed and angle."""
+    """R from 0.72 by the drive's own speed towards the 0.485 ohm of standstill by the angle's."""
     log = campaign("laas_solo")
+    by_speed = without(log, "theta_mech_rad")
+    blind, own = fit(by_speed, kinds=("q",), on_time=True), fit(by_speed, kinds=("q",))
     plain, late = fit(log, kinds=("q",)), fit(log, "sample_delay", kinds=("q",))
-    assert plain.values["r_ohm"] == pytest.approx(0.72, abs=0.01)
-    assert 0.47 < late.values["r_ohm"] < 0.56
-    assert late.values["sample_delay.delay_s"] == pytest.approx(1.75e-3, rel=0.1)
-    assert late.held_out["vq_v"] < 0.9 * plain.held_out["vq_v"]
+    assert blind.values["r_ohm"] == pytest.approx(0.72, abs=0.01)
+    assert own.values["r_ohm"] == pytest.approx(0.505, abs=0.01)
+    assert 1.5e-3 < own.values["late_speed_s"] < 2.5e-3
+    assert own.held_out["vq_v"] < 0.9 * blind.held_out["vq_v"]
+    assert 0.47 < plain.values["r_ohm"] < 0.56
+    assert late.values["r_ohm"] == pytest.approx(plain.values["r_ohm"], rel=0.02)
+    assert late.values["sample_delay.of_speed"] == 1.0
+    assert late.values["sample_delay.delay_s"] == pytest.approx(1.8e-3, rel=0.05)
+    assert plain.held_out["vq_v"] < 0.9 * blind.held_out["vq_v"]
     assert late.held_out["omega_mech_rad_s"] < 0.2 * plain.held_out["omega_mech_rad_s"]
     ke = 12 * late.values["psi_wb"]
     assert 0.0184 < ke < 0.0195

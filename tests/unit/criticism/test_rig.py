@@ -43,7 +43,7 @@ def test_what_is_hidden_is_named_exactly(name):
         told = {effect: (s.signal, s.variable) for effect, s in shown.items() if s is not None}
         assert told == {
             "angle_eccentricity": ("vd_v", "theta_mech_rad"),
-            "stribeck": ("torque_nm", "omega_mech_rad_s"),
+            "stribeck": ("torque_shaft_nm", "omega_mech_rad_s"),
         }
 
 

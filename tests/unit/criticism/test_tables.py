@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.criticism.data.holding_orders import holding_orders, sector_errors
+from pipeline.criticism.data.holding_orders import holding_orders
 from pipeline.criticism.data.levels import levels_of, set_levels
 from pipeline.criticism.data.segment import Segment
 from pipeline.criticism.diagnosis import diagnose
@@ -23,6 +23,7 @@ from pipeline.criticism.residuals.segments import segments
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.comparison import ModelSpec
 from pipeline.records.constants import Constants
+from tests.sectors import sector_errors
 
 MACHINE = Machine(5, 6, {"current_a": 1.0, "voltage_v": 1.0, "torque_nm": 1.0})
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import polars as pl
 import pytest
 
 from pipeline.criticism.comparison import compare
+from pipeline.criticism.data.machine_scale import machine_of
 from pipeline.criticism.policy.policy import DEFAULT
 from pipeline.records.capture import Campaign
 from pipeline.records.comparison import ModelSpec
@@ -62,3 +64,64 @@ def test_a_trace_of_line_voltages_without_an_encoder_has_the_flux(lost):
     assert abs(psi.value - TRUE["psi_pm_wb"]) < REACH * psi.u
     assert psi.u / psi.value < 0.005
     assert not any("not used" in note for note in result.notes)
+
+
+def test_a_hot_winding_at_rest_without_a_thermometer():
+    """It gave R 13 % high, by 60 of its uncertainties; a drive's winding may be another."""
+    plan = (("hot", "resistance", {"temp_degc": 60.0}), ("log", "drive", {}))
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 1, plan))
+    bare = replace(whole.of("resistance")[0])
+    bare = replace(bare, tables=tuple(t.drop("temp_winding_degc") for t in bare.tables))
+    alone = compare(replace(whole, captures=(bare,)), ModelSpec(), Constants())
+    r = alone.parameters["r_ohm"]
+    assert abs(r.value - TRUE["r_phase_ohm"]) < REACH * r.u
+    assert r.u / r.value == pytest.approx(U_K * 0.0039, rel=0.15)
+    assert any(
+        f"no temp_winding_degc, taken to be at ambient temperature ± {U_K:g} K" in note
+        for note in alone.notes
+    )
+    (log,) = whole.of("drive")
+    both = compare(replace(whole, captures=(bare, log)), ModelSpec(), Constants())
+    r = both.parameters["r_ohm"]
+    assert abs(r.value - TRUE["r_phase_ohm"]) < REACH * r.u
+    assert r.u / r.value < 0.01
+
+
+def test_a_shaft_that_rests_has_no_speed():
+    """The rounding of an angle that stands still made psi 7e13 Wb, and its coefficient sure."""
+    plan = (("run", "heat_run", {}),)
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 1, plan))
+    (run,) = whole.captures
+    (table, *rest) = run.tables
+    still = table.drop("omega_mech_rad_s", strict=False).with_columns(
+        (0.7853 + 1e-16 * pl.int_range(pl.len()).mod(3)).alias("theta_mech_rad")
+    )
+    stated = replace(run.meta, pole_pairs=MOTOR.pole_pairs)
+    captures = (replace(run, meta=stated, tables=(still, *rest)),)
+    machine = machine_of(replace(whole, captures=captures), Constants())
+    assert machine.scales["speed_rad_s"] == 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_drive_without_an_angle(seed):
+    """Its observer is late: that read as resistance, and left an error of many noise floors."""
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), seed, (("log", "drive", {}),)))
+    (log,) = whole.captures
+    bare = replace(log, tables=tuple(t.drop("theta_mech_rad") for t in log.tables))
+    result = compare(replace(whole, captures=(bare,)), ModelSpec(), Constants())
+    with_angle = compare(whole, ModelSpec(), Constants())
+    for name, true in (("r_ohm", "r_phase_ohm"), ("psi_wb", "psi_pm_wb"), ("lq_h", "lq_h")):
+        one = result.parameters[name]
+        assert abs(one.value - TRUE[true]) < REACH * one.u, name
+        assert one.u < 0.05 * one.value, name
+    assert result.held_out < 3.0 * with_angle.held_out
+
+
+def test_a_drive_without_a_motion_is_not_taken_to_rest():
+    """Its back-EMF read as resistance, three times too large, with an uncertainty of 5 %."""
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), 1, (("log", "drive", {}),)))
+    (log,) = whole.captures
+    lost = ("theta_mech_rad", "omega_mech_rad_s")
+    bare = replace(log, tables=tuple(t.drop(lost, strict=False) for t in log.tables))
+    result = compare(replace(whole, captures=(bare,)), ModelSpec(), Constants())
+    assert not any(one.known for one in result.parameters.values())

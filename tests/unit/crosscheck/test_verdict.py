@@ -14,6 +14,7 @@ from pipeline.estimation.protocol import Estimator, Fit
 from pipeline.records.capture import Campaign, Capture, CaptureMeta
 from pipeline.records.constants import Constants
 from pipeline.records.datasheet import AWAITS_APPROVAL, left_to_a_person
+from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import Estimate
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.records.uncertainty import type_a
@@ -60,7 +61,7 @@ def test_one_that_is_out_by_its_scatter_keeps_nothing_back(monkeypatch: pytest.M
 
 WORST = Excess("drive_0.mcap", "vd_v", 0, 76.3, 0.9, "V")
 OVER = ModelVerdict("missing", held_out=31.0, residual=76.3, worst=WORST, over=3)
-FOUND = FoundEffect({"loss_nm": (0.1, 0.01, "N·m")}, "windage of 0.10 ± 0.02 N·m")
+FOUND = FoundEffect({"loss_nm": ReportedParameter(0.1, 0.01, "N·m")}, "windage of 0.10 ± 0.02 N·m")
 BELOW = ModelVerdict("missing", held_out=1.0, residual=1.2, missing={"windage": FOUND})
 NOTHING = ModelVerdict("insufficient", note="record a torque map")
 OFF = ModelVerdict("not_tested", note="residual_test=false")

@@ -146,6 +146,15 @@ def test_a_phase_of_less_than_three_cycles_is_none() -> None:
     assert _smooth_phase(few, TURN * 5.0 * few / few[-1]) is None
 
 
+def test_where_a_phase_begins_is_neither_cycles_nor_a_sense() -> None:
+    """A counter that stands at a hundred cycles as the record begins, and falls."""
+    t = np.arange(400) * 1e-3
+    assert _smooth_phase(t, TURN * (100.0 + 2.9 * t / t[-1])) is None
+    found = _smooth_phase(t, TURN * (100.0 - 8.0 * t / t[-1]))
+    assert found is not None
+    assert found[1][100:300] == pytest.approx(-TURN * 8.0 / t[-1], rel=2e-3)
+
+
 def test_a_run_is_cut_where_its_speed_leaves_the_band() -> None:
     """12 cycles at 100, then 12 at 103 rad/s, ten rows each; one cycle at either end is left."""
     number = np.repeat(np.arange(24), 10)
@@ -371,6 +380,7 @@ def test_pole_pairs_phase_order_and_angle_of_several_speeds(order: float) -> Non
     pairs, sense = count_pole_pairs(METHOD, groups)
     assert (pairs.value, sense.value) == (7, order)
     assert pairs.captures == ("a", "b")
+    assert "a turn of theta_mech_rad:" in pairs.note
     angle = angle_offset(METHOD, groups, pairs, sense)
     assert angle.number == pytest.approx(0.30, abs=1e-6)
     apart = np.array([-0.02, 0.02])

@@ -102,6 +102,17 @@ def test_a_run_without_current_tells_nothing(estimator):
         assert one.status == "not_identifiable"
 
 
+def test_a_run_that_cannot_be_used_keeps_no_other_from_being_used():
+    reference = Constants((known_value("r_phase_ohm", 0.4, 0.0004, "ohm", "resistance"),))
+    good = heat_capture()
+    turning = replace(heat_capture(speed=5.0), path="a")
+    found = estimates(heat_run.ESTIMATOR, turning, good, known=reference)
+    alone = estimates(heat_run.ESTIMATOR, good, known=reference)
+    name = "temp_coeff_copper_1_k"
+    assert found[name].number == alone[name].number
+    assert "open_circuit" in found[name].note
+
+
 def test_a_turning_rotor_without_its_flux_is_refused():
     found = estimates(heat_run.ESTIMATOR, heat_capture(speed=5.0))
     assert found["temp_coeff_copper_1_k"].status == "not_identifiable"
@@ -117,6 +128,14 @@ def test_thermal_resistance_of_one_time_constant():
     table = short.tables[0].head(600)
     brief = Capture("short", "0" * 64, "verified", short.meta, (table,))
     assert estimates(thermal.ESTIMATOR, brief)["rth_winding_k_w"].status == "not_identifiable"
+
+
+def test_a_clock_that_does_not_begin_at_zero_changes_nothing():
+    run = heat_capture(kind="measured", alpha=0.0)
+    table = run.tables[0].with_columns(pl.col("t_s") + 7200.0)
+    late = Capture("late", run.sha256, "verified", run.meta, (table,))
+    first, second = (estimates(thermal.ESTIMATOR, one)["rth_winding_k_w"] for one in (run, late))
+    assert (second.number, second.u) == pytest.approx((first.number, first.u), rel=1e-6)
 
 
 def test_the_loss_carries_what_it_was_made_of():

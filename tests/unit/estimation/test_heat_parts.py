@@ -122,6 +122,15 @@ def test_one_nodes_scatter_is_that_of_a_ratio() -> None:
     assert found.dof == pytest.approx(fit.dof / tau)
 
 
+def test_twice_the_heat_for_one_rise_is_half_the_resistance_and_half_its_u() -> None:
+    t = np.arange(0.0, 100.0, 0.5)
+    winding = one_node(t) + 0.5 * np.random.default_rng(3).standard_normal(t.size)
+    one, two = (_balance(record(t, winding), np.full(t.size, p), 25.0) for p in (40.0, 80.0))
+    assert one is not None and two is not None
+    assert two.rth_k_w == pytest.approx(one.rth_k_w / 2.0, rel=1e-9)
+    assert two.u_rth_k_w == pytest.approx(one.u_rth_k_w / 2.0, rel=1e-9)
+
+
 @pytest.mark.parametrize("power", [-40.0, 0.0])
 def test_heat_that_cools_is_no_balance(power: float) -> None:
     t = np.arange(0.0, 200.0, 0.5)

@@ -45,6 +45,15 @@ def test_the_line_of_a_heat_run() -> None:
     assert _line(line_of(alpha=-0.001)) is None
 
 
+@pytest.mark.parametrize(("rows", "there"), [(11, False), (12, True)])
+def test_a_line_has_ten_rows_more_than_parameters(rows: int, there: bool) -> None:
+    whole = line_of(1e-4)
+    sampled = np.linspace(0, whole.t_s.size - 1, rows).round().astype(int)
+    columns = ("t_s", "r_phase_ohm", "temp_winding_degc")
+    few = replace(whole, **{name: getattr(whole, name)[sampled] for name in columns})
+    assert (_line(few) is not None) is there
+
+
 def test_alpha_and_r25_of_one_run_and_what_they_rest_on() -> None:
     """Alpha = s/R25 with their correlation; gains cancel; R25 by the thermometer's slope."""
     line = _line(line_of(1e-4))

@@ -31,6 +31,7 @@ from pipeline.estimation.mechanical.drag import (
 from pipeline.estimation.mechanical.shaft_rows import COAST, DRIVE, ShaftRows, shaft_rows
 from pipeline.numerics.least_squares import autocorrelation_time, linear_fit
 from pipeline.physics.conventions import COPPER_COEFFICIENT_25_1_K
+from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from tests.unit.estimation.signals import capture, estimates
 
@@ -361,8 +362,6 @@ def test_both_senses_of_a_coast_give_dry_and_viscous_friction(of_angle: bool, no
 
 def test_the_plots_of_coasts_show_speed_in_its_sense_and_the_fit_on_it() -> None:
     runs = [coasting(s, path=f"{s}") for s in (1.0, -1.0)]
-    from pipeline.records.capture import Campaign
-
     fit = spin_down.ESTIMATOR.fit(
         Campaign("m", tuple(runs)), Constants(), spin_down.ESTIMATOR.options
     )
@@ -480,6 +479,10 @@ def test_what_a_held_voltage_may_be_of_the_back_emf() -> None:
         expected
     )
     assert drive_voltage._hold_doubt(log(), speed, 4, 1e-3) == 0.0
+    # without pole pairs one, the least that a motor has
+    least = (1.0 / math.cos(half / 4.0) - 1.0) / math.sqrt(3.0)
+    alone = drive_voltage._hold_doubt(log(timing="centred"), speed, None, 1e-3)
+    assert alone == pytest.approx(least)
     most = (1.0 / math.cos(1.0) - 1.0) / math.sqrt(3.0)
     assert drive_voltage._hold_doubt(log(timing="centred"), speed, 4, 1.0) == pytest.approx(most)
 
@@ -531,8 +534,6 @@ def test_each_log_counts_by_what_it_leaves() -> None:
 
 def test_plots_lay_the_fit_on_what_was_read() -> None:
     """Of a meter's table every pair; of a feedforward log its windows."""
-    from pipeline.records.capture import Campaign
-
     angles = np.arange(0.0, 180.0, 15.0)
     columns = {}
     for pair, axis in zip(PAIRS, (-30.0, 90.0, 210.0), strict=True):

@@ -66,6 +66,9 @@ def test_small_outrunner_on_a_real_bench() -> None:
     assert left is not None
     assert inertia is not None
     assert 0.0184 <= ke.number <= 0.0195
+    kv = known.best("kv_ll_peak_rpm_v")
+    assert kv is not None
+    assert abs(kv.number - 300.0) < 2.0 * kv.u
     assert order.number == 72
     assert left.number + 2.0 * left.u < 0.03
     assert inertia.number == pytest.approx(5.4e-6, rel=0.1)

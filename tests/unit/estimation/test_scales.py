@@ -260,3 +260,52 @@ def test_a_constant_goes_with_the_power_of_the_clock_that_is_said(name: str) -> 
             continue
         expected = one.number * (1.0 + U) ** said.get(one.name, 0)
         assert other.number == pytest.approx(expected, abs=0.05 * U * abs(one.number)), one.name
+
+
+def alike(one: Estimate, other: Estimate) -> None:
+    """The same number, within a thousandth of its uncertainty, and as well known."""
+    assert (one.name, one.status) == (other.name, other.status)
+    if one.known:
+        assert other.number == pytest.approx(one.number, rel=1e-9, abs=1e-3 * one.u), one.name
+        assert other.u == pytest.approx(one.u, rel=1e-3), one.name
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_no_result_depends_on_when_a_clock_began(name: str) -> None:
+    """Two hours, which doubles hold to a part in 1e12 of a second."""
+    made = campaign(name)
+    late = tuple(
+        replace(
+            c,
+            tables=tuple(
+                t.with_columns(pl.col("t_s") + 7200.0) if "t_s" in t.columns else t
+                for t in c.tables
+            ),
+        )
+        for c in made.captures
+    )
+    plain, other = fitted(name, made), fitted(name, replace(made, captures=late))
+    for one, two in zip(plain.estimates, other.estimates, strict=True):
+        alike(one, two)
+
+
+# A row of these is a measurement of its own.
+TABLES = {"lcr", "torque_table", "holding_current"}
+
+
+@pytest.mark.parametrize("end", ["first", "last"])
+@pytest.mark.parametrize("name", sorted(set(PLANS) - TABLES))
+def test_a_capture_that_cannot_be_used_keeps_no_other_from_it(name: str, end: str) -> None:
+    """Three of its rows, before or after the others."""
+    made = campaign(name)
+    for whole in {c.meta.test: c for c in made.captures}.values():
+        brief = replace(
+            whole,
+            path="0" if end == "first" else "z",
+            sha256="f" * 64,
+            tables=tuple(t.head(3) for t in whole.tables),
+        )
+        beside = (brief, *made.captures) if end == "first" else (*made.captures, brief)
+        plain, other = fitted(name, made), fitted(name, replace(made, captures=beside))
+        for one, two in zip(plain.estimates, other.estimates, strict=True):
+            alike(one, two)

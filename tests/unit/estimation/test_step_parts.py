@@ -15,9 +15,11 @@ from pipeline.estimation.electrical.step_budget import (
     unexplained,
 )
 from pipeline.estimation.electrical.step_fit import (
+    _fit,
     _white_power,
     between_models,
     bic_penalty,
+    offers_of,
     row_variance,
     solve,
 )
@@ -50,7 +52,7 @@ from pipeline.estimation.electrical.step_wave import (
     waveform_of,
 )
 from pipeline.estimation.estimators import current_step
-from pipeline.estimation.estimators.current_step import inductances
+from pipeline.estimation.estimators.current_step import _chord, inductances
 from pipeline.numerics.least_squares import autocorrelation_time
 from tests.unit.estimation.signals import capture, estimates
 
@@ -612,3 +614,24 @@ def test_the_largest_current_of_an_axis_is_that_of_its_own_steps() -> None:
         largest = found[name].at["current_largest_a"]
         assert largest == pytest.approx(2.0 / math.sqrt(3.0) * amps, rel=5e-3)
         assert f"no saturation seen up to {largest:.3g} A" in found[name].note
+
+
+def test_an_offer_moves_the_inductance_as_a_fit_with_that_term_does(solution) -> None:
+    for name, place in (("ld_h", LD), ("lq_h", LQ)):
+        (gain, term, change), *_ = offers_of(solution, (name,), solution.sigmas)[name]
+        assert (term, gain >= 0.0) == (place + 1, True)
+        free = solution.free.copy()
+        free[term] = True
+        refitted = _fit(solution.model, solution.parameters, free, solution.sigmas)
+        moved = refitted.parameters[place] - solution.parameters[place]
+        assert change == pytest.approx(moved, rel=0.05)
+
+
+def test_the_mean_inductance_of_a_capture_is_that_of_its_step(solution) -> None:
+    layout = solution.model.layout
+    pairs = (1e-3, 1e-3, 2e-3)
+    for record, at, own, pair in zip(
+        solution.model.records, layout.starts, layout.own, pairs, strict=True
+    ):
+        drive = drive_of(record, own, solution.parameters[None, at : at + own.size])
+        assert _chord(record, drive) == pytest.approx(pair, rel=0.01)

@@ -13,6 +13,7 @@ from pipeline.estimation.estimators.inertia import (
     Torque,
     _orders,
     _share_of_no_torque,
+    _slopes,
     _torque,
     driving_torque,
 )
@@ -24,9 +25,9 @@ from pipeline.numerics.least_squares import linear_fit
 from pipeline.records.capture import Campaign
 from pipeline.records.constants import Constants
 from pipeline.records.uncertainty import type_a, type_b
+from tests.unit.estimation.points import point
 from tests.unit.estimation.signals import capture, estimates, known_value
 from tests.unit.estimation.test_motion_parts import coasting, log
-from tests.unit.estimation.test_point_parts import point
 
 J, COULOMB, VISCOUS, KT = 2e-4, 8e-3, 1e-4, 0.06
 
@@ -116,6 +117,20 @@ def test_the_torque_that_drives() -> None:
     assert off[1] == pytest.approx(1.5 - 0.01 - 0.1)
     moved = driving_torque(rows, torque, {"kt": 0.1, "reluctance": 0.02, "magnet": 0.001})
     assert moved[0] == pytest.approx(0.55 * (2.0 - 0.001 * 20.0) + 0.03 * 4.0 - 0.1)
+
+
+def test_slopes_by_what_a_torque_rests_on() -> None:
+    """J = kt (1 + k) + 3 r and others, where the torque constant moves by a share k of itself."""
+    torque = Torque(0.5, (), -0.02, (), 0.0, (), "")
+
+    def values(shift):
+        k, r, m = (shift.get(name, 0.0) for name in ("kt", "reluctance", "magnet"))
+        return np.array([0.5 * (1.0 + k) + 3.0 * r, 7.0 * r, 2.0 * m])
+
+    per_kt, per_reluctance, per_magnet = _slopes(values, torque)
+    assert per_kt == pytest.approx([1.0, 0.0, 0.0])
+    assert per_reluctance == pytest.approx([3.0, 7.0, 0.0])
+    assert per_magnet == pytest.approx([0.0, 0.0, 2.0])
 
 
 def test_reluctance_by_itself_by_the_inductances_or_not_at_all() -> None:

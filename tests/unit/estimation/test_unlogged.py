@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from pipeline.estimation.estimators.drive_voltage import ESTIMATOR
 from pipeline.estimation.policy import DEFAULT
 from pipeline.estimation.registry import fit_all
+from pipeline.numerics.integrals import trapezoid
 from pipeline.records.capture import Campaign
 from pipeline.records.estimate import Estimate
 from pipeline.simulator.bench import campaign
 from pipeline.simulator.design import EXACT, Bench
 from pipeline.simulator.truth import truth
 from tests.simulated import campaign_of, design
+from tests.unit.estimation.signals import capture, estimates
 
 MOTOR = replace(design("gimbal-5208"), effects={})
 TRUE = truth(MOTOR)["constants"]
@@ -59,7 +63,7 @@ def test_a_warm_magnet_without_a_thermometer(
     assert holds(one)
     (part,) = (p for p in one.budget if p.source.startswith("assumed:temp_magnet_degc"))
     assert abs(part.u / one.number) == pytest.approx(abs(LOST), rel=0.02)
-    assert f"± {DEFAULT.magnet.unlogged_k:g} K" in one.note
+    assert f"ambient temperature ± {DEFAULT.magnet.unlogged_k:g} K" in one.note
 
 
 def test_a_thermometer_goes_before_an_assumption() -> None:
@@ -118,3 +122,48 @@ def test_a_map_without_motion_breaks_nothing() -> None:
         ),
     )
     assert fit_all(captures, {})[2] == ()
+
+
+@pytest.mark.parametrize("seed", [0, 3, 4])
+def test_a_drive_without_its_d_current(seed: int) -> None:
+    """Its flux read as 2 % of Ke, 2 to 7 u, and its torque as 3 % of J."""
+    steps = (("drive", "drive", {}),)
+    whole = campaign_of(campaign(MOTOR, Bench(instruments=EXACT), seed, steps))
+    (one,) = whole.captures
+    bare = replace(one, tables=tuple(t.drop("id_a", "vd_v") for t in one.tables))
+    captures = replace(whole, captures=(bare,))
+    ke, inertia = (found(captures, n) for n in ("ke_phase_peak_v_s_rad", "j_rotor_kgm2"))
+    assert abs(ke.number - MOTOR.pole_pairs * MOTOR.psi_pm_wb) < 2.0 * ke.u
+    assert ke.u < 0.05 * ke.number
+    assert abs(inertia.number - MOTOR.j_rotor_kgm2) < 2.0 * inertia.u
+    assert "id_a not logged" in ke.note
+    assert "id_a not logged" in inertia.note
+    assert not any("id_a" in p.source for p in found(whole, "ke_phase_peak_v_s_rad").budget)
+
+
+def test_the_lateness_of_an_observer_is_no_resistance() -> None:
+    """It goes with the current where that accelerates; noise must not hide it from the fit."""
+    rng, t = np.random.default_rng(1), np.arange(0.0, 8.0, 1e-3)
+    iq = 2.0 * np.sign(np.sin(2.0 * np.pi * t / 0.8)) + 0.4 * np.sin(2.0 * np.pi * t / 3.0)
+    rate = 300.0 * 2.0 * np.sign(np.sin(2.0 * np.pi * t / 0.8)) + 30.0 * np.cos(9.0 * t)
+    true = trapezoid(t, rate)
+    late = true - 2e-3 * rate
+    vq = 0.2 * true + 0.5 * iq + 0.5 * rng.standard_normal(t.size)
+    log = capture("drive", t_s=t, omega_mech_rad_s=late, vq_v=vq, iq_a=iq, id_a=0.0 * t)
+    resistance = estimates(ESTIMATOR, log)["r_phase_ohm"]
+    assert "acceleration" in resistance.note
+    assert not resistance.known or abs(resistance.number - 0.5) < 2.0 * resistance.u
+
+
+def test_a_hot_winding_without_a_thermometer() -> None:
+    """Taken at ambient it read 15 % high, with an uncertainty of half a percent."""
+    hot = {"temp_degc": 60.0}
+    bare = recorded(("resistance", hot), without={"temp_winding_degc"})
+    resistance = found(bare, "r_phase_ohm")
+    assert abs(resistance.number - MOTOR.r_phase_ohm) < 2.0 * resistance.u
+    (part,) = (p for p in resistance.budget if p.source == "assumed:temp_winding_degc")
+    assert abs(part.u / resistance.number) == pytest.approx(0.0039 * DEFAULT.magnet.unlogged_k, 0.1)
+    assert f"ambient ± {DEFAULT.magnet.unlogged_k:g} K" in resistance.note
+    logged = found(recorded(("resistance", hot)), "r_phase_ohm")
+    assert not any(p.source == "assumed:temp_winding_degc" for p in logged.budget)
+    assert logged.u < 0.01 * logged.number

@@ -20,6 +20,7 @@ from pipeline.export.curves import bump_of, drag_polynomial, waves
 from pipeline.export.protocol import Source
 from pipeline.export.registry import exporters
 from pipeline.physics.glossary import CONSTANTS
+from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.effect_table import EffectTable
 from pipeline.records.model_verdict import ModelVerdict
 from tests.unit.export.test_exporters import LD, LQ, PAIRS, PSI, VALUES, R, estimate, source
@@ -34,7 +35,7 @@ STRIBECK = {"excess_nm": 0.003, "speed_rad_s": 4.0, "exponent": 2.0, "tail": 0.0
 def known(**effects: Mapping[str, float | None]) -> Source:
     """A motor whose model was fitted with these effects."""
     fitted = {
-        name: {short: (value, 1e-5, "N·m") for short, value in parameters.items()}
+        name: {short: ReportedParameter(value, 1e-5, "N·m") for short, value in parameters.items()}
         for name, parameters in effects.items()
     }
     model = ModelVerdict("adequate", effects=tuple(effects), fitted=fitted, scales=SCALES)

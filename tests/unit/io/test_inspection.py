@@ -282,3 +282,52 @@ def test_what_nothing_asks_for_and_a_map_that_is_there_are_usage_errors(
     (tmp_path / "m.yaml").write_text("")
     assert main(["inspect", str(tmp_path), f"map={tmp_path / 'm.yaml'}"]) == 2
     assert "is there already" in capsys.readouterr().err
+
+
+SAMPLES = Path(__file__).parent / "samples"
+
+
+def test_files_that_a_map_reads_get_it_with_the_answers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of ODrive and SimpleFOC: serial number and interval are answered, nothing is edited."""
+    logs, made = tmp_path / "logs", tmp_path / "mine.yaml"
+    logs.mkdir()
+    (logs / "run.csv").write_bytes((SAMPLES / "odrive_characterization.csv").read_bytes())
+    (logs / "simplefoc.txt").write_bytes((SAMPLES / "simplefoc.csv").read_bytes())
+    given = [f"map={made}", "motor_id=M1", "increment_s=0.002"]
+    assert main(["inspect", str(logs), *given]) == 0
+    assert f"source={made}" in capsys.readouterr().out
+    maps = parse_source_file(made.read_bytes(), "mine")
+    assert len(maps) == 2
+    found = survey(logs, maps)
+    assert [e.stated["motor_id"] for e in found.entries] == ["M1", "M1"]
+    clock, even = (read_capture(logs, entry).tables[0]["t_s"].to_numpy() for entry in found.entries)
+    assert np.ptp(clock) > 0.0
+    np.testing.assert_allclose(np.diff(even), 0.002)
+
+
+def test_a_folder_that_needs_no_map_is_checked_without_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "logs" / "w.csv"
+    path.parent.mkdir()
+    head = "# contract: 1\n# motor_id: m\n# test: spin_down\nt_s,omega_mech_rad_s\n"
+    rows = "".join(f"{0.01 * k:.2f},{100.0 - k}\n" for k in range(100))
+    path.write_text(head + rows)
+    assert main(["inspect", str(path.parent), f"map={tmp_path / 'm.yaml'}", "check=true"]) in (0, 3)
+    assert "cannot be read" not in capsys.readouterr().err
+    assert not (tmp_path / "m.yaml").exists()
+
+
+def test_a_form_without_a_suffix_of_its_own_is_known_by_its_map(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A sweep of moteus is JSON; any other JSON is no table of numbers."""
+    rows = ", ".join(f'"{level}": [{{"omega": 100.0, "y": 0.5}}]' for level in (0.0, 1.0))
+    (tmp_path / "ld_x.json").write_text(f'{{"raw": {{{rows}}}}}')
+    (tmp_path / "other.json").write_text("{}")
+    main(["inspect", str(tmp_path)])
+    told = capsys.readouterr().out
+    assert "1 file read by the source map moteus_ld" in told
+    assert "no table of numbers: other.json" in told

@@ -8,9 +8,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from pipeline.io.recordings.font import in_headings
 from pipeline.io.recordings.lots import lots_name, write_lots_recording
 from pipeline.io.recordings.lots_page import verdict_markdown
-from pipeline.io.recordings.lots_traces import SIDES, constant_scale, drift, histogram
+from pipeline.io.recordings.lots_traces import MOTORS, SIDES, constant_scale, drift, histogram
 from pipeline.io.recordings.lots_views import cogging_plan, drift_plan
 from pipeline.io.recordings.readback import entities, recording_property
 from pipeline.io.recordings.seal import verify
@@ -76,10 +77,21 @@ def test_drift_is_the_change_of_lot_means_from_the_baselines() -> None:
 
 
 def test_motors_stand_with_their_values(lots: Path) -> None:
-    back = read_back(lots, "/motors")
-    told = {m.motor_id: m.value for m in compared(make_regression())[0].motors}
-    assert dict(zip(back["motor"], back["cogging_amplitude_nm"], strict=True)) == told
-    assert back["side"].to_list() == ["baseline"] * 18 + ["candidate"] * 6
+    back = read_back(lots, MOTORS)
+    assert back["baseline_or_candidate"].to_list() == ["baseline"] * 18 + ["candidate"] * 6
+    first = compared(make_regression())[0]
+    assert first.name == "cogging_amplitude_nm"
+    shown = read_back(lots, f"{MOTORS}/{first.name}")["mN·m"]
+    known = {m.motor_id: 1e3 * m.value for m in first.motors}
+    found = dict(zip(back["motor_serial_number"], shown, strict=True))
+    assert found == pytest.approx(known, rel=1e-4)
+
+
+def test_a_heading_has_no_superscript_minus() -> None:
+    """The monospaced font of the viewer's tables lacks it, and the viewer ends."""
+    assert in_headings("×10⁻⁶ kg·m²") == "1e-6 kg·m²"
+    assert in_headings("×10⁻³ K⁻¹") == "1e-3 K^-1"
+    assert in_headings("mN·m") == "mN·m"
 
 
 def test_every_curve_and_every_bar_that_is_drawn_is_there(lots: Path) -> None:

@@ -12,7 +12,8 @@ import pipeline
 from pipeline.api.recordings import Recordings
 from pipeline.contracts.validate import validate
 from pipeline.io.ingest.capture_reader import read_capture, survey
-from pipeline.io.maps.source_map import load_source_maps, parse_source_map
+from pipeline.io.maps.columns import _converted
+from pipeline.io.maps.source_map import FieldMap, load_source_maps, parse_source_map
 from pipeline.records.capture import Campaign, Capture
 from pipeline.records.errors import CaptureError, UsageError
 from tests.unit.io.recordings import SHARED
@@ -345,3 +346,12 @@ def test_an_unknown_unit_refuses_the_capture_and_not_the_run(tmp_path: Path) -> 
     with pytest.raises(CaptureError) as refused:
         read_capture(tmp_path, found.entries[0])
     assert refused.value.code == "unknown_unit"
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("scale", "offset"), [(100.0, 0.0), (1.5, 1e308)])
+def test_a_number_that_no_double_holds_once_converted_is_infinite(scale, offset):
+    """What gates take for a reading that is missing; a warning of numpy names no file."""
+    part = FieldMap("i", "iq_a", unit="A", scale=scale, offset=offset)
+    first, second = _converted(np.array([1e308, 2.0]), part, {})
+    assert (first, second) == (np.inf, 2.0 * scale + offset)

@@ -12,7 +12,8 @@ from pipeline.io.storage.publish import canonical_json
 from pipeline.lots.regression import compare_lots
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.limits import Amount, ConstantLimits, Limits
-from pipeline.records.lot_regression import regression_of
+from pipeline.records.lot_regression import LotRegression
+from pipeline.records.plain_form import record_of
 from pipeline.report.pages.lot_page import render_regression
 from pipeline.report.text.junit import junit_xml
 from pipeline.report.text.lot_text import regression_text
@@ -62,7 +63,7 @@ def test_any_comparison_is_told(base, candidate) -> None:
         for side, side_motors in (("b", base), ("c", candidate))
     ]
     found = compare_lots(line.samples([sheets[0]], sheets[1]), LIMITS, CONSTANTS)
-    assert regression_of(json.loads(canonical_json(found.document()))) == found
+    assert record_of(LotRegression, json.loads(canonical_json(found.document()))) == found
     assert render_regression(found)
     assert junit_xml(found)
     assert regression_text(found, ())

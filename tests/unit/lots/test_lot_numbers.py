@@ -460,7 +460,18 @@ def test_motors_outside_come_before_all_else_and_the_move_is_relative() -> None:
         ["A", "B"],
     )
     found = judge(ConstantLimits("r"), "ohm", from_zero, out, evaluated(), NOTHING, None, 0.01)
-    assert found.why.startswith("492 mΩ: 3 of 7")
+    assert found.why.startswith("+492 mΩ: 3 of 7")
+    for candidate, words in ((0.29, "+190 %"), (0.31, "+210 mΩ")):
+        values = [candidate - 0.01, candidate + 0.01]
+        from_little = assess(
+            [*lot_of("A", [0.09, 0.11], "baseline"), *lot_of("B", values, "candidate")],
+            [],
+            ["A", "B"],
+        )
+        found = judge(
+            ConstantLimits("r"), "ohm", from_little, out, evaluated(), NOTHING, None, 0.01
+        )
+        assert found.why.startswith(f"{words}: 3 of 7")
     assert overall((), ()) == ("undecided", ("no constant could be compared",))
 
 

@@ -12,7 +12,8 @@ from pipeline.lots.regression import compare_lots
 from pipeline.physics.glossary import CONSTANTS
 from pipeline.records.estimate import Order
 from pipeline.records.limits import Amount, ConstantLimits
-from pipeline.records.lot_regression import LotRegression, regression_of
+from pipeline.records.lot_regression import LotRegression
+from pipeline.records.plain_form import record_of
 from tests.unit.lots import production as line
 
 THREE = ("r_phase_ohm", "psi_pm_wb", "j_rotor_kgm2")
@@ -334,7 +335,7 @@ def test_the_report_crosses_json() -> None:
     found = compare(base, _cogging("B", {84: 0.008, 12: 0.003}, rng), with_margin())
     document = json.loads(canonical_json(found.document()))
     assert document["schema"] == "lot-regression/1"
-    assert regression_of(document) == found
+    assert record_of(LotRegression, document) == found
 
 
 def test_equal_input_equal_bytes() -> None:

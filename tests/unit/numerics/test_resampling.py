@@ -250,3 +250,16 @@ def test_the_second_column_is_judged_with_the_first_one_in(factor: float, joins:
     assert 1e-4 < p < 0.5
     chosen = needed_columns(base, {"x": x, "z": z}, y, np.ones(n), factor * p)
     assert chosen == (["x", "z"] if joins else ["x"])
+
+
+@pytest.mark.parametrize("seed", [94, 98, 319, 333])
+def test_no_rounding_makes_a_variance_negative(seed: int) -> None:
+    """Two columns that nearly go together, in two clusters: the root of it was nan."""
+    rng = np.random.default_rng(seed)
+    x = rng.standard_normal(60)
+    near = x + 10.0 ** rng.uniform(-8.0, -5.0) * rng.standard_normal(60)
+    design = np.column_stack([x, near, rng.standard_normal(60)])
+    noise = rng.standard_normal(60)
+    left = noise - design @ np.linalg.lstsq(design, noise, rcond=None)[0]
+    covariance, _ = cluster_covariance(design, left, np.ones(60), np.arange(60) // 30)
+    assert (np.diag(covariance) >= 0.0).all()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -175,3 +177,11 @@ FINDINGS = (
     Finding("joint-P0/x.mcap", "refused", "truncated", "the file ends early", "record it again"),
     Finding(STEPS, "warning", "gap", "12 samples are missing", "look at the cable", (400, 412)),
 )
+
+
+def flat(html: str) -> str:
+    """HTML in one line, without the space that stands beside what is a block anyway."""
+    blocks = (
+        r"(</?(?:h\d|p|div|table|t[rdh]|details|summary|section|figure|[uod]l|li|d[td])\b[^>]*>)"
+    )
+    return re.sub(rf"\s*{blocks}\s*", r"\1", re.sub(r"\s+", " ", html))

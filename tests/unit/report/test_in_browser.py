@@ -154,10 +154,10 @@ def test_what_is_too_wide_or_cut_off_is_seen(measured: dict[str, Any]) -> None:
 def test_the_sheet_prints_on_one_page(tmp_path: Path, size: str) -> None:
     """As many constants, numbers and notes as there are; the page of the printer's size."""
     page = PAGES["sheet"]()
-    known = "@page { margin: 12mm; }"
+    known = "margin: 12mm;"
     assert page.count(known) == 1
     path = tmp_path / "sheet.html"
-    path.write_text(page.replace(known, f"@page {{ size: {size}; margin: 12mm; }}"), "utf-8")
+    path.write_text(page.replace(known, f"size: {size}; {known}"), "utf-8")
     words = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
     words += ["--disable-background-networking", "--disable-component-update", "--disable-sync"]
     words += [f"--user-data-dir={tmp_path / 'profile'}", "--no-pdf-header-footer"]

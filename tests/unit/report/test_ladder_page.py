@@ -19,6 +19,7 @@ from pipeline.report.pages.ladder_page import render_ladder
 from pipeline.report.text.comparison_text import comparison_text
 from pipeline.views.notes import shown_and_folded
 from tests.unit.ladders import make_diagnosis, make_map, make_turn
+from tests.unit.report.conftest import flat
 
 HOSTILE = '"><script>alert(1)</script>{{7*7}}<img src=x onerror=alert(2)>'
 
@@ -48,7 +49,7 @@ def test_every_number_of_the_ladder_is_on_the_page() -> None:
 
 
 def test_the_page_leads_with_words_the_command_and_what_shows_it() -> None:
-    html = render_ladder(make_diagnosis(), "captures")
+    html = flat(render_ladder(make_diagnosis(), "captures"))
     places = [
         html.index(words)
         for words in (
@@ -111,7 +112,7 @@ def test_the_unknown_and_what_is_left_are_told() -> None:
 
 def test_nothing_foreign_runs_and_nothing_is_fetched() -> None:
     diagnosis = replace(make_diagnosis(HOSTILE), notes=(HOSTILE,))
-    html = render_ladder(diagnosis)
+    html = flat(render_ladder(diagnosis))
     assert "<script>alert(1)" not in html
     assert "<img" not in html
     assert "49" not in re.findall(r"<h1>(.*?)</h1>", html)[0]

@@ -9,6 +9,7 @@ import pytest
 from pipeline.io.storage.datasheets import datasheet_of
 from pipeline.records.current_status import current_status
 from pipeline.records.datasheet import Datasheet
+from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.ledger import histories
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.report.pages.fleet_page import render_fleet
@@ -63,7 +64,9 @@ def test_the_page_says_where_how_much_and_which_command(datasheet: Datasheet) ->
 def test_above_the_fold_the_model_is_said_once_and_both_numbers_are_told_apart(
     datasheet: Datasheet,
 ) -> None:
-    found = FoundEffect({"cos_84_nm": (0.007, 1e-5, "N·m")}, "cogging torque of 7 mN·m")
+    found = FoundEffect(
+        {"cos_84_nm": ReportedParameter(0.007, 1e-5, "N·m")}, "cogging torque of 7 mN·m"
+    )
     model = replace(OVER, missing={"cogging": found}, held_out_with=0.6)
     sheet = sheet_with(replace(datasheet, why=(model.reason("m") or "",)), model)
     fold = render_motor(sheet, (), ()).split('<section id="constants">')[0]
@@ -82,7 +85,7 @@ def test_the_terminal_names_the_one_that_misses_most(datasheet: Datasheet) -> No
     # a stand-in for the folder, which the stage replaces, goes through as it is
     kept = summary(sheets, (), "out", report=False, folder="\ue000")
     assert "`diagnose input='\ue000' motor=two` tells more" in kept
-    rows = {line.split()[0]: line.split()[3:5] for line in text.splitlines()[2:5]}
+    rows = {line.split()[0]: line.split()[3:5] for line in text.splitlines()[2:8:2]}
     assert rows == {
         "one": ["missing,", "20"],
         "three": ["adequate,", "1.1"],

@@ -57,6 +57,8 @@ class Page(HTMLParser):
 
     def handle_endtag(self, tag: str) -> None:
         assert self.open.pop() == tag
+        if tag in {"th", "td"}:
+            self.rows[-1][-1] = self.rows[-1][-1].strip()
 
     def handle_data(self, data: str) -> None:
         if self.open and self.open[-1] in {"style", "script"}:
@@ -123,7 +125,7 @@ def test_what_u_comes_from_is_a_bar_that_adds_up(
     html = render_motor(datasheet, evidence, ())
     row = html.split('<tr id="r_phase_ohm"')[1].split("</tr>")[0]
     assert 'aria-label="current 64 %, scatter 36 %"' in row
-    shares = re.findall(r'<i class="b-(\w+)" style="flex-grow:([\d.]+)"', row)
+    shares = re.findall(r'<i\s+class="b-(\w+)"\s+style="flex-grow:([\d.]+)"', row)
     assert shares == [("current", "0.6400"), ("scatter", "0.3600")]
     for name, estimate in datasheet.constants.items():
         parts = parts_of(estimate.budget)

@@ -17,7 +17,8 @@ from pipeline.contracts.json_schema import build_schemas
 from pipeline.export.registry import exporters
 from pipeline.io.registry.store import Registry
 from pipeline.records.datasheet import Datasheet
-from pipeline.records.lot_regression import regression_of
+from pipeline.records.lot_regression import LotRegression
+from pipeline.records.plain_form import record_of
 from tests.registered import NOON
 from tests.unit.lots import production as line
 
@@ -69,7 +70,7 @@ def test_an_unchanged_lot_passes(output: Path, capsys: pytest.CaptureFixture[str
     assert out.startswith("pass: Lot B")
     said = report(output)
     jsonschema.Draft202012Validator(build_schemas()["lot-regression"]).validate(said)
-    found = regression_of(said)
+    found = record_of(LotRegression, said)
     assert found.verdict == "pass"
     assert found.history == "INSUFFICIENT_HISTORY"
     assert {one.name for one in found.constants if one.motors} == set(THREE)

@@ -15,6 +15,7 @@ from pipeline.report.pages.link_block import Link
 from pipeline.report.text.comparison_text import comparison_text
 from pipeline.views.comparison import comparison_view
 from tests.unit.ladders import make_map, make_turn
+from tests.unit.report.conftest import flat
 
 HOSTILE = '"><script>alert(1)</script>{{7*7}}'
 
@@ -69,7 +70,8 @@ def test_a_capture_counts_by_its_windows() -> None:
 
 
 def test_the_page_shows_sizes_moves_maps_and_the_worst_capture_of_each_signal() -> None:
-    html = render_comparison(make_comparison(), links=(Link("Diagnosis", "../diagnosis/m.html"),))
+    links = (Link("Diagnosis", "../diagnosis/m.html"),)
+    html = flat(render_comparison(make_comparison(), links=links))
     for words in (
         "held-out error 0.35 (1 is the noise floor); without what was added: 20",
         '<td class="r num">35</td><td class="r num"><b>0.35</b></td>',
@@ -83,9 +85,7 @@ def test_the_page_shows_sizes_moves_maps_and_the_worst_capture_of_each_signal() 
     traces = html.split('id="traces"')[1].split("</section>")[0]
     assert traces.count("<figure>") == 1 and "a.mcap" in traces
     assert 'id="earlier"' not in html
-    assert html == render_comparison(
-        make_comparison(), links=(Link("Diagnosis", "../diagnosis/m.html"),)
-    )
+    assert html == flat(render_comparison(make_comparison(), links=links))
 
 
 def test_earlier_comparisons_are_kept_and_listed() -> None:

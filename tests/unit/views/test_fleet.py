@@ -9,6 +9,7 @@ import polars as pl
 import pytest
 
 from pipeline.records.datasheet import Datasheet
+from pipeline.records.diagnosis import ReportedParameter
 from pipeline.records.estimate import not_identifiable
 from pipeline.records.model_verdict import Excess, FoundEffect, ModelVerdict
 from pipeline.report.pages.fleet_page import render_fleet
@@ -69,6 +70,20 @@ def test_a_summary_fits_eighty_columns_in_the_units_of_the_page(length: int) -> 
     assert "all constants: out/fleet.csv" in text
 
 
+def test_below_each_value_stands_its_expanded_uncertainty() -> None:
+    sheets = [motor(name, 252.0) for name in "ab"]
+    (first, *_) = summary(sheets, (), "out", report=True).split("\n\n")
+    lines = first.splitlines()
+    at = [n for n, line in enumerate(lines) if "310.04" in line]
+    estimate = sheets[0].constants["r_phase_ohm"]
+    for n in at:
+        below = lines[n + 1]
+        end = lines[n].index("310.04") + len("310.04")
+        number = below[:end].rsplit("±", 1)[1]
+        assert float(number) == pytest.approx(2e3 * estimate.u, rel=0.05)
+    assert len(at) == 2
+
+
 def test_many_motors_are_told_in_one_table() -> None:
     sheets = [make_datasheet(f"m{number:02d}") for number in range(30)]
     lines = summary(sheets, (), "out", report=False).split("\n\n")[0].splitlines()
@@ -111,7 +126,10 @@ def test_the_tidy_files_hold_every_constant_of_every_motor() -> None:
 
 def test_the_tidy_files_hold_the_sizes_of_the_effects_that_were_found() -> None:
     """One that the captures do not determine is there without a value, and is no constant."""
-    parameters = {"loss_nm": (0.1, 0.01, "N·m"), "knee_rad_s": (None, None, "rad/s")}
+    parameters = {
+        "loss_nm": ReportedParameter(0.1, 0.01, "N·m"),
+        "knee_rad_s": ReportedParameter(None, None, "rad/s"),
+    }
     found = FoundEffect(parameters, "windage of 0.10 ± 0.02 N·m", (), "spin it fast")
     sheet = replace(
         make_datasheet("one"), model=replace(misses(76.0, "one"), missing={"windage": found})

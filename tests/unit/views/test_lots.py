@@ -12,6 +12,7 @@ from pipeline.report.pages.lot_page import render_regression
 from pipeline.report.text.lot_text import regression_text
 from pipeline.views.lots import change_text, compared, lot_view
 from tests.unit.regressions import make_constant, make_regression
+from tests.unit.report.conftest import flat
 
 HISTORY = "the lot-level test needs 3 baseline lots, there is 1"
 
@@ -70,7 +71,7 @@ def test_one_why_for_equal_reasons() -> None:
         "cogging_amplitude_nm": 1,
         "ld_h": 0,
     }
-    html = render_regression(result)
+    html = flat(render_regression(result))
     assert html.count(HISTORY) == 1 and "<b>2 constants</b>" in html
     assert html.count("the same</div>") == 1
     assert regression_text(result, ()).count(f"2 constants: {HISTORY}") == 1

@@ -88,11 +88,13 @@ def test_the_linear_form_is_the_spring_and_gives_it_back():
     inside = slice(60, -60)
     assert both[1][inside] == pytest.approx(both[0][inside], rel=1e-6, abs=1e-9)
     assert np.abs(both[0][inside]).max() > 0.01
-    found = spring_of(linear, j, x.machine)
-    assert found == pytest.approx({"share": share, "twist_rad": torque / stiffness})
+    found = spring_of(linear, {"j_kgm2": j}, x.machine)
+    assert found == pytest.approx(
+        {"share": share, "twist_rad": torque / stiffness, "damping_s": 0.0, "between": -1.0}
+    )
 
 
 @pytest.mark.parametrize(("soft", "bent"), [(-1e-6, 1e-6), (1e-6, -1e-6), (1e-6, 1.0)])
 def test_no_two_masses_have_such_parameters(soft, bent):
     x = operating(4)
-    assert spring_of({"torque_s2": soft, "angle_s2": bent}, BASE["j_kgm2"], x.machine) is None
+    assert spring_of({"torque_s2": soft, "angle_s2": bent}, BASE, x.machine) is None

@@ -1,0 +1,73 @@
+"""Other names of a back-EMF constant that a log under current gave: flux, KV, Kt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pipeline.estimation.electrical.operating_points import pole_pairs_of
+from pipeline.estimation.method import Method
+from pipeline.estimation.protocol import Estimator, Fit
+from pipeline.physics.conventions import CouplingName, coupling_as
+from pipeline.records.capture import Campaign
+from pipeline.records.constants import Constants
+from pipeline.records.estimate import Estimate, derived
+
+METHOD = Method("back_emf_names")
+KE = "ke_phase_peak_v_s_rad"
+NAMES: dict[str, CouplingName] = {
+    "ke_ll_peak_v_s_rad": "ke_ll_peak_v_s_rad",
+    "ke_ll_rms_v_s_rad": "ke_ll_rms_v_s_rad",
+    "ke_ll_peak_v_krpm": "ke_ll_peak_v_krpm",
+    "kv_ll_peak_rpm_v": "kv_ll_peak_rpm_v",
+    "kt_from_ke_nm_a": "kt_peak_nm_a",
+}
+GIVES = ("psi_pm_wb", *NAMES)
+EXPERIMENT = (
+    "record an open_circuit capture, or a drive with vq_v, iq_a and theta_mech_rad over a wide "
+    "range of speed and current"
+)
+
+
+def fit(campaign: Campaign, known: Constants, options: Mapping[str, float]) -> Fit:
+    """Flux, Ke of lines, KV and Kt by `coupling_as` from a Ke that was found under current.
+
+    An open_circuit capture gives its own. The flux needs pole pairs, measured or of the nameplate.
+
+    Notes
+    -----
+    psi = Ke/p; Kt = 1.5 Ke in the amplitude-invariant frame. Each is a power of Ke, 1 or -1.
+
+    """
+    del options
+    ke = known.best(KE)
+    if ke is None or ke.status != "measured" or set(ke.captures) <= _spins(campaign):
+        return METHOD.nothing(GIVES, EXPERIMENT)
+    found = [_named(name, coupling_as(as_name, ke.number), ke) for name, as_name in NAMES.items()]
+    pairs = pole_pairs_of(known, campaign.nameplate("pole_pairs"))
+    if pairs is None:
+        flux = METHOD.missing("psi_pm_wb", "state pole_pairs: the flux is Ke over the pole pairs")
+    else:
+        flux = _named("psi_pm_wb", ke.number / pairs, ke)
+    return Fit((flux, *found))
+
+
+def _spins(campaign: Campaign) -> set[str]:
+    return {capture.path for capture in campaign.of("open_circuit")}
+
+
+def _named(name: str, value: float, ke: Estimate) -> Estimate:
+    power = -1.0 if name == "kv_ll_peak_rpm_v" else 1.0
+    unit = METHOD.unit(name)
+    terms = [(power * value / ke.number, ke)]
+    return derived(name, unit, value, terms, METHOD.name, ke.at, f"from Ke of {ke.method}")
+
+
+ESTIMATOR = Estimator(
+    METHOD.name,
+    GIVES,
+    ("drive", "torque_map"),
+    EXPERIMENT,
+    fit,
+    uses=(KE, "pole_pairs"),
+    rank=40,
+)
