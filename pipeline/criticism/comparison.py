@@ -148,7 +148,7 @@ def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
             continue
         out = bool(np.isfinite(held.residual[mine]).all())
         residual = held.residual[mine] if out else system.residual[mine]
-        unit, noise_ratio = system.unit[mine], system.noise_ratio[mine]
+        unit, expected = system.unit[mine], (system.noise_ratio * held.widening)[mine]
         segment = system.segments[number]
         signal = reported_signal(segment, channel)
         yield SignalError(
@@ -156,7 +156,7 @@ def _errors(system: LinearSystem, held: HeldOut) -> Iterator[SignalError]:
             segment.capture,
             "held_out" if out else "fit",
             math.sqrt(float(((residual * unit) ** 2).mean())),
-            math.sqrt(float(((unit * noise_ratio) ** 2).mean())),
+            math.sqrt(float(((unit * expected) ** 2).mean())),
             int(mine.sum()),
             effective(residual),
             unit_of(signal),

@@ -16,7 +16,7 @@ from pipeline.criticism.effect import Array
 from pipeline.criticism.policy.regression import Goodness
 from pipeline.criticism.regression.fit import Fit
 from pipeline.criticism.regression.linear_system import LinearSystem
-from pipeline.criticism.regression.normal_equations import unit_diagonal
+from pipeline.criticism.regression.normal_equations import pseudo_inverse, unit_diagonal
 from pipeline.criticism.residuals.channels import (
     channel_of,
     channel_scale,
@@ -34,13 +34,16 @@ class HeldOut:
     """A fit's errors where each capture is predicted without itself.
 
     `residual` [R] is NaN in a capture that alone carries a constant, and so is always in the fit.
-    `total` is the rms of the others over the noise floor; of the fit itself if there are none.
-    `steps` [own columns] are how far the parameters move without a capture, by its number.
+    `total` is the rms of the others over what may be expected: the noise floor, times `widening`
+    [R] for what the other captures and the instruments leave open of the prediction; of the fit
+    itself if there are none. `steps` [own columns] are how far the parameters move without a
+    capture, by its number.
     """
 
     residual: Array
     total: float
     steps: Mapping[int, Array] = field(default_factory=dict)
+    widening: Array | float = 1.0
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -48,6 +51,17 @@ class HeldOut:
         if np.isfinite(self.residual).any():
             return ()
         return ("no capture can be predicted from the others: errors are those of the fit",)
+
+    @classmethod
+    def of(
+        cls, system: LinearSystem, residual: Array, steps: Mapping[int, Array], widening: Array
+    ) -> HeldOut:
+        """With the total over the rows whose residual is there, over those of the fit if none is."""
+        predicted = np.isfinite(residual)
+        made = cls(residual, 0.0, steps, widening)
+        errors = made.or_fit(system) / (system.noise_ratio * widening)
+        errors = errors[predicted] if predicted.any() else errors
+        return replace(made, total=math.sqrt(float((errors**2).mean())))
 
     def or_fit(self, system: LinearSystem) -> Array:
         """The residual [R], that of the fit where a capture is always in it."""
@@ -71,7 +85,9 @@ def leave_out(system: LinearSystem) -> HeldOut:
     Notes
     -----
     Δ = −(N − N_k)⁻¹ (s − s_k) with the normal matrix N and the gradient s of all rows, and those of
-    the capture k. To first order: noise floors, weights and shapes stay those of the full fit.
+    the capture k. To first order: noise floors, weights and shapes stay those of the full fit. A row
+    x of the capture is predicted with the variance x (N − N_k)⁻¹ x' beside its noise, where N counts
+    noise and the priors of instruments and temperatures alone: what a model misses excuses nothing.
 
     """
     policy, own = system.policy.goodness, system.own.size
@@ -81,9 +97,10 @@ def leave_out(system: LinearSystem) -> HeldOut:
     unit = _units(system)
     weighted = matrix * weight[:, None]
     normal = weighted.T @ matrix + np.diag(system.prior_precision[places])
+    plain = matrix.T @ matrix + np.diag(system.prior_precision[places])
     slope = weighted.T @ system.residual + system.prior_gradient[places]
     spread = np.diag(np.linalg.pinv(unit_diagonal(normal), hermitian=True))
-    left = np.full(system.size, np.nan)
+    left, widening = np.full(system.size, np.nan), np.ones(system.size)
     steps: dict[int, Array] = {}
     for number in sorted(set(unit.tolist())):
         mine = unit == number
@@ -99,12 +116,12 @@ def leave_out(system: LinearSystem) -> HeldOut:
             continue
         step = -(inverse @ ((slope - weighted[mine].T @ system.residual[mine]) / scale)) / scale
         left[mine] = system.residual[mine] + matrix[mine] @ step
+        rows = matrix[mine] / system.noise_ratio[mine, None]
+        covariance = pseudo_inverse(plain - matrix[mine].T @ matrix[mine])
+        widening[mine] = np.sqrt(1.0 + np.einsum("rk,kl,rl->r", rows, covariance, rows))
         steps[number] = np.zeros(own)
         steps[number][places] = step
-    predicted = np.isfinite(left)
-    errors = np.where(predicted, left, system.residual) / system.noise_ratio
-    errors = errors[predicted] if predicted.any() else errors
-    return HeldOut(left, math.sqrt(float((errors**2).mean())), steps)
+    return HeldOut.of(system, left, steps, widening)
 
 
 def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[HeldOut, ...]:
@@ -125,22 +142,21 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
     Notes
     -----
     A parameter that one capture alone carries keeps that capture in the fit. If it counted in one
-    fit and not in the other, that would pass for a better prediction.
+    fit and not in the other, that would pass for a better prediction. So would a prediction that
+    leaves more open: of each row the surest prediction's widening counts in all.
 
     """
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
-    counted = shared if shared.any() else np.ones(shared.size, dtype=bool)
-    made = []
-    for system, one in zip(fits, held, strict=True):
-        residual = np.where(shared, one.residual, np.nan)
-        errors = (np.where(shared, one.residual, system.residual) / system.noise_ratio)[counted]
-        made.append(replace(one, residual=residual, total=math.sqrt(float((errors**2).mean()))))
-    return tuple(made)
+    widening = np.min([one.widening for one in held], axis=0)
+    return tuple(
+        HeldOut.of(system, np.where(shared, one.residual, np.nan), one.steps, widening)
+        for system, one in zip(fits, held, strict=True)
+    )
 
 
 def predicted_chi2(system: LinearSystem, held: HeldOut) -> Array:
     """χ²/n [G] of every group as `held` out; captures that are always in the fit as fitted."""
-    return system.reduced_chi2(held.or_fit(system))
+    return system.reduced_chi2(held.or_fit(system) / held.widening)
 
 
 def _units(system: LinearSystem) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ from pipeline.criticism.regression.goodness import (
     material_size,
     misfit,
     over_floor,
+    predicted_chi2,
     remainder,
 )
 from pipeline.criticism.regression.identifiability import known_by
@@ -110,6 +111,49 @@ def test_a_capture_without_which_a_variance_grows_fivefold_is_not_held_out(times
     matrix = np.where(system.group == 0, strong, 1.0)[:, None] * system.matrix
     held = leave_out(replace(system, matrix=matrix, residual=0.01 * system.residual))
     assert np.array_equal(np.isfinite(held.residual), (system.group != 0) | (not carries))
+
+
+def with_offsets(system: LinearSystem, u: float) -> LinearSystem:
+    """An instrument for the last capture and one for all others, each with an offset of prior u."""
+    last = system.group == system.group.max()
+    return replace(
+        system,
+        columns=(*system.columns, Column("one_offset", 1.0), Column("other_offset", 1.0)),
+        matrix=np.column_stack([system.matrix, -1.0 * ~last, -1.0 * last]),
+        prior_precision=np.array([0.0, u**-2, u**-2]),
+        prior_gradient=np.zeros(3),
+        own_count=3,
+    )
+
+
+@pytest.mark.parametrize("u", [0.5, 3.0])
+def test_what_instruments_may_be_off_by_is_expected_of_a_capture_held_out(u):
+    """Two instruments disagree by what two offsets of u may: a row of the capture held out may be
+    off by noise, both offsets and what the mean of the 800 other rows is uncertain by.
+    """
+    system = with_offsets(captures([0.0, 0.0, 2**0.5 * u]), u)
+    held, last = leave_out(system), system.group == 2
+    noise_alone = system.residual - system.residual[~last].mean()
+    assert held.residual[last] == pytest.approx(noise_alone[last], abs=0.01)
+    expected = np.sqrt(1.0 + 2.0 * u**2 + 1.0 / (2 * ROWS))
+    assert held.widening[last] == pytest.approx(np.full(ROWS, expected), rel=0.01)
+    assert held.total == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_fit_that_leaves_more_open_predicts_nothing_better():
+    """The same error of the last capture, with and without offsets that nobody knows."""
+    system = captures([0.0, 0.0, 3.0])
+    loose = with_offsets(system, 3.0)
+    alone, last = (leave_out(system), leave_out(loose)), system.group == 2
+
+    def missed(systems, held):
+        return [predicted_chi2(one, out)[2] for one, out in zip(systems, held, strict=True)]
+
+    sure, vague = missed((system, loose), alone)
+    assert vague < 0.2 * sure
+    assert alone[1].residual[last] == pytest.approx(alone[0].residual[last], abs=0.01)
+    together = missed((system, loose), in_common((system, loose), alone))
+    assert together == pytest.approx([sure, sure], rel=0.01)
 
 
 def test_at_standstill_a_voltage_is_measured_by_what_is_there():
