@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import base64
+import re
 from dataclasses import dataclass
 from functools import cache
 from html import escape
 from pathlib import Path
 
 from pipeline.report.pages.page import TEMPLATES
+
+_DRAWING_RULE = re.compile(r"^(?:svg |\.ladder)[^{}]*\{[^{}]*\}", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -72,5 +75,4 @@ def _style() -> str:
     """The report's colours and its rules for drawings, without those for pages."""
     sheet = (TEMPLATES / "style.css").read_text(encoding="utf-8")
     colours, _, rules = sheet.partition("* {")
-    kept = [line for line in rules.splitlines() if line.startswith(("svg ", ".ladder"))]
-    return "\n".join([colours.rstrip(), *kept])
+    return "\n".join([colours.rstrip(), *_DRAWING_RULE.findall(rules)])

@@ -56,7 +56,7 @@ class HeldOut:
     def of(
         cls, system: LinearSystem, residual: Array, steps: Mapping[int, Array], widening: Array
     ) -> HeldOut:
-        """With the total over the rows whose residual is there, over those of the fit if none is."""
+        """With the total over the rows that are held out, or over those of the fit if none is."""
         predicted = np.isfinite(residual)
         made = cls(residual, 0.0, steps, widening)
         errors = made.or_fit(system) / (system.noise_ratio * widening)
@@ -85,9 +85,11 @@ def leave_out(system: LinearSystem) -> HeldOut:
     Notes
     -----
     Δ = −(N − N_k)⁻¹ (s − s_k) with the normal matrix N and the gradient s of all rows, and those of
-    the capture k. To first order: noise floors, weights and shapes stay those of the full fit. A row
-    x of the capture is predicted with the variance x (N − N_k)⁻¹ x' beside its noise, where N counts
-    noise and the priors of instruments and temperatures alone: what a model misses excuses nothing.
+    the capture k. To first order: noise floors, weights and shapes stay those of the full fit.
+
+    A row x of the capture is predicted with the variance x (N − N_k)⁻¹ x' beside its noise. This N
+    counts noise and the priors of instruments and temperatures: what a model misses excuses
+    nothing.
 
     """
     policy, own = system.policy.goodness, system.own.size

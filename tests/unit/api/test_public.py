@@ -6,6 +6,7 @@ import doctest
 import importlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 
 import pipeline
 from pipeline.__main__ import main
+from pipeline.api.figure import figure
 from pipeline.records.errors import UsageError
 
 ROOT = Path(__file__).parents[3]
@@ -138,8 +140,19 @@ def test_a_plot_is_a_document_of_its_own(fits, tmp_path):
     path = first.save(tmp_path / "plot.svg")
     assert Xml.parse(path).getroot().tag == "{http://www.w3.org/2000/svg}svg"
     assert "data:image/svg+xml;base64," in first._repr_html_()
+
     with pytest.raises(KeyError, match="no plot of nothing"):
         fits.plot("nothing")
+
+
+def test_a_saved_plot_has_the_whole_rules_of_the_report_s_drawings():
+    """A style sheet of other line breaks once left selectors without their rules."""
+    style = figure("a drawing", "<svg></svg>").svg.partition("<![CDATA[")[2].partition("]]>")[0]
+    rules = re.findall(r"([^{}]+)\{([^{}]*)\}", style.replace(":root {", "").replace("}\n}", "}"))
+    found = {selector.strip(): body for selector, body in rules}
+    assert style.count("{") == style.count("}") > 40
+    assert "stroke: var(--measured)" in found["svg .measured"]
+    assert "text-anchor: end" in found["svg .tick.y,\nsvg .scale"]
 
 
 def test_what_is_wrong_is_said():
