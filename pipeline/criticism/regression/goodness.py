@@ -149,7 +149,7 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
 
     """
     shared = np.all([np.isfinite(one.residual) for one in held], axis=0)
-    widening = np.min([one.widening for one in held], axis=0)
+    widening = np.minimum.reduce([np.broadcast_to(one.widening, shared.shape) for one in held])
     return tuple(
         HeldOut.of(system, np.where(shared, one.residual, np.nan), one.steps, widening)
         for system, one in zip(fits, held, strict=True)
