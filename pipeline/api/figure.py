@@ -61,6 +61,29 @@ def figure(title: str, element: str) -> Figure:
     """A figure of the report's inline `<svg>` element, with the report's style sheet.
 
     Raises ValueError where there is nothing to draw.
+
+    Parameters
+    ----------
+    title
+        What is drawn.
+    element
+        Text that begins with `<svg`; anything else is the report's remark that there is nothing to
+        draw.
+
+    Attributes
+    ----------
+    figure of an inline `<svg>` element of the report, with the report's style sheet in it.
+
+    Returns
+    -------
+    Figure
+        One self-contained SVG document.
+
+    Raises
+    ------
+    ValueError
+        The element is no `<svg>`: no sample is finite.
+
     """
     if not element.startswith("<svg"):
         raise ValueError(f"{title}: no finite samples to draw")

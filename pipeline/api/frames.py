@@ -45,12 +45,43 @@ FINDING_SCHEMA = {
 
 
 def frame(rows: Iterable[Mapping[str, Any]], schema: Mapping[str, Any]) -> pl.DataFrame:
-    """A frame of rows with the types of `schema`, also where there is no row."""
+    """A frame of rows with the types of `schema`, also where there is no row.
+
+    Parameters
+    ----------
+    rows
+        One mapping a row; a key that a row lacks is null.
+    schema
+        Type of each column by name, in the order of the columns.
+
+    Attributes
+    ----------
+    polars frame with stated types, also where there is no row.
+
+    Returns
+    -------
+    DataFrame
+        One row each, columns as in `schema`.
+
+    """
     return pl.DataFrame(list(rows), schema=dict(schema), orient="row")
 
 
 def capture_rows(campaign: Campaign) -> list[dict[str, Any]]:
-    """One row a capture: what it is, how many rows it has and how many of them are masked."""
+    """One row a capture: what it is, how many rows it has and how many of them are masked.
+
+    Parameters
+    ----------
+    campaign
+        The captures of one motor.
+
+    Returns
+    -------
+    list of dict
+        Keys of `CAPTURE_SCHEMA`. `duration_s` [s] is the longest span of any clock, None for a
+        table without time; `masked` counts rows that some gate set aside, over all tables.
+
+    """
     rows = []
     for capture in campaign.captures:
         clocks = [t["t_s"].to_numpy() for t in capture.tables if "t_s" in t.columns and t.height]
@@ -74,7 +105,22 @@ def capture_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def check_rows(motor_id: str, checks: Sequence[Check]) -> list[dict[str, Any]]:
-    """One row a cross-check."""
+    """Cross-checks as rows of a frame.
+
+    Parameters
+    ----------
+    motor_id
+        The motor of all of them.
+    checks
+        The checks of its datasheet.
+
+    Returns
+    -------
+    list of dict
+        Keys of `CHECK_SCHEMA`; `value` and `limit` are in `unit`, None where the check was not
+        evaluated.
+
+    """
     return [
         {
             "motor_id": motor_id,
@@ -91,7 +137,20 @@ def check_rows(motor_id: str, checks: Sequence[Check]) -> list[dict[str, Any]]:
 
 
 def finding_rows(findings: Iterable[Finding]) -> list[dict[str, Any]]:
-    """One row a finding; the rows are null where it is not about rows."""
+    """Findings as rows of a frame.
+
+    Parameters
+    ----------
+    findings
+        Refusals and warnings, in any order; the order is kept.
+
+    Returns
+    -------
+    list of dict
+        Keys of `FINDING_SCHEMA`. Rows count from 0 and are None where the finding is not about
+        rows.
+
+    """
     return [
         {
             "file": one.file,

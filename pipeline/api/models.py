@@ -380,7 +380,30 @@ def model_spec(
     effects_path: str | None = None,
     policy: Mapping[str, Any] | None = None,
 ) -> ModelSpec:
-    """The model asked for; raises UsageError for a model, effect or policy field that is not."""
+    """The model that a caller asks for, with every name in it checked.
+
+    Parameters
+    ----------
+    name
+        `ideal` or `standard`.
+    effects
+        Names of effects to add; a name that begins with `-` is left out of the model.
+    effects_path
+        Folder with effects of the user's own; None without any.
+    policy
+        Constants of judgement that differ from the default ones, by section and field.
+
+    Returns
+    -------
+    ModelSpec
+        The model, its policy reduced to what differs from the default.
+
+    Raises
+    ------
+    UsageError
+        There is no such model, effect or field of the policy.
+
+    """
     from pipeline.criticism.library.named_models import MODELS
     from pipeline.criticism.library.registry import known_effects
     from pipeline.criticism.policy.policy import policy_changes

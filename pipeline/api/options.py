@@ -21,8 +21,19 @@ Known = Mapping[str, Mapping[str, float]]
 
 
 def check_options(settings: RunSettings) -> None:
-    """Refuses an option of an estimator, gate or check that there is not, a stated constant that
-    there is not, and a value that none of them can take: none must be silent.
+    """Refuses options of plug-ins and stated constants that do not exist or cannot be meant.
+
+    Parameters
+    ----------
+    settings
+        Options by the name of an estimator, a gate or a check, and stated constants [SI].
+
+    Raises
+    ------
+    UsageError
+        No such plug-in, option or constant, or a value that it cannot take; the remedy names the
+        ones there are.
+
     """
     check_constants(settings.constants)
     if not (settings.fit or settings.gates or settings.crosscheck):
@@ -91,10 +102,24 @@ def _check(group: str, given: Mapping[str, Any], known: Known) -> None:
 
 
 def allowed(option: str, value: Any, default: float) -> str | None:
-    """What an option takes, in words; None where the value is that.
+    """What values an option takes, in words; None where the given value is one of them.
 
-    Names say what a number is: a share of something, a chance, a temperature. What is not negative
-    by default is a size or a count, and never is.
+    Parameters
+    ----------
+    option
+        Name of the option. Its ending says what the number is: `share` and `correlation` lie from 0
+        to 1, `level` and `chance` strictly between, `_degc` above absolute zero.
+    value
+        What the configuration gives.
+    default
+        The option's usual value [unit of the option]. Where it is not negative, no value may be: it
+        is a size or a count.
+
+    Returns
+    -------
+    str or None
+        The rest of the sentence "is not ...", or None.
+
     """
     number = isinstance(value, (int, float)) and math.isfinite(value)
     if option == "enabled":

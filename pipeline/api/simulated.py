@@ -130,7 +130,28 @@ Job = tuple[str, Motor, Bench, int, Plan]
 
 
 def single(settings: SimulateSettings) -> Iterable[Job]:
-    """The one motor that the settings ask for; raises ValueError or KeyError for what is wrong."""
+    """The one motor that the settings ask for.
+
+    Parameters
+    ----------
+    settings
+        Name of the motor's file, effects, unknown structure, seed, and whether instruments are
+        exact.
+
+    Yields
+    ------
+    Job
+        Subfolder (the output folder itself), motor, bench, seed, and an empty plan: the whole
+        campaign.
+
+    Raises
+    ------
+    ValueError
+        An effect or a parameter is not one that can be simulated.
+    KeyError
+        The motor's file lacks a key.
+
+    """
     document = _document("motor", settings.motor, settings.config_dir)
     motor = motor_from(document)
     name = settings.motor_id or f"{settings.motor}-{settings.seed}"
@@ -144,7 +165,26 @@ def single(settings: SimulateSettings) -> Iterable[Job]:
 
 
 def fleet(settings: SimulateSettings) -> Iterable[Job]:
-    """Every motor on one station, whose gains are drawn once from the fleet's seed."""
+    """Every motor of a fleet, measured on one station.
+
+    Parameters
+    ----------
+    settings
+        Name of the fleet's file, and whether instruments are exact.
+
+    Yields
+    ------
+    Job
+        Subfolder, motor, bench, seed and tests of each motor. The gains of the station's
+        instruments are drawn once, from the seed of the fleet; the seed of a motor follows from
+        that and its name, so that a motor is the same in a fleet of any size.
+
+    Raises
+    ------
+    ValueError
+        A test of the plan is none of the campaign's.
+
+    """
     words = _document("fleet", str(settings.fleet), settings.config_dir)
     document = _document("motor", str(words.get("motor")), settings.config_dir)
     many = fleet_from(words, document)
@@ -182,9 +222,29 @@ def _document(kind: str, name: str, config_dir: str | None) -> dict[str, Any]:
 def simulated(
     motor: Motor, bench: Bench, seed: int, plan: Plan
 ) -> tuple[list[Recording], dict[str, Any]]:
-    """The recordings of one motor and what is true of it.
+    """The recordings of one simulated motor, and what is true of it.
 
-    Raises UsageError for a size that cannot be simulated.
+    Parameters
+    ----------
+    motor
+        The motor with its effects.
+    bench
+        The station that measures it.
+    seed
+        Of the noise of its instruments.
+    plan
+        The captures to record; the whole campaign where empty.
+
+    Returns
+    -------
+    tuple of list of Recording and dict
+        Recordings in the order of the plan, and the true parameters [SI] by name.
+
+    Raises
+    ------
+    UsageError
+        A size cannot be simulated.
+
     """
     try:
         return campaign(motor, bench, seed, plan), truth(motor)

@@ -62,8 +62,19 @@ class Identified:
         return self.root @ self.root.T
 
     def u_of(self, gradient: Array) -> float:
-        """Standard uncertainty of a function with this gradient [p], infinite where directions
-        without information move it.
+        """Standard uncertainty of a function of the parameters.
+
+        Parameters
+        ----------
+        gradient
+            Its derivatives [p] by the parameters.
+
+        Returns
+        -------
+        float
+            k = 1 [unit of the function]; infinite for a zero gradient and where directions without
+            information move the function by more than a tenth of its uncertainty.
+
         """
         u = self._noise_of(gradient)
         moved = float(np.linalg.norm(gradient @ self.null))
@@ -71,8 +82,19 @@ class Identified:
         return math.inf if unknown else u
 
     def u_of_bent(self, gradient: Array) -> float:
-        """The same for a function that is not linear, whose gradient is orthogonal to directions
-        without information as far as columns from finite differences can show.
+        """Standard uncertainty of a function that is not linear in the parameters.
+
+        Parameters
+        ----------
+        gradient
+            Its derivatives [p] by the parameters, at their values.
+
+        Returns
+        -------
+        float
+            As `u_of`, but the gradient need be orthogonal to the directions without information
+            only as far as columns from finite differences can show.
+
         """
         there = float(np.linalg.norm(gradient * self.sizes))
         moved = float(np.linalg.norm(gradient @ self.null))

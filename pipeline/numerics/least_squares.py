@@ -26,6 +26,28 @@ class LinearFit:
     of the minimum-norm solution and says nothing of the missing directions: ask `u`. `chi2_dof`
     is the weighted residual variance: 1 where `sigma` was right. `rows` [n, k] are the whitened
     rows, `sizes` [k] the coefficients at which a column alone would be as large as y.
+
+    Attributes
+    ----------
+    weighted linear least-squares fit.
+    coefficients
+        [k].
+    covariance
+        [k, k]. Where `rank` is below k it is that of the minimum-norm solution and says nothing of
+        the undetermined directions: use `u`.
+    residuals
+        y less the fit [n, unit of y].
+    dof
+        n less the rank.
+    rank
+        Number of directions that the data determine.
+    chi2_dof
+        Weighted residual variance [1]: 1 where `sigma` was right.
+    rows
+        Weighted rows [n, k].
+    sizes
+        Coefficients [k] at which a column alone would be as large as y.
+
     """
 
     coefficients: Array
@@ -48,7 +70,19 @@ class LinearFit:
         return identify(self.rows, self.sizes)
 
     def u(self, index: int) -> float:
-        """Standard uncertainty of one coefficient, infinite where the data do not determine it."""
+        """Standard uncertainty of one coefficient.
+
+        Parameters
+        ----------
+        index
+            Of the coefficient.
+
+        Returns
+        -------
+        float
+            k = 1; infinite where the data do not determine it.
+
+        """
         if not (self.full_rank or math.isfinite(self.known.u[index])):
             return math.inf
         return math.sqrt(max(float(self.covariance[index, index]), 0.0))
@@ -156,6 +190,24 @@ class NonlinearFit:
 
     The covariance is that of the minimum-norm step where the data do not part the parameters: ask
     `u`.
+
+    Attributes
+    ----------
+    nonlinear least-squares fit.
+    parameters
+        At the minimum [k].
+    covariance
+        [k, k]; that of the minimum-norm step where the data do not determine all parameters: use
+        `u`.
+    residuals
+        At the minimum [n].
+    jacobian
+        Derivatives of the residuals by the parameters [n, k].
+    cost
+        Sum of squared residuals.
+    converged
+        Whether the last step was below the tolerance.
+
     """
 
     parameters: Array
@@ -173,15 +225,37 @@ class NonlinearFit:
         return identify(self.jacobian, np.maximum(np.abs(self.parameters), one))
 
     def u_of(self, gradient: Array) -> float:
-        """Standard uncertainty of a function of the parameters with this gradient [k], infinite
-        where the data do not determine it.
+        """Standard uncertainty of a function of the parameters.
+
+        Parameters
+        ----------
+        gradient
+            Its derivatives [k] by the parameters.
+
+        Returns
+        -------
+        float
+            k = 1; infinite where the data do not determine it.
+
         """
         if math.isinf(self.known.u_of(gradient)):
             return math.inf
         return math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
 
     def u(self, index: int) -> float:
-        """Standard uncertainty of one parameter, infinite where the data do not determine it."""
+        """Standard uncertainty of one parameter.
+
+        Parameters
+        ----------
+        index
+            Of the parameter.
+
+        Returns
+        -------
+        float
+            k = 1; infinite where the data do not determine it.
+
+        """
         return self.u_of(np.eye(self.parameters.size)[index])
 
 

@@ -22,10 +22,17 @@ Array = NDArray[np.float64]
 class Projection:
     """Test functions over one clock.
 
-    `starts` [W] are first samples of the windows, `functions` [W, M, N] the test functions, of
-    unit sum of squares each; `orders` [M] the order a turn of each function, 0 for the plain
-    window; `valid` [W, M] where a window holds enough cycles of the order and enough samples a
-    cycle.
+    Attributes
+    ----------
+    starts
+        First samples of the windows [W].
+    functions
+        Test functions [W, M, N], of unit sum of squares each.
+    orders
+        Order a turn of each function [M]; 0 for the plain window.
+    valid
+        Where a window [W, M] holds enough cycles of the order and enough samples a cycle.
+
     """
 
     starts: NDArray[np.int64]
@@ -79,7 +86,14 @@ class Projection:
         return averaged
 
     def only(self, windows: NDArray[np.bool_]) -> Projection:
-        """The same test functions in some of the windows [W]."""
+        """The same test functions over some of the windows.
+
+        Parameters
+        ----------
+        windows
+            Which [W] are kept.
+
+        """
         return Projection(
             self.starts[windows], self.functions[windows], self.orders, self.valid[windows]
         )

@@ -23,11 +23,20 @@ STRETCH = 16
 
 @dataclass(frozen=True, slots=True)
 class WeakRows:
-    """Windows over one clock: rows `starts` [w] to `starts + sizes`, and their weights.
+    """Windows over one clock, with the weights that turn samples into averages.
 
-    On an even clock `weights` [3, m] is shared by all windows and `members` is empty; else
-    `members` [sum m] lists the rows of every window in turn and `weights` is [3, sum m].
-    `centres_s` [w] are the windows' mid times.
+    Attributes
+    ----------
+    starts, sizes
+        First row and number of rows of each window [w].
+    centres_s
+        Mid times of the windows [w, s].
+    weights
+        For derivatives of order 0, 1 and 2: [3, m], shared by all windows, on an even clock; else
+        [3, sum m] over the rows of `members`.
+    members
+        Rows of every window in turn [sum m]; empty on an even clock.
+
     """
 
     starts: NDArray[np.int64]

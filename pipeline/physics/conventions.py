@@ -47,7 +47,18 @@ CouplingName = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Coupling:
-    """One name for the coupling k = p·psi [V·s/rad]: value = factor · k^power, power 1 or -1."""
+    """One convention for the coupling k = p ψ [V·s/rad]: value = factor · k^power.
+
+    Attributes
+    ----------
+    unit, words, formula
+        Unit of the value, its meaning, and the formula as text.
+    factor
+        In the unit, for k in V·s/rad.
+    power
+        1, or −1 for speed constants.
+
+    """
 
     unit: str
     words: str
@@ -190,26 +201,71 @@ def motor_constant_nm_sqrt_w(kt_peak_nm_a: float, r_phase_ohm: float) -> float:
 
 
 def phase_from_line(line: float) -> float:
-    """Wye-equivalent phase resistance or inductance from terminal to terminal: X_ll/2.
+    """Wye-equivalent phase resistance or inductance from terminal to terminal.
 
-    Holds for both windings: a delta of 1.5·X_ll a winding also reads X_ll. For an inductance,
-    X_ll is the mean over the rotor's angle.
+    Parameters
+    ----------
+    line
+        X_ll [ohm or H]. For an inductance, the mean over the rotor's angle.
+
+    Returns
+    -------
+    float
+        X_ll / 2 in the same unit, for either winding: a delta of 1.5 X_ll a winding also reads
+        X_ll.
+
     """
     return line / 2.0
 
 
 def line_from_phase(phase: float) -> float:
-    """Terminal-to-terminal resistance or inductance of a wye-equivalent phase: 2·X_phase."""
+    """Terminal-to-terminal resistance or inductance of a wye-equivalent phase.
+
+    Parameters
+    ----------
+    phase
+        X [ohm or H].
+
+    Returns
+    -------
+    float
+        2 X in the same unit.
+
+    """
     return 2.0 * phase
 
 
 def delta_from_wye(phase: float) -> float:
-    """Resistance or inductance of a balanced delta's winding from the wye equivalent: 3·X."""
+    """Resistance or inductance of the winding of a balanced delta from its wye equivalent.
+
+    Parameters
+    ----------
+    phase
+        X [ohm or H].
+
+    Returns
+    -------
+    float
+        3 X in the same unit.
+
+    """
     return 3.0 * phase
 
 
 def wye_from_delta(winding: float) -> float:
-    """Wye-equivalent phase resistance or inductance of a balanced delta's winding: X/3."""
+    """Wye-equivalent phase resistance or inductance of the winding of a balanced delta.
+
+    Parameters
+    ----------
+    winding
+        X [ohm or H].
+
+    Returns
+    -------
+    float
+        X / 3 in the same unit.
+
+    """
     return winding / 3.0
 
 
@@ -252,7 +308,19 @@ def phase_resistances_ohm(rab_ohm: float, rbc_ohm: float, rca_ohm: float) -> Pha
 
 
 def line_resistances_ohm(ra_ohm: float, rb_ohm: float, rc_ohm: float) -> Phases:
-    """Line-to-line resistances ab, bc, ca [ohm] from the wye-equivalent phases."""
+    """Line-to-line resistances from the phases of a wye.
+
+    Parameters
+    ----------
+    ra_ohm, rb_ohm, rc_ohm
+        Phases.
+
+    Returns
+    -------
+    Phases
+        ab, bc and ca [ohm].
+
+    """
     return Phases(ra_ohm + rb_ohm, rb_ohm + rc_ohm, rc_ohm + ra_ohm)
 
 

@@ -18,7 +18,27 @@ TermKind = Literal["column", "constant", "metadata"]
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """One name. `low` and `high` [unit] bound what is physically plausible, both inclusive."""
+    """One name of the glossary.
+
+    Attributes
+    ----------
+    name
+        Its unit is the last part, from the closed table of suffixes.
+    unit, words
+        Unit, and meaning in a few words.
+    kind
+        `column`, `constant` or `metadata`.
+    low, high
+        Bounds of what is physically plausible [unit], both inclusive; None without a bound.
+    integer
+        Whether only whole numbers are meant.
+
+    Raises
+    ------
+    ValueError
+        The suffix is that of another unit, or the bounds leave no value.
+
+    """
 
     name: str
     unit: str
@@ -64,7 +84,19 @@ def suffix_of(name: str) -> str:
 
 
 def unit_of(name: str) -> str:
-    """The unit that the suffix of a name stands for; `1` where it has none."""
+    """The unit that the suffix of a name stands for.
+
+    Parameters
+    ----------
+    name
+        A name of the glossary's form.
+
+    Returns
+    -------
+    str
+        `1` where the name has no suffix of a unit.
+
+    """
     return SUFFIX_UNITS.get(suffix_of(name), "1")
 
 

@@ -26,7 +26,14 @@ class Scale:
     unit: str
 
     def shown(self, value: float) -> float:
-        """The number to show beside `unit`."""
+        """The number to show beside `unit`.
+
+        Parameters
+        ----------
+        value
+            In the unit without a prefix.
+
+        """
         return value / 10.0**self.exponent
 
 
@@ -46,7 +53,18 @@ class Reading:
 
 
 def unit_text(unit: str) -> str:
-    """A unit of the glossary as people write it: `ohm` is Ω, `1` is nothing."""
+    """A unit of the glossary as people write it: `ohm` is Ω, `1` is nothing.
+
+    Parameters
+    ----------
+    unit
+        Such as `ohm`, which is Ω; `1` is the empty text.
+
+    Attributes
+    ----------
+    unit of the glossary as people write it.
+
+    """
     return _WORDS.get(unit, unit)
 
 
@@ -86,7 +104,16 @@ def scale_for(magnitude: float, unit: str) -> Scale:
 
 
 def times_ten(exponent: int, shown: str) -> str:
-    """The unit text after a power of ten, `×10⁻⁶ kg·m²`; just the unit for exponent 0."""
+    """The text of a unit after a power of ten, such as `×10⁻⁶ kg·m²`.
+
+    Parameters
+    ----------
+    exponent
+        Of ten; 0 for the unit alone.
+    shown
+        The unit as people write it.
+
+    """
     if exponent == 0:
         return shown
     return f"×10{str(exponent).translate(_SUPERSCRIPT)} {shown}".strip()
@@ -219,7 +246,16 @@ def significant(value: float, digits: int) -> str:
 
 
 def plain(value: float, digits: int = 6) -> str:
-    """Shortest text of a number to `digits` significant digits, no trailing zeros."""
+    """The shortest text of a number, without trailing zeros.
+
+    Parameters
+    ----------
+    value
+        Any number.
+    digits
+        Significant digits at most.
+
+    """
     text = f"{value:.{digits}g}"
     return text.replace("-", MINUS) if "e" not in text else text
 

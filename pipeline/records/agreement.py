@@ -17,6 +17,22 @@ class Reading:
     `value` is positive [unit]; the parts of `budget` that other captures share have sources of
     one name. `u_rel_model` is what the method cannot promise from one capture to the next, as a
     relative standard uncertainty. Readings of different ways may differ by a convention.
+
+    Attributes
+    ----------
+    quantity
+        Name of what is read, such as `psi_pm_wb`.
+    way
+        Test, place and method: what captures that measure it alike share.
+    path
+        The capture.
+    value, unit
+        Positive, in the unit.
+    budget
+        Contributions [unit]; those that other captures share bear one source name.
+    u_rel_model
+        Relative standard uncertainty [1] of the method from one capture to the next.
+
     """
 
     quantity: str
@@ -42,6 +58,20 @@ class Disagreement:
     """Groups of captures that differ in one quantity; `usual` is the larger, `odd` the others.
 
     `tied` where the two largest are of one size, so that neither is the odd one.
+
+    Attributes
+    ----------
+    quantity, unit
+        What the groups differ in.
+    usual
+        The largest group.
+    odd
+        The other groups.
+    p_value
+        Chance of groups this far apart where all are of one value.
+    tied
+        Whether the two largest groups are of one size.
+
     """
 
     quantity: str

@@ -36,7 +36,47 @@ UNSTATED_U: Mapping[str, float] = {
 
 @dataclass(frozen=True, slots=True)
 class CaptureMeta:
-    """The metadata of `contract/capture.md`, parsed; keys it does not know are in `extra`."""
+    """The metadata of one capture, as `contract/capture.md` has it, parsed.
+
+    Attributes
+    ----------
+    motor_id, motor_type, lot
+        Serial number, design, and production lot.
+    test
+        One of the glossary's tests.
+    station, operator, started_at
+        Bench, person, and ISO 8601 time in UTC.
+    winding
+        `wye` or `delta`, as the nameplate says.
+    pole_pairs, slots
+        Of the nameplate [1].
+    ambient_degc
+        Ambient temperature [degC].
+    pair
+        `ab`, `bc` or `ca`: the terminals of a two-terminal test.
+    theta_elec_deg
+        Electrical angle at which the rotor is locked [deg].
+    voltage_kind
+        Whether voltages are `measured` or the inverter's `commanded` ones.
+    voltage_timing
+        Whether a voltage sample is of its `instant`, `held` for the period that follows, or
+        `centred` on it.
+    pwm_hz
+        Switching frequency [Hz].
+    vdc_v
+        Voltage of the DC link [V].
+    u_rel_current, u_rel_voltage, u_rel_torque, u_rel_clock
+        Relative standard uncertainty (k = 1) of a gain or the time base [1]; None where not stated.
+    u_temp_degc
+        Standard uncertainty of temperatures [K].
+    pause_s
+        The recorder paused where its clock steps by more [s].
+    sha256_rows
+        Digest and count of the rows of a CSV.
+    extra
+        Every other key of the file, as text.
+
+    """
 
     motor_id: str
     test: str
@@ -65,19 +105,59 @@ class CaptureMeta:
     extra: Mapping[str, str] = field(default_factory=dict)
 
     def instrument_u(self, key: str) -> float:
-        """Standard uncertainty of an instrument, a key of UNSTATED_U; its default if not stated."""
+        """Standard uncertainty of an instrument, its default where the capture states none.
+
+        Parameters
+        ----------
+        key
+            A key of `UNSTATED_U`.
+
+        Returns
+        -------
+        float
+            k = 1, relative [1] for gains and the time base, [K] for temperatures. What is stated
+            counts as stated, 0 too.
+
+        """
         stated: float | None = getattr(self, key)
         return UNSTATED_U[key] if stated is None else stated
 
     def stated_u_rel(self, key: str) -> float | None:
-        """A relative standard uncertainty, 0 to 1, under a key of `extra`; None without one."""
+        """A relative standard uncertainty, 0 to 1, under a key of `extra`; None without one.
+
+        Parameters
+        ----------
+        key
+            A key of `extra`.
+
+        Attributes
+        ----------
+        relative standard uncertainty that a capture states under a key of its own.
+
+        Returns
+        -------
+        float or None
+            From 0 to 1; None where there is no such key or its text is no such number.
+
+        """
         found = number(self.extra.get(key, ""))
         return found if found is not None and 0.0 <= found <= 1.0 else None
 
 
 @dataclass(frozen=True, slots=True)
 class Mask:
-    """Rows of one table that a gate set aside: True is kept. Every mask is kept and counted."""
+    """Rows of one table that a gate set aside; every mask is kept and counted.
+
+    Attributes
+    ----------
+    gate
+        Name of the gate.
+    table
+        Index of the table in the capture.
+    keep
+        True [n] for a row that is kept.
+
+    """
 
     gate: str
     table: int
@@ -91,10 +171,26 @@ class Mask:
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """Tables of one clock each, columns named by the glossary, float64, NaN where missing.
+    """One test of one motor: tables of one clock each, columns named by the glossary.
 
-    `path` is relative to the input folder with forward slashes. Streams of different rates are
-    different tables; `arrays` puts the columns asked for on one clock.
+    Streams of different rates are different tables; `arrays` puts the columns asked for on one
+    clock.
+
+    Attributes
+    ----------
+    path
+        Relative to the input folder, with forward slashes.
+    sha256
+        Digest of the file's bytes, in hexadecimal.
+    integrity
+        `verified` where the file carries a checksum that holds, else `unverified`.
+    meta
+        What the file says of the test.
+    tables
+        Columns in float64 and SI units, NaN where a value is missing.
+    masks
+        Rows that gates set aside.
+
     """
 
     path: str
@@ -110,15 +206,41 @@ class Capture:
         return frozenset(name for table in self.tables for name in table.columns)
 
     def has(self, *names: str) -> bool:
-        """Whether all the columns are there."""
+        """Whether every one of some columns is in some table.
+
+        Parameters
+        ----------
+        *names
+            Names of the glossary.
+
+        """
         return self.columns.issuperset(names)
 
     def with_masks(self, *masks: Mask) -> Capture:
-        """This capture with further masks."""
+        """This capture with further masks; its tables are shared, not copied.
+
+        Parameters
+        ----------
+        *masks
+            Each for one of the tables.
+
+        """
         return replace(self, masks=self.masks + masks)
 
     def kept(self, table: int) -> NDArray[np.bool_]:
-        """Rows [n] of a table that every mask keeps."""
+        """Rows of a table that every mask keeps.
+
+        Parameters
+        ----------
+        table
+            Index of the table.
+
+        Returns
+        -------
+        array [n] of bool
+            True for a row to use.
+
+        """
         keep = np.ones(self.tables[table].height, dtype=bool)
         for mask in self.masks:
             if mask.table == table:
@@ -126,9 +248,23 @@ class Capture:
         return keep
 
     def table_of(self, *names: str) -> int:
-        """Index of the table that holds most of `names`, the longest where several do.
+        """The table that holds most of some columns, the longest where several do.
 
-        Raises KeyError where no table holds any.
+        Parameters
+        ----------
+        *names
+            Names of the glossary.
+
+        Returns
+        -------
+        int
+            Index in `tables`.
+
+        Raises
+        ------
+        KeyError
+            No table holds any of them.
+
         """
         counts = [len(set(names) & set(table.columns)) for table in self.tables]
         if not counts or max(counts) == 0:
@@ -138,11 +274,27 @@ class Capture:
         return int(np.argmax(heights))
 
     def arrays(self, *names: str, masked: bool = True) -> dict[str, Array]:
-        """The columns on one clock [n each], masked rows removed unless `masked` is False.
+        """Columns on one clock, without the rows that were set aside.
 
-        The clock is that of `table_of(*names)`; columns of other tables are interpolated
-        linearly onto it and are NaN outside their own span. Raises KeyError for a column that
-        no table holds.
+        Parameters
+        ----------
+        masked
+            Whether the rows that gates set aside are left out.
+        *names
+            Names of the glossary.
+
+        Returns
+        -------
+        dict of array [n]
+            Each column in its unit. The clock is that of `table_of`; columns of other tables are
+            interpolated linearly onto it, from their own unmasked, finite samples, and are NaN
+            outside their own span.
+
+        Raises
+        ------
+        KeyError
+            No table holds one of the columns, or none of them has a clock in common.
+
         """
         home = self.table_of(*names)
         keep = self.kept(home) if masked else np.ones(self.tables[home].height, dtype=bool)
@@ -174,9 +326,17 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """All captures of one motor, of whatever day and bench, sorted by path.
+    """All captures of one motor, of whatever day and bench.
 
-    `stated` are constants that the configuration states, with `u_NAME` their uncertainties.
+    Attributes
+    ----------
+    motor_id
+        Serial number.
+    captures
+        Sorted by path.
+    stated
+        Constants [SI] that the configuration states, with `u_NAME` their standard uncertainties.
+
     """
 
     motor_id: str
@@ -184,19 +344,42 @@ class Campaign:
     stated: Mapping[str, float] = field(default_factory=dict)
 
     def of(self, *tests: str) -> tuple[Capture, ...]:
-        """The captures of these tests, in path order."""
+        """The captures of some tests, in the order of their paths.
+
+        Parameters
+        ----------
+        *tests
+            Names of tests.
+
+        """
         return tuple(c for c in self.captures if c.meta.test in tests)
 
     def nameplate(self, key: str) -> object | None:
-        """The most frequent value of a metadata key (`pole_pairs`, ...), the first of equals.
+        """What most captures state under a metadata key.
 
-        None where no capture states the key.
+        Parameters
+        ----------
+        key
+            A field of `CaptureMeta`, such as `pole_pairs`.
+
+        Returns
+        -------
+        object or None
+            The most frequent value, the first of equals; None where no capture states the key.
+
         """
         stated = [getattr(c.meta, key) for c in self.captures]
         counts = Counter(value for value in stated if value is not None)
         return max(counts, key=counts.__getitem__, default=None)
 
     def text(self, key: str) -> str | None:
-        """What `nameplate` says of a key, as text."""
+        """What `nameplate` gives for a key, as text; None where no capture states it.
+
+        Parameters
+        ----------
+        key
+            A field of `CaptureMeta`.
+
+        """
         stated = self.nameplate(key)
         return None if stated is None else str(stated)

@@ -27,10 +27,19 @@ SIGNALS = (
 
 @dataclass(frozen=True, slots=True)
 class ModelSpec:
-    """Which model: `ideal` or `standard`, plus effects, less those whose name starts with `-`.
+    """Which model of a motor is meant.
 
-    `effects_path`: a folder of the user's own effects. `policy`: constants of judgement that differ
-    from the default ones, by their full names.
+    Attributes
+    ----------
+    name
+        `ideal` or `standard`.
+    effects
+        Names that are added; one that begins with `-` is taken out.
+    effects_path
+        Folder with effects of the user's own.
+    policy
+        Constants of judgement that differ from the default ones, by their full names.
+
     """
 
     name: str = "standard"
@@ -47,6 +56,16 @@ class ModelSpec:
 class ModelParameter(PlainRecord):
     """One fitted parameter with its standard uncertainty [unit]; both are None where the captures
     and the station's priors do not determine it. `stated`: nothing but what somebody states does.
+
+    Attributes
+    ----------
+    value, u
+        Value and standard uncertainty (k = 1) [unit].
+    at_bound
+        Whether the fit ended at a bound of its range.
+    stated
+        Whether only a statement, and no data, determines it.
+
     """
 
     value: float | None
@@ -120,10 +139,26 @@ class Move(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class SignalError(PlainRecord):
-    """Error of one signal of one capture, as means over smooth windows [unit of the signal].
+    """Error of one signal of one capture, as means over smooth windows.
 
-    `kind`: what an `equation` misses by, sample by sample, or what a `free_run` of the model away
-    from each window's start does.
+    Attributes
+    ----------
+    signal, unit
+        Glossary name, and the unit of `rmse` and `noise_floor`.
+    capture
+        Its path.
+    split
+        `held_out` where the model was fitted without this capture or stretch, else `fit`.
+    rmse
+        Root mean square of the window means' error.
+    noise_floor
+        The rms that noise and the instruments' uncertainty alone would give.
+    n, n_eff
+        Windows, and how many of them count as independent.
+    kind
+        What an `equation` misses by, sample by sample, or what a `free_run` of the model away from
+        each window's start does.
+
     """
 
     signal: str
@@ -168,12 +203,35 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One model of one motor: parameters, errors, and where the error lives.
+    """One model of one motor: its parameters, its errors, and where the errors lie.
 
-    `moved` holds parameters with and without the effects that were added; `bare` the held-out
-    error without them, None where none were. `combinations` are known where their parameters are
-    not. `traces` are for looking, not for the document. `before` are the errors of the equations
-    without the effects that were added.
+    Attributes
+    ----------
+    motor_id, name, effects
+        The motor, and the model with what was added to it.
+    parameters
+        Fitted parameters by name.
+    errors
+        One a signal, capture and split.
+    held_out
+        Error of captures that the model was not fitted to, over the noise floor [1].
+    where
+        What variables the error depends on.
+    notes
+        Remarks, one sentence each.
+    maps
+        Mean error over cells of one or two variables.
+    moved
+        Parameters with and without the effects that were added.
+    bare
+        `held_out` without those effects; None where none were added.
+    traces
+        Samples for plots; no part of the document.
+    combinations
+        What is known of parameters that are not, one by one.
+    before
+        Errors of the equations without the effects that were added.
+
     """
 
     motor_id: str

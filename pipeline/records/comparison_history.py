@@ -29,7 +29,19 @@ class Earlier:
 
 
 def history_of(document: Mapping[str, Any] | None) -> tuple[Earlier, ...]:
-    """The comparisons of a document; none where it has another form."""
+    """The comparisons that a document holds.
+
+    Parameters
+    ----------
+    document
+        As `document_of` writes it, or None where there is no file.
+
+    Returns
+    -------
+    tuple of Earlier
+        Oldest first; empty for a document of any other form.
+
+    """
     if document is None or document.get("schema") != SCHEMA:
         return ()
     try:
@@ -39,11 +51,38 @@ def history_of(document: Mapping[str, Any] | None) -> tuple[Earlier, ...]:
 
 
 def with_latest(earlier: Sequence[Earlier], latest: Earlier) -> tuple[Earlier, ...]:
-    """The history with one more; the same model again takes the place of its last one."""
+    """The history with one more; the same model again takes the place of its last one.
+
+    Parameters
+    ----------
+    earlier
+        The comparisons so far, oldest first.
+    latest
+        The new one; it replaces an earlier one of the same model and effects.
+
+    Attributes
+    ----------
+    history with one more comparison in it.
+
+    Returns
+    -------
+    tuple of Earlier
+        The last `MOST` of them.
+
+    """
     others = [e for e in earlier if (e.name, e.effects) != (latest.name, latest.effects)]
     return (*others, latest)[-MOST:]
 
 
 def document_of(motor_id: str, history: Sequence[Earlier]) -> dict[str, Any]:
-    """The JSON form."""
+    """The JSON form of a motor's history, schema comparison-history/1.
+
+    Parameters
+    ----------
+    motor_id
+        The motor.
+    history
+        Oldest first.
+
+    """
     return {"schema": SCHEMA, "motor_id": motor_id, "comparisons": plain_of(history)}

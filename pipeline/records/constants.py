@@ -15,25 +15,72 @@ class Constants:
     estimates: tuple[Estimate, ...] = ()
 
     def adding(self, estimates: Iterable[Estimate]) -> Constants:
-        """These constants and further, less preferred ones."""
+        """These constants and further, less preferred ones.
+
+        Parameters
+        ----------
+        estimates
+            In order of preference.
+
+        """
         return Constants(self.estimates + tuple(estimates))
 
     def only(self, names: Iterable[str]) -> Constants:
-        """The estimates of these names."""
+        """The estimates of some constants, in the same order.
+
+        Parameters
+        ----------
+        names
+            Names of constants.
+
+        """
         kept = frozenset(names)
         return Constants(tuple(e for e in self.estimates if e.name in kept))
 
     def best(self, name: str) -> Estimate | None:
-        """The preferred estimate of a constant that has a value, or None."""
+        """The preferred estimate of a constant that has a value.
+
+        Parameters
+        ----------
+        name
+            Name of the constant.
+
+        Returns
+        -------
+        Estimate or None
+            None where no estimate of that name has a value.
+
+        """
         return next((e for e in self.estimates if e.name == name and e.known), None)
 
     def by(self, method: str, name: str) -> Estimate | None:
-        """What one method found for a constant, if it has a value."""
+        """What one method found for a constant.
+
+        Parameters
+        ----------
+        method
+            Name of an estimator.
+        name
+            Name of the constant.
+
+        Returns
+        -------
+        Estimate or None
+            None where that method gave no value.
+
+        """
         found = (e for e in self.estimates if e.name == name and e.method == method and e.known)
         return next(found, None)
 
     def all_of(self, name: str) -> tuple[Estimate, ...]:
-        """Every estimate of a constant, known or not, in order of preference."""
+        """Every estimate of a constant, with a value or without, in order of preference.
+
+        Parameters
+        ----------
+        name
+            Name of the constant.
+
+        """
         return tuple(e for e in self.estimates if e.name == name)
 
     def chosen(self) -> dict[str, Estimate]:

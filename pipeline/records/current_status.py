@@ -15,10 +15,19 @@ from pipeline.records.ledger import Event, Standing, Version, in_force
 
 @dataclass(frozen=True, slots=True)
 class CurrentStatus:
-    """Status now, and the reasons that stand: those that an approval was given in spite of, too.
+    """The status of a datasheet now, and the reasons for it.
 
-    `version` is the registered one, None where there is none of this content; `in_force` the one of
-    its motor that an export takes, None where no version is released.
+    Attributes
+    ----------
+    status
+        `released`, `provisional`, `refused` or `revoked`.
+    why
+        Reasons that stand, those in spite of which it was approved too.
+    version
+        The registered version with this content; None where there is none.
+    in_force
+        The version of the motor that an export takes; None where none is released.
+
     """
 
     status: Standing
@@ -40,10 +49,23 @@ class CurrentStatus:
 def current_status(
     sheet: Datasheet, history: Sequence[Version] = (), content_sha256: str | None = None
 ) -> CurrentStatus:
-    """The status of a datasheet by the `history` of its motor in the registry, oldest first.
+    """The status of a datasheet by what people decided of it.
 
-    Without a history it is what the datasheet says of itself. So it is where `content_sha256`, the
-    digest of the datasheet's file, is not the one that is registered: no decision was on that.
+    Parameters
+    ----------
+    sheet
+        The datasheet.
+    history
+        The versions of its motor in the registry, oldest first.
+    content_sha256
+        Digest of the datasheet's file; None where there is no file to compare.
+
+    Returns
+    -------
+    CurrentStatus
+        What the datasheet says of itself where no version of that content is registered: no
+        decision was on that content.
+
     """
     valid = in_force(history)
     for version in history:
@@ -54,7 +76,21 @@ def current_status(
 
 
 def status_of(version: Version, valid: Version | None) -> CurrentStatus:
-    """The status of a registered version; `valid` is the version of its motor that is in force."""
+    """The status of a registered version.
+
+    Parameters
+    ----------
+    version
+        The version with its decisions.
+    valid
+        The version of its motor that is in force, None where none is released.
+
+    Returns
+    -------
+    CurrentStatus
+        Once a person has decided, the reason that an approval is awaited is left out.
+
+    """
     why = version.published.reasons
     if version.decisions:
         why = tuple(reason for reason in why if reason != AWAITS_APPROVAL)

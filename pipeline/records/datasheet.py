@@ -20,17 +20,41 @@ AWAITS_APPROVAL = (
 
 
 def left_to_a_person(reason: str) -> bool:
-    """Whether a person may approve a datasheet in spite of a reason in its `why`.
+    """Whether a person may approve a datasheet in spite of a reason.
 
-    So it is where nothing but the approval lacks, and where the model of the motor leaves something
-    in its captures or could not be tested: constants are measured, what else the motor does is not.
+    Parameters
+    ----------
+    reason
+        One entry of `why`.
+
+    Returns
+    -------
+    bool
+        True for a missing approval and for a reason about the model: constants are measured, what
+        else the motor does is not. A failed check or a missing constant is never left to a person.
+
     """
     return reason == AWAITS_APPROVAL or reason.startswith(MODEL_REASON)
 
 
 @dataclass(frozen=True, slots=True)
 class Check(PlainRecord):
-    """One cross-check. `value` is judged against `limit` [unit]; both None if not evaluated."""
+    """One comparison of constants that were found in different ways.
+
+    Attributes
+    ----------
+    name
+        Name of the rule.
+    status
+        `pass`, `marginal`, `fail`, or `not_evaluated` where something is missing.
+    meaning
+        What was compared, or what is missing, in one sentence.
+    value, limit, unit
+        What is judged, and the limit that it is held to; None where not evaluated.
+    suspect
+        The convention or capture that would explain a failure.
+
+    """
 
     name: str
     status: CheckStatus
@@ -47,6 +71,22 @@ class CaptureReference(PlainRecord):
 
     `sha256` is that of its bytes, `read_sha256` that of what was read from them: columns, metadata
     and masks, after units, signs and gates. None in datasheets written before it existed.
+
+    Attributes
+    ----------
+    file that a datasheet rests on.
+    path
+        Relative to the input folder.
+    sha256
+        Digest of the file's bytes.
+    test, station, started_at
+        What the file says of itself.
+    integrity
+        `verified` or `unverified`.
+    read_sha256
+        Digest of what was read: columns, metadata and masks, after units, signs and gates. None in
+        datasheets that were written before it existed.
+
     """
 
     path: str
@@ -69,10 +109,35 @@ class Superseded(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Datasheet:
-    """Everything known of one motor, reproducibly: same inputs, configuration, code, bytes.
+    """Everything known of one motor: the same inputs, configuration and code give the same bytes.
 
-    `libraries` are the versions of Python and of the libraries that the numbers hang on.
-    `model` is None in datasheets of before there was a residual test.
+    Attributes
+    ----------
+    motor_id, motor_type, lot
+        The motor.
+    version
+        Digest of captures, configuration, code and libraries.
+    status
+        `released`, `provisional` or `refused`.
+    why
+        Reasons against a release, one sentence each.
+    captures
+        The files that it rests on.
+    config_sha256, code_version
+        Digests of the settings and of the code that fitted and checked.
+    constants
+        The preferred estimate of each constant, or why there is none.
+    alternatives
+        Estimates of the same constants by other methods.
+    checks
+        Cross-checks.
+    libraries
+        Versions of Python and of the libraries that the numbers depend on.
+    supersedes
+        The revoked version that it replaces.
+    model
+        The residual test; None in datasheets of before there was one.
+
     """
 
     motor_id: str

@@ -25,8 +25,17 @@ class ReportedParameter(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Separation(PlainRecord):
-    """An experiment that parts two effects, with the power it is predicted to have at the 1 %
-    level; None where that cannot be predicted.
+    """An experiment that separates two effects.
+
+    Attributes
+    ----------
+    against
+        The other effect.
+    experiment
+        What to record, in one line.
+    power
+        Predicted power at the 1 % level [1]; None where it cannot be predicted.
+
     """
 
     against: str
@@ -36,12 +45,33 @@ class Separation(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class RankedEffect(PlainRecord):
-    """One effect's evidence. `score`: fall of the deviance less the BIC penalty of its parameters.
+    """The evidence for one effect.
 
-    `held_out_drop`: share of the removable held-out error that goes with it. `parameters`: value
-    and standard uncertainty by name, where it was fitted. Of an effect that is not called for,
-    `size` is its largest amplitude over the least that matters, `shortfall` why it is not named.
-    `headline` is what a person says of a found one, with its size.
+    Attributes
+    ----------
+    effect
+        Its name.
+    score
+        Fall of the deviance (−2 log L) less the BIC penalty of its parameters [1].
+    held_out_drop
+        Share of the removable held-out error that goes with it [1].
+    p_value
+        Chance of such a score without the effect.
+    confused_with
+        Names of effects that explain the same within uncertainty.
+    explanation, experiment
+        What it does, and the test that would show it best.
+    parameters
+        Value, standard uncertainty and unit by name, where it was fitted.
+    separation
+        Experiments that would separate it from others.
+    size
+        Largest amplitude over the least that matters [1]; of an effect that is not missing.
+    shortfall
+        Why it is not reported as missing.
+    headline
+        One phrase with its size, for people.
+
     """
 
     effect: str
@@ -74,10 +104,24 @@ class RungError(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Signature(PlainRecord):
-    """What came with a rung, as people look at it: mean errors of a signal [unit] without it and
-    with it, [n] each, `at` values of a variable, a glossary name [its unit]. `capture` is None
-    where it is of all captures together. With an `order` above 1, `at` is the angle [rad] within
-    one of so many waves a turn of the variable, laid over each other.
+    """The mean error of a signal over what it depends on, before and after an effect was added.
+
+    Attributes
+    ----------
+    signal, unit
+        Glossary name, and the unit of `before` and `after`.
+    variable
+        Glossary name of what the error depends on.
+    capture
+        The capture, None where all captures are taken together.
+    at
+        Centres [n] of the cells of the variable [its unit]; with an `order` above 1, the angle
+        [rad] within one of that many waves a turn, folded onto each other.
+    before, after
+        Mean errors [n] without the effect and with it.
+    order
+        Waves a turn of the variable.
+
     """
 
     signal: str
@@ -97,11 +141,25 @@ class Signature(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class LadderRung(PlainRecord):
-    """A model's held-out error, 1 at the noise floor, and rms error of each signal [its unit].
+    """One step of the search: a model, and its held-out error.
 
-    For looking: `errors` are those of `signals` beside their noise floors, `parameters` those of
-    the effects on this rung (value, standard uncertainty, unit), `maps` where the error lives,
-    `histograms` how it is spread, `signature` what gives away that which came with the rung.
+    Attributes
+    ----------
+    effects
+        Effects in the model.
+    held_out
+        Held-out error over the noise floor [1].
+    signals
+        Rms held-out error of each signal [its unit].
+    errors
+        The same beside their noise floors.
+    parameters
+        Parameters of the effects on this step.
+    maps, histograms
+        Where the error lies, and how it is distributed.
+    signature
+        What shows the effect that this step added.
+
     """
 
     effects: tuple[str, ...]
@@ -114,7 +172,21 @@ class LadderRung(PlainRecord):
     signature: Signature | None = None
 
     def map_of(self, signal: str, *variables: str) -> ErrorMap | None:
-        """The map of a signal over one variable, or over x and y."""
+        """The error map of a signal over one or two variables.
+
+        Parameters
+        ----------
+        signal
+            Glossary name.
+        *variables
+            The one variable, or those of x and y, in that order.
+
+        Returns
+        -------
+        ErrorMap or None
+            None where there is none of just these variables.
+
+        """
         for one in self.maps:
             axes = (one.x.variable,) if one.y is None else (one.x.variable, one.y.variable)
             if one.signal == signal and axes == variables:
@@ -163,11 +235,29 @@ class AlternativeVariables(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class UnknownStructure(PlainRecord):
-    """Error that no known effect explains: where it acts, on what it depends, its shape.
+    """Error that no known effect explains: where it acts, on what it depends, and its shape.
 
-    `curve` runs over the first of `variables`, temperatures counted from 25 degC; `times` is what
-    multiplies it. `alternatives`: variables that explain nearly as much, with their share of the
-    held-out evidence. `effect` is the name of an effect whose file has the text `source`.
+    Attributes
+    ----------
+    signal
+        The signal in which it shows.
+    variables
+        Glossary names of what it depends on.
+    shape
+        The dependence in words.
+    sketch
+        Terms of the dependence with their coefficients.
+    expression
+        The same as one formula.
+    curve
+        Over the first of `variables`, temperatures counted from 25 degC.
+    times
+        What multiplies the curve.
+    alternatives
+        Variables that explain nearly as much, with their share of the held-out evidence.
+    effect, source
+        Name of an effect, and the text of a file that defines it.
+
     """
 
     signal: str
@@ -190,8 +280,17 @@ class UnknownStructure(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Unexcited(PlainRecord):
-    """An effect of which these captures can say nothing: the tests that would show it, by name,
-    what to do in them, and the signals that the captures of these tests lack.
+    """An effect of which these captures can say nothing.
+
+    Attributes
+    ----------
+    effect
+        Its name.
+    tests, experiment
+        The tests that would show it, and what to do in them.
+    signals
+        Signals that the captures of these tests lack.
+
     """
 
     effect: str
@@ -209,11 +308,35 @@ class Unexcited(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis(PlainRecord):
-    """The verdict on one motor's model, with the ladder that leads to it.
+    """The verdict on the model of one motor, with the search that leads to it.
 
-    `asked`: effects that were asked for beside the `model`'s own; the first rung holds them.
-    `combinations` are known where their parameters, on the last rung, are not. `policy`: digest of
-    the constants of judgement.
+    Attributes
+    ----------
+    motor_id, model
+        The motor, and the name of the model.
+    verdict
+        `adequate`, `missing`, `unknown` or `insufficient`.
+    missing
+        Effects that the model lacks.
+    ranking
+        Evidence for each effect.
+    ladder
+        Steps of the search; the first holds the model as requested.
+    unknown
+        What no known effect explains; None where nothing is left.
+    remainder
+        Where error over the noise floor is left.
+    notes
+        Remarks, one sentence each.
+    unexcited
+        Effects that these captures cannot show.
+    asked
+        Effects that were requested beside the model's own.
+    combinations
+        What is known of parameters of the last step that are not known one by one.
+    policy
+        Digest of the constants of judgement.
+
     """
 
     motor_id: str

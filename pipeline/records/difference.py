@@ -12,7 +12,16 @@ from pipeline.records.uncertainty import Budget, covariance
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One constant before and after; None where a datasheet does not hold it."""
+    """One constant before and after.
+
+    Attributes
+    ----------
+    name
+        Name of the constant.
+    before, after
+        The estimates; None where a datasheet does not hold the constant.
+
+    """
 
     name: str
     before: Estimate | None
@@ -64,7 +73,19 @@ class Change:
 
 
 def changes(before: Mapping[str, Estimate], after: Mapping[str, Estimate]) -> tuple[Change, ...]:
-    """Every constant of either datasheet, by name."""
+    """Every constant of either of two datasheets, sorted by name.
+
+    Parameters
+    ----------
+    before, after
+        Estimates by name.
+
+    Returns
+    -------
+    tuple of Change
+        One a name; a side that lacks the name is None.
+
+    """
     return tuple(
         Change(name, before.get(name), after.get(name)) for name in sorted({*before, *after})
     )

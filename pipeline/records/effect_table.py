@@ -44,7 +44,16 @@ class EffectTable(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class EffectTables:
-    """The tables of a motor's effects, and why others have none, by the name of the effect."""
+    """The tables of a motor's effects.
+
+    Attributes
+    ----------
+    tables
+        One for each quantity that an effect adds.
+    without
+        Why an effect has no table, by its name.
+
+    """
 
     tables: tuple[EffectTable, ...] = ()
     without: Mapping[str, str] = field(default_factory=dict)

@@ -16,7 +16,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Bins(PlainRecord):
-    """The cells of one variable, a glossary name: cell n runs from edge n to edge n + 1."""
+    """The cells of one variable.
+
+    Attributes
+    ----------
+    variable
+        Glossary name.
+    edges
+        Ascending [the variable's unit]: cell n runs from edge n to edge n + 1.
+
+    """
 
     variable: str
     edges: tuple[float, ...]
@@ -29,11 +38,25 @@ class Bins(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class ErrorMap(PlainRecord):
-    """Mean error of one signal [unit] over cells of `x` [X], or of `y` and `x` [Y, X].
+    """Mean error of one signal over cells of one variable, or of two.
 
-    `count` are the samples of each cell, `mean` is NaN where there are none. `p_value` is that of
-    a mean this far from zero by chance, NaN where there are too few visits; `p_map` that of means
-    this far from each other. `explained` is the share of the error's variance between the cells.
+    Attributes
+    ----------
+    signal, unit
+        Glossary name and unit of the signal.
+    x, y
+        Cells of the variables; `y` is None for a map of one variable.
+    count
+        Samples of each cell, [X] or [Y, X].
+    mean
+        Mean error of each cell [unit], NaN for a cell without samples.
+    p_value
+        Chance of a mean this far from zero, NaN where there are too few visits to a cell.
+    explained
+        Share of the error's variance that lies between the cells [1].
+    p_map
+        Chance of means this far from each other.
+
     """
 
     signal: str
@@ -69,9 +92,17 @@ class ErrorMap(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Histogram(PlainRecord):
-    """How often [H] a signal's error, over its noise floor, falls between the edges [H + 1].
+    """How often the error of a signal takes a value.
 
-    Errors beyond the last edges are counted in the outermost bins.
+    Attributes
+    ----------
+    signal
+        Glossary name.
+    edges
+        Of the bins [H + 1], in noise floors.
+    count
+        Errors of each bin [H]; those beyond the last edges are counted in the outermost bins.
+
     """
 
     signal: str

@@ -30,7 +30,26 @@ class UsageError(PipelineError):
 
 
 def meant(typed: str, known: Iterable[str]) -> str:
-    """A remedy for a name that there is not: the nearest one, and all."""
+    """A remedy for a name that there is not: the nearest one, and all.
+
+    Parameters
+    ----------
+    typed
+        What the user wrote.
+    known
+        The names that there are.
+
+    Attributes
+    ----------
+    remedy for a name that there is not
+        the nearest one, and all that there are.
+
+    Returns
+    -------
+    str
+        `did you mean X? known are ...`, without the question where none is near.
+
+    """
     names = list(known)
     near = get_close_matches(typed, names, 1)
     shown = f"known are {', '.join(names)}" if names else "there is none"
@@ -46,8 +65,17 @@ class MachineError(PipelineError):
 class CaptureError(PipelineError):
     """One capture cannot be used; the rest of the batch goes on.
 
-    `code` is a short stable word (`truncated`, `missing_column`, ...), `rows` the first and
-    last offending row counted from 0, or None where the fault is not in rows.
+    Parameters
+    ----------
+    code
+        Short stable identifier, such as `truncated` or `missing_column`.
+    message
+        What is wrong; what is longer than `MOST_CHARS` is cut.
+    remedy
+        What the user can do about it.
+    rows
+        First and last offending row counted from 0; None where the fault is not in rows.
+
     """
 
     exit_code = 3
@@ -73,10 +101,19 @@ class RecordingError(PipelineError):
 
 
 def merged(faults: Sequence[CaptureError]) -> CaptureError:
-    """One error that says every fault: code, rows and remedy are the first one's.
+    """One error that reports several faults of a capture.
 
-    Each further fault stands in the message with its own code, rows and remedy; a remedy that is
-    the first one's is not repeated.
+    Parameters
+    ----------
+    faults
+        At least one; the first gives code, rows and remedy.
+
+    Returns
+    -------
+    CaptureError
+        The further faults stand in its message, each with code, rows and remedy; a remedy that is
+        the first one's is not repeated.
+
     """
     first, rest = faults[0], faults[1:]
     others = "".join(f"; also {_beside(fault, first.remedy)}" for fault in rest)

@@ -21,8 +21,17 @@ MOST = 1e150
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One order a turn that was found: amplitude and its u [unit of the estimate], phase of its
-    cosine [rad].
+    """One order a turn that was found.
+
+    Attributes
+    ----------
+    order
+        Cycles a mechanical turn.
+    amplitude, u
+        With its standard uncertainty [unit of the estimate].
+    phase_rad
+        Of its cosine.
+
     """
 
     order: int
@@ -33,13 +42,43 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One constant of one motor. `value` is None exactly when `status` is not_identifiable.
+    """One constant of one motor.
 
-    `method` is the estimator's name, `at` the conditions the value holds for (names from the
-    glossary, unit last), `bounds` the range it was searched in, `captures` the paths it used,
-    `orders` the spectrum behind it, where it has one. `impossible`: it came out where no motor is,
-    by more than its uncertainty explains, so a clock, a sign or a unit of `captures` is wrong.
-    `settled`: it was searched for and is absent, down to the size in the note.
+    Attributes
+    ----------
+    name, unit
+        Names of the glossary.
+    value
+        None exactly when `status` is `not_identifiable`.
+    status
+        `measured`, `derived` from other constants, `assumed`, `stated`, or `not_identifiable`.
+    method
+        Name of the estimator.
+    budget
+        Contributions to the standard uncertainty [unit].
+    at
+        Conditions that the value holds for; names of the glossary, unit last.
+    captures
+        Paths of the captures that were used.
+    note
+        Remark for people.
+    bounds
+        Range that was searched [unit].
+    at_bound
+        Whether the value lies at an end of that range.
+    orders
+        The spectrum that the value was taken from.
+    impossible
+        The value lies where no motor is, by more than its uncertainty explains: a clock, a sign or
+        a unit of `captures` is wrong.
+    settled
+        It was searched for and is absent, down to the size in the note.
+
+    Raises
+    ------
+    ValueError
+        The value is not finite, or is None with another status than `not_identifiable`.
+
     """
 
     name: str
@@ -158,12 +197,44 @@ class Estimate:
 
 
 def not_identifiable(name: str, unit: str, method: str, note: str) -> Estimate:
-    """The result that says which experiment is missing; `note` names it."""
+    """The result that says which experiment is missing; `note` names it.
+
+    Parameters
+    ----------
+    name, unit
+        Names of the glossary.
+    method
+        Name of the estimator.
+    note
+        Which experiment is missing.
+
+    Attributes
+    ----------
+    result without a value
+        the captures do not determine the constant.
+
+    """
     return Estimate(name, None, unit, "not_identifiable", method, note=note)
 
 
 def not_there(name: str, unit: str, method: str, note: str) -> Estimate:
-    """The result that says that it was looked for and not found; `note` names down to what size."""
+    """The result that says that it was looked for and not found; `note` names down to what size.
+
+    Parameters
+    ----------
+    name, unit
+        Names of the glossary.
+    method
+        Name of the estimator.
+    note
+        Down to what size it was searched for.
+
+    Attributes
+    ----------
+    result without a value
+        what was searched for is absent.
+
+    """
     return replace(not_identifiable(name, unit, method, note), settled=True)
 
 

@@ -13,9 +13,19 @@ PlotKind = Literal["line", "scatter", "bars"]
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One measured curve with its fit: `x`, `measured`, `fitted` are [n]; `fitted` may be empty.
+    """One measured curve with its fit; the residual is `measured` less `fitted`.
 
-    The residual is measured - fitted. `label` distinguishes the series of one plot.
+    Attributes
+    ----------
+    label
+        Distinguishes the series of one plot.
+    x
+        [n, unit of the plot's `x_name`].
+    measured
+        [n, unit of the plot's `y_name`].
+    fitted
+        [n], or empty where there is no fit.
+
     """
 
     label: str
@@ -26,10 +36,25 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """One plot of one estimator. `x_name` and `y_name` are glossary names (unit last).
+    """One plot of one estimator.
 
-    Where `x_name` is `t_s` and `capture` is set, the series are traces of that capture, `y_name`
-    is the measured column, and the recording shows them on its time line as well.
+    Attributes
+    ----------
+    estimator, title
+        Its name, and what the plot shows.
+    x_name, y_name
+        Glossary names, unit last. Where `x_name` is `t_s` and `capture` is set, the series are
+        traces of that capture and `y_name` is its column; a recording shows them on its time line
+        too.
+    kind
+        `line`, `scatter` or `bars`.
+    series
+        The curves.
+    capture
+        The capture that is shown, None for several.
+    caption
+        Text below the plot.
+
     """
 
     estimator: str

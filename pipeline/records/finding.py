@@ -15,7 +15,22 @@ Severity = Literal["refused", "warning"]
 
 @dataclass(frozen=True, slots=True, order=True)
 class Finding(PlainRecord):
-    """One line of `findings.json`; `rows` is the first and last row concerned, from 0."""
+    """One line of `findings.json`.
+
+    Attributes
+    ----------
+    file
+        Path of the file.
+    severity
+        `refused` or `warning`.
+    code
+        Short stable identifier.
+    message, remedy
+        What is wrong, and what to do about it.
+    rows
+        First and last row concerned, from 0.
+
+    """
 
     file: str
     severity: Severity
@@ -26,7 +41,16 @@ class Finding(PlainRecord):
 
     @classmethod
     def refusal(cls, file: str, error: CaptureError) -> Finding:
-        """The finding for a capture that had to be refused."""
+        """The finding for a capture that had to be refused.
+
+        Parameters
+        ----------
+        file
+            Path of the capture.
+        error
+            Why it was refused.
+
+        """
         return cls(file, "refused", error.code, error.message, error.remedy, error.rows)
 
     def line(self) -> str:
@@ -40,10 +64,21 @@ MOST_LINES_OF_A_KIND = 3
 
 
 def lines_of(findings: Iterable[Finding]) -> list[str]:
-    """The lines that standard error carries: one a refused file, and one a cause of many warnings.
+    """Findings as the lines of standard error: one a refused file, and one a cause of many
+    warnings.
 
-    Warnings of one code and remedy that concern more than three findings are one line with the
-    count of findings and files, at the place of the first; `findings.json` holds them all.
+    Parameters
+    ----------
+    findings
+        In the order of the files.
+
+    Returns
+    -------
+    list of str
+        Warnings of one code and remedy that concern more than `MOST_LINES_OF_A_KIND` findings are
+        one line with the count of findings and files, at the place of the first. `findings.json`
+        holds them all.
+
     """
     every = list(findings)
     kinds: dict[tuple[str, str], list[Finding]] = {}

@@ -23,12 +23,28 @@ START = "0" * 64
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One row of the registry, in the order of commits: `sequence` counts 1, 2, ... over all.
+    """One row of the registry, in the order of commits.
 
-    `revision` counts the versions of one motor. `chain` is the sha256 of this row and the chain of
-    the row before, so that no row can be changed, lost or put in without notice. What a datasheet
-    says of itself (`motor_type` to `content_sha256`) is there for `publish` alone, `by` and `why`
-    for the decisions alone; the `why` of a tag is its name.
+    Attributes
+    ----------
+    sequence
+        1, 2, ... over all rows.
+    recorded_at
+        Time of the commit, UTC.
+    kind
+        `publish`, `approve`, `revoke`, `tag` or `untag`.
+    motor_id, version
+        The datasheet that it concerns.
+    revision
+        Counts the versions of one motor from 1.
+    motor_type, lot, stations, status, reasons, content_sha256
+        Of the datasheet; for `publish` alone.
+    by, why
+        Who decided, and why; the `why` of a tag is its name.
+    chain
+        sha256 of this row and of the `chain` before it, so that no row can be changed, removed or
+        inserted without notice.
+
     """
 
     sequence: int
@@ -53,7 +69,14 @@ class Event:
         return self.motor_id, self.version
 
     def linked(self, before: str) -> Event:
-        """This event with its chain, given the chain of the row before it."""
+        """This event with its chain.
+
+        Parameters
+        ----------
+        before
+            The chain of the row before it; `START` for the first row.
+
+        """
         return replace(self, chain=_link(self, before))
 
 
@@ -76,9 +99,17 @@ class Revocation:
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """One version of a motor's datasheet and what was decided of it, oldest decision first.
+    """One version of a motor's datasheet, and what was decided of it.
 
-    `tags` are the names that it bears.
+    Attributes
+    ----------
+    published
+        The row that entered it.
+    decisions
+        Approvals and revocations, oldest first.
+    tags
+        Names that it bears.
+
     """
 
     published: Event
@@ -139,9 +170,21 @@ class Version:
 def histories(
     events: Iterable[Event], until: datetime | None = None
 ) -> Mapping[str, tuple[Version, ...]]:
-    """The versions of each motor, oldest first, as they stood at a moment (now, without one).
+    """The versions of each motor as they stood at a moment.
 
-    A version published twice counts once, by its first row; motors are sorted.
+    Parameters
+    ----------
+    events
+        Rows of the registry, in any order.
+    until
+        The moment; None for now.
+
+    Returns
+    -------
+    mapping of str to tuple of Version
+        Motors sorted, versions oldest first. A version that was published twice counts once, by its
+        first row.
+
     """
     published: dict[tuple[str, str], Event] = {}
     decided: dict[tuple[str, str], list[Event]] = {}
@@ -165,17 +208,40 @@ def histories(
 
 
 def in_force(history: Sequence[Version]) -> Version | None:
-    """The newest released version of a motor; None where nothing is released."""
+    """The version of a motor that an export takes.
+
+    Parameters
+    ----------
+    history
+        The versions of one motor.
+
+    Returns
+    -------
+    Version or None
+        The newest released one; None where none is released.
+
+    """
     released = [version for version in history if version.status == "released"]
     return max(released, key=lambda version: version.revision, default=None)
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which versions are meant; what is None does not matter.
+    """Which versions of the registry are meant; what is None does not matter.
 
-    `version` is a beginning of the digest, `since` and `until` bound when the version was
-    published, and `until` is also the moment whose status counts.
+    Attributes
+    ----------
+    motor_id, motor_type, lot, station
+        Of the datasheet.
+    status
+        The status at `until`.
+    version
+        Beginning of the digest.
+    revision
+        Number of the version of its motor.
+    since, until
+        Bounds on when it was published.
+
     """
 
     motor_id: str | None = None
@@ -189,7 +255,14 @@ class Selection:
     until: datetime | None = None
 
     def takes(self, version: Version) -> bool:
-        """Whether a version is meant."""
+        """Whether a version is selected.
+
+        Parameters
+        ----------
+        version
+            A version as it stood at `until`.
+
+        """
         own = version.published
         equal = (
             (self.motor_id, own.motor_id),
@@ -207,22 +280,47 @@ class Selection:
 
 
 def select(events: Iterable[Event], wanted: Selection) -> tuple[Version, ...]:
-    """Every version that is meant, by motor and revision."""
+    """Every version of the registry that is selected, by motor and revision.
+
+    Parameters
+    ----------
+    events
+        Rows of the registry.
+    wanted
+        Which versions are meant.
+
+    """
     motors = histories(events, wanted.until)
     return tuple(v for history in motors.values() for v in history if wanted.takes(v))
 
 
 def newest(versions: Iterable[Version]) -> tuple[Version, ...]:
-    """The newest of each motor's versions, in the order of motors."""
+    """The newest version of each motor, sorted by motor.
+
+    Parameters
+    ----------
+    versions
+        Versions of any motors, in any order.
+
+    """
     last = {v.motor_id: v for v in sorted(versions, key=lambda v: (v.motor_id, v.revision))}
     return tuple(last.values())
 
 
 def faults(events: Sequence[Event]) -> list[str]:
-    """Everything that no registry written by this project shows, one sentence each.
+    """Whatever a registry shows that this project would not have written.
 
-    Gaps and repeats of the sequence and of a motor's revisions, a version published twice, a
-    decision on nothing, a chain that does not hold.
+    Parameters
+    ----------
+    events
+        Every row, in the order in which it is stored.
+
+    Returns
+    -------
+    list of str
+        One sentence a fault: gaps and repeats of the sequence or of a motor's revisions, a version
+        published twice, a decision on no version, a chain that does not hold.
+
     """
     found: list[str] = []
     chain, revisions, seen = START, dict[str, int](), set[tuple[str, str]]()

@@ -19,13 +19,40 @@ RULES: dict[RuleName, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Amount:
-    """A size: in the constant's unit, or as a share of nominal, motor sd or U."""
+    """A size: in the constant's unit, or as a share of nominal, motor sd or U.
+
+    Attributes
+    ----------
+    size in a limits file.
+    value
+        In what `per` says.
+    per
+        `unit` for the constant's unit, `nominal` for a share of the nominal value, `sd` for
+        standard deviations between motors, `U` for expanded uncertainties.
+
+    """
 
     value: float
     per: Per
 
     def in_unit(self, nominal: float, sd: float | None, expanded_u: float | None) -> float | None:
-        """The size in the constant's unit; None where what it counts in is not known."""
+        """The size in the constant's unit.
+
+        Parameters
+        ----------
+        nominal
+            Nominal value [unit].
+        sd
+            Standard deviation between motors [unit], None where it is not known.
+        expanded_u
+            Expanded uncertainty U of a value [unit], None where it is not known.
+
+        Returns
+        -------
+        float or None
+            None where what the size counts in is not known or not finite.
+
+        """
         scale = {"unit": 1.0, "nominal": abs(nominal), "sd": sd, "U": expanded_u}[self.per]
         return None if scale is None or not math.isfinite(scale) else self.value * scale
 
@@ -34,11 +61,28 @@ class Amount:
 class ConstantLimits:
     """The limits of one constant; what is None is not limited.
 
-    `nominal` None is the mean of the baseline. `tolerance` is what the design allows either side
-    of nominal; `minimum` and `maximum` [unit] are test limits that replace it on their side. The
-    largest of `margins` that can be worked out is the margin of sameness. `decides`: the lot does
-    not pass while this constant is undecided. `tolerate`: a change that is significant but shown
-    to lie within the margin is marginal instead of a failure.
+    Attributes
+    ----------
+    name
+        Name of the constant.
+    nominal
+        Nominal value [unit]; None stands for the mean of the baseline.
+    tolerance
+        What the design allows on either side of nominal.
+    minimum, maximum
+        Test limits [unit]; each replaces the tolerance on its side.
+    guard_band
+        Distance of the acceptance limit from the tolerance limit.
+    rule
+        Decision rule of ILAC-G8.
+    margins
+        The largest that can be evaluated is the margin of equivalence.
+    decides
+        Whether the lot does not pass while this constant is undecided.
+    tolerate
+        Whether a significant change that is shown to lie within the margin is marginal and no
+        failure.
+
     """
 
     name: str
@@ -59,6 +103,30 @@ class Limits:
 
     A cogging order counts as new from `order_share` of the leading amplitude on. For versions of
     the code, a change is negligible below `code_negligible` u and fails above `code_limit` u.
+
+    Attributes
+    ----------
+    limits file.
+    name, sha256
+        Of the file.
+    required
+        Constants that a released datasheet must hold.
+    constants
+        Limits of the constants that are compared.
+    golden
+        Motors that are measured on several stations.
+    alpha
+        Significance level of each family of tests.
+    min_lots
+        Fewest baseline lots for the lot-level test.
+    k
+        Coverage factor of U.
+    order_share
+        A cogging order counts as new from this share of the leading amplitude on.
+    code_negligible, code_limit
+        A change between versions of the code is negligible below the first and fails above the
+        second [standard uncertainties].
+
     """
 
     name: str
@@ -113,7 +181,28 @@ def amount_from(text: str) -> Amount:
 
 
 def number_from(text: str) -> float:
-    """A finite number; raises UsageError otherwise."""
+    """A finite number; raises UsageError otherwise.
+
+    Parameters
+    ----------
+    text
+        Such as `0.0071`.
+
+    Attributes
+    ----------
+    finite number from the text of a limits file.
+
+    Returns
+    -------
+    float
+        Finite.
+
+    Raises
+    ------
+    UsageError
+        The text is no finite number.
+
+    """
     try:
         value = float(text)
     except (TypeError, ValueError):

@@ -26,10 +26,26 @@ Decision = Literal["pass", "conditional_pass", "conditional_fail", "fail", "not_
 
 @dataclass(frozen=True, slots=True)
 class MotorValue:
-    """One motor's value [unit] with its standard uncertainty, and what the limits say of it.
+    """The value of one motor, and how the limits judge it.
 
-    `value` is corrected for the station by `correction`. `z` is its robust distance from its lot
-    in standard deviations between motors; `capture` is the file that the value rests on most.
+    Attributes
+    ----------
+    motor_id, lot, side, stations
+        The motor, and where it was measured.
+    value, u
+        At the reference temperature, corrected for the station, with its standard uncertainty
+        [unit].
+    correction
+        Bias of the station that was taken off [unit].
+    decision
+        By the decision rule of the limits.
+    z
+        Robust distance from its lot in standard deviations between motors [1].
+    outlier
+        Whether that distance is significant.
+    capture
+        The file that the value depends on most.
+
     """
 
     motor_id: str
@@ -47,10 +63,23 @@ class MotorValue:
 
 @dataclass(frozen=True, slots=True)
 class LotMean:
-    """One lot in the order of time: mean over its motors, and the chart over lot means.
+    """One lot in the order of time, on the control chart of lot means.
 
-    `ewma` is the exponentially weighted mean after this lot, in control within `ewma_low` and
-    `ewma_high`; None where there is no history to chart against.
+    Attributes
+    ----------
+    lot, side, started_at
+        The lot, and ISO 8601 time of its first capture.
+    motors
+        How many.
+    mean, u, sd
+        Mean of the motors, its standard uncertainty, and the standard deviation between motors
+        [unit].
+    ewma, ewma_low, ewma_high
+        Exponentially weighted mean after this lot and its control limits [unit]; None without
+        history to chart against.
+    signal
+        Whether the chart signals.
+
     """
 
     lot: str
@@ -68,10 +97,21 @@ class LotMean:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Limits [unit]: tolerance, acceptance limits inside it (guard band off), margin of sameness.
+    """The limits of a constant in its unit; None on a side that is not limited.
 
-    The specification limits are `lower` and `upper`; None on a side that is not limited.
-    `margin` is the largest difference of lot means that still counts as the same.
+    Attributes
+    ----------
+    nominal
+        Nominal value [unit].
+    lower, upper
+        Specification limits [unit].
+    accept_lower, accept_upper
+        Acceptance limits [unit]: the guard band inside.
+    guard_band, rule
+        Width of the guard band [unit], and the decision rule.
+    margin
+        Largest difference of lot means that still counts as equivalent [unit].
+
     """
 
     nominal: float | None
@@ -94,10 +134,23 @@ class Count:
 
 @dataclass(frozen=True, slots=True)
 class Conformity:
-    """How many candidate motors the limits pass, by decision; the worst one named.
+    """How many motors of the candidate conform, by decision.
 
-    The risks are those of the decision rule for motors spread like the candidate's: accepted
-    though outside the tolerance, and rejected though inside (JCGM 106).
+    Attributes
+    ----------
+    counts
+        Motors by decision.
+    worst, worst_motor
+        The worst decision, and the motor that has it.
+    risk_false_accept, risk_false_reject
+        Probability of a motor accepted though outside the tolerance, and rejected though inside,
+        for motors distributed as the candidate's.
+
+    References
+    ----------
+    JCGM 106:2012, Evaluation of measurement data: the role of measurement uncertainty in conformity
+    assessment.
+
     """
 
     counts: tuple[Count, ...]
@@ -112,6 +165,22 @@ class LotTest:
     """t test whose unit is the lot: is the candidate beyond the baseline lots' own scatter.
 
     `status` is INSUFFICIENT_HISTORY below `needed` baseline lots; then there is no p value.
+
+    Attributes
+    ----------
+    t test whose unit is the lot
+        is the candidate beyond the scatter of the baseline lots.
+    status
+        `INSUFFICIENT_HISTORY` below `needed` baseline lots; there is no p-value then.
+    lots, needed
+        Baseline lots that there are, and that the test needs.
+    t, dof, p_value
+        The statistic, its degrees of freedom, and the p-value.
+    p_holm
+        The p-value after Holm's correction over the constants.
+    significant
+        Whether that is below the level.
+
     """
 
     status: Literal["evaluated", "INSUFFICIENT_HISTORY", "CONFOUNDED", "not_evaluated"]
@@ -126,10 +195,20 @@ class LotTest:
 
 @dataclass(frozen=True, slots=True)
 class Equivalence:
-    """Two one-sided tests of the difference of means against the margin.
+    """Two one-sided tests of the difference of means against the margin of equivalence.
 
-    `low` and `high` bound the difference [unit] at 1 − 2 α. `equivalent`: wholly within the
-    margin; `different`: wholly outside; `undecided`: it lies across.
+    Attributes
+    ----------
+    status
+        `equivalent` where the interval lies within the margin, `different` where it lies outside,
+        `undecided` where it crosses it.
+    margin
+        Margin of equivalence [unit].
+    low, high
+        Interval of the difference at level 1 − 2 α [unit].
+    p_value, dof
+        Of the larger of the two one-sided tests.
+
     """
 
     status: Literal["equivalent", "different", "undecided", "not_evaluated"]
@@ -142,7 +221,20 @@ class Equivalence:
 
 @dataclass(frozen=True, slots=True)
 class EffectSize:
-    """Candidate minus baseline [unit] with u and U = k u; also relative, and in motor sd."""
+    """How far the candidate is from the baseline.
+
+    Attributes
+    ----------
+    difference, u
+        Difference of means and its standard uncertainty [unit].
+    k, expanded_u
+        Coverage factor, and U = k u [unit].
+    relative
+        Difference over the baseline's mean [1].
+    in_sd
+        Difference in standard deviations between motors [1].
+
+    """
 
     difference: float | None
     u: float | None
@@ -189,9 +281,22 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class Gauge:
-    """Gauge R&R by analysis of variance over motors repeated on stations [sd in unit].
+    """Gauge repeatability and reproducibility: analysis of variance of motors repeated on stations.
 
-    `percent` is the share of R&R in the total study variation, with its interval.
+    Attributes
+    ----------
+    motors, stations, repeats
+        Size of the study.
+    repeatability, reproducibility, rr, part
+        Standard deviations [unit] of one station's repeats, between stations, of both together, and
+        between motors.
+    percent, percent_low, percent_high
+        Share of R&R in the total study variation and its interval at `level` [%].
+    level
+        Of the interval [1].
+    verdict
+        `good`, `acceptable` or `not_acceptable`.
+
     """
 
     motors: int
@@ -249,5 +354,12 @@ class ConstantResult:
     missing: tuple[str, ...]
 
     def of(self, side: Side) -> tuple[MotorValue, ...]:
-        """The motors of one side."""
+        """The motors of one side.
+
+        Parameters
+        ----------
+        side
+            `baseline` or `candidate`.
+
+        """
         return tuple(motor for motor in self.motors if motor.side == side)

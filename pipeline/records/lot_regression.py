@@ -41,9 +41,23 @@ class LimitsUsed:
 class EffectChange:
     """How many motors of each side show an effect or a cogging order.
 
-    `name` is an effect of the library (`stribeck`), or `cogging_order_12`. `source` says what
-    showed it. `p_value` is Fisher's exact one over motors, `p_holm` after Holm. Amplitudes are
-    means over the motors that show it [unit].
+    Attributes
+    ----------
+    name
+        An effect of the library, such as `stribeck`, or `cogging_order_N`.
+    source
+        Whether diagnoses or datasheets show it.
+    verdict, why
+        Of this effect.
+    baseline_shown, baseline_of, candidate_shown, candidate_of
+        Motors that show it, and motors that could.
+    p_value, p_holm
+        Of Fisher's exact test over motors, and after Holm's correction.
+    baseline_amplitude, candidate_amplitude, unit
+        Means over the motors that show it.
+    motors
+        Candidate motors that show it.
+
     """
 
     name: str
@@ -107,11 +121,30 @@ class Outlier:
 
 @dataclass(frozen=True, slots=True)
 class LotRegression(PlainRecord):
-    """One comparison. `headline` is one sentence, `reasons` what led to the verdict.
+    """One comparison of lots, or of two versions of the code on the same captures.
 
-    `history` is INSUFFICIENT_HISTORY where the baseline has too few lots for the lot-level test,
-    whatever limits and equivalence could decide without it. `mode` `code`: the same captures
-    under two versions of the pipeline, motor by motor.
+    Attributes
+    ----------
+    mode
+        `lots`, or `code`, motor by motor.
+    verdict, headline, reasons
+        The result, one sentence on it, and what led to it.
+    history
+        `INSUFFICIENT_HISTORY` where the baseline has too few lots for the lot-level test, whatever
+        limits and equivalence decide without it.
+    baseline, candidate
+        The two groups.
+    limits
+        The limits in force.
+    constants, effects
+        Results of each constant and each effect.
+    orders, cogging
+        Cogging amplitudes by order, and the wave over the angle.
+    outliers
+        Motors apart from their lot.
+    golden, notes
+        Golden motors that were used; remarks.
+
     """
 
     mode: Literal["lots", "code"]

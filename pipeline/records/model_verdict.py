@@ -21,6 +21,19 @@ MODEL_REASON = "model: "
 class Excess(PlainRecord):
     """Where a residual is over its noise floor: rms over the floor [1] and the part of the rms
     that the floor does not explain [unit of the signal]; `order` a turn of the shaft, 0 for means.
+
+    Attributes
+    ----------
+    residual above its noise floor.
+    capture, signal
+        Where it was found.
+    order
+        Order a turn of the shaft; 0 for means.
+    floors
+        Rms over the noise floor [1].
+    size, unit
+        Part of the rms that the floor does not explain.
+
     """
 
     capture: str
@@ -39,10 +52,19 @@ class Excess(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class FoundEffect(PlainRecord):
-    """An effect that a model lacks: value, standard uncertainty and unit of its parameters by name.
+    """An effect that a model lacks.
 
-    `headline` says it with its size; `confused_with` is what else it could be, and `experiment`
-    what would separate them.
+    Attributes
+    ----------
+    parameters
+        Value, standard uncertainty and unit by name.
+    headline
+        One phrase with its size.
+    confused_with
+        Effects that explain the same within uncertainty.
+    experiment
+        What would separate them.
+
     """
 
     parameters: Parameters
@@ -55,15 +77,38 @@ class FoundEffect(PlainRecord):
 class ModelVerdict(PlainRecord):
     """The residual test of one motor against the noise floors of `diagnose`.
 
-    `verdict` is that of a diagnosis of the same model, or `not_tested`. `missing` with an empty
-    list of effects says that something is missing and was not searched for. `held_out` and
-    `residual` [noise floors] are the error of captures predicted without themselves and the largest
-    residual of any signal in any capture; None where no model was fitted. `held_out_with` is the
-    former with the effects found. `worst` is the largest one of a size that matters, `over` how
-    many of that size there are. `effects` were asked for beside the `model`'s own. `unknown` says
-    what depends on what, where no known effect explains it. `unexcited` are effects that no capture
-    would show. `fitted` are the parameters of `effects`, and `scales` the sizes of the machine
-    [unit of the name's suffix] that an effect's parameters are multiples of.
+    Attributes
+    ----------
+    verdict
+        That of a diagnosis of the same model, or `not_tested`. `missing` with no effects in
+        `missing` means that something is missing and was not searched for.
+    model, effects
+        Name of the model, and effects that were requested beside its own.
+    missing
+        Effects that were found, by name.
+    held_out
+        Error of captures that were predicted without themselves [noise floors]; None where no model
+        was fitted.
+    residual
+        Largest residual of any signal in any capture [noise floors].
+    worst
+        The largest residual of a size that matters.
+    over
+        How many residuals of such a size there are.
+    note
+        Why there was no test.
+    held_out_with
+        `held_out` with the effects that were found [noise floors].
+    unknown
+        What depends on what, where no known effect explains it.
+    unexcited
+        Effects that no capture would show.
+    fitted
+        Parameters of `effects`.
+    scales
+        Sizes of the machine [unit of the name's suffix] that parameters of effects are multiples
+        of.
+
     """
 
     verdict: ModelState
@@ -106,15 +151,28 @@ class ModelVerdict(PlainRecord):
         return words + (f" without {' and '.join(less)}" if less else "")
 
     def command(self, motor_id: str, folder: str = "FOLDER") -> str:
-        """The command that says what is missing in the captures of a `folder`.
+        """The command that diagnoses the captures of a folder.
 
-        A datasheet does not know its folder: the same captures give the same bytes anywhere.
+        Parameters
+        ----------
+        motor_id
+            The motor.
+        folder
+            A datasheet does not know its folder: the same captures give the same bytes anywhere.
+
         """
         where = f"input={shlex.quote(folder)} motor={shlex.quote(motor_id)}"
         return f"diagnose {where}{self._asked(self.effects)}"
 
     def adding(self, folder: str = "FOLDER") -> str:
-        """The command that runs a `folder` with the effects found; empty where none was."""
+        """The command that runs a folder with the effects that were found; empty where none was.
+
+        Parameters
+        ----------
+        folder
+            As the user wrote it.
+
+        """
         if not self.missing:
             return ""
         return f"run input={shlex.quote(folder)}{self._asked((*self.effects, *self.missing))}"
@@ -154,7 +212,19 @@ class ModelVerdict(PlainRecord):
         return text
 
     def reason(self, motor_id: str) -> str | None:
-        """Why the datasheet is not released by itself; None where the test was passed."""
+        """Why the datasheet is not released by itself.
+
+        Parameters
+        ----------
+        motor_id
+            The motor, for the command in the text.
+
+        Returns
+        -------
+        str or None
+            Begins with `MODEL_REASON`; None where the test was passed.
+
+        """
         if self.passed:
             return None
         remedy = ""
@@ -174,7 +244,24 @@ class ModelVerdict(PlainRecord):
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> ModelVerdict:
-        """The record that `document` wrote; raises as `record_of` for anything else."""
+        """The record that `document` wrote.
+
+        Parameters
+        ----------
+        document
+            Its JSON form.
+
+        Returns
+        -------
+        ModelVerdict
+            Keys that later versions added have their defaults where they are missing.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            The document has another form.
+
+        """
         fitted = document.get("fitted", ())
         changed = {
             "model": document.get("name", "standard"),
@@ -185,5 +272,17 @@ class ModelVerdict(PlainRecord):
 
 
 def number(floors: float) -> str:
-    """A number of noise floors for people: two digits below a hundred."""
+    """A number of noise floors for people: two digits below a hundred.
+
+    Parameters
+    ----------
+    floors
+        [noise floors].
+
+    Attributes
+    ----------
+    number of noise floors as text
+        whole from ten on, two digits below.
+
+    """
     return f"{floors:.0f}" if floors >= 10.0 else f"{floors:.2g}"

@@ -17,14 +17,28 @@ _CAPITALS = re.compile("(?<![A-Za-z])[A-Za-z]{1,2}(?=-?[0-9])")
 def file_stem(motor_id: str) -> str:
     """The file name, without extension, that stands for a motor.
 
-    ASCII letters, digits and `-_.` stay; every other byte of the UTF-8 form becomes `~` and two
-    hex digits, as do a first `-` or `.`, a last `.`, and the first letter of a name that Windows
-    keeps for devices or that a folder of pages keeps for its first page. Two ids that differ in
-    case alone must differ on every file system: one or two letters before a number are expected
-    in capitals, all others in small letters (`joint-P0`, `SN-12`), and an id written otherwise
-    ends in `~u` and a hex mask of the letters that deviate (bit 0 is the first). What is then
-    longer than `MAX_CHARS` keeps a readable beginning and ends in `~h` and a sha256. The empty id
-    is `~n`. No two ids share a name, whatever the case.
+    Parameters
+    ----------
+    motor_id
+        Any text.
+
+    Returns
+    -------
+    str
+        At most `MAX_CHARS` characters; no two motors share a name, whatever its case.
+
+    Notes
+    -----
+    ASCII letters, digits and `-_.` stay. Every other byte of the UTF-8 form becomes `~` and two
+    hexadecimal digits, as do a first `-` or `.`, a last `.`, and the first letter of a name that
+    Windows keeps for devices or that a folder of pages keeps for its first page.
+
+    Two ids that differ in case alone must differ on every file system. One or two letters before a
+    number are expected in capitals, all others in small letters (`joint-P0`, `SN-12`); an id
+    written otherwise ends in `~u` and a hexadecimal mask of the letters that deviate (bit 0 is the
+    first). What is then too long keeps a readable beginning and ends in `~h` and a sha256. The
+    empty id is `~n`.
+
     """
     if not motor_id:
         return "~n"
@@ -36,13 +50,38 @@ def file_stem(motor_id: str) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """A number of things: `1 motor`, `2 motors`, `2 mismatches`."""
+    """A number of things: `1 motor`, `2 motors`, `2 mismatches`.
+
+    Parameters
+    ----------
+    number
+        How many.
+    noun
+        Regular, in the singular.
+
+    Attributes
+    ----------
+    number of things
+        `1 motor`, `2 motors`, `2 mismatches`.
+
+    """
     ending = "" if number == 1 else "es" if noun.endswith(("s", "ch")) else "s"
     return f"{number} {noun}{ending}"
 
 
 def printable(text: str) -> str:
-    """The text in one line that a terminal shows and does not obey."""
+    """The text in one line that a terminal shows and does not obey.
+
+    Parameters
+    ----------
+    text
+        May hold control characters; these are written as escapes.
+
+    Attributes
+    ----------
+    text in one line that a terminal shows and does not obey.
+
+    """
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 

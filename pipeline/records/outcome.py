@@ -11,13 +11,28 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """`text` goes to standard output, `errors` line by line to standard error.
+    """What a command returns to the entry point.
 
-    `result` is what `json=true` prints, as plain data; `wrote` the path where results lie, and
-    `next` the command that a user would sensibly give now, both printed after the text.
+    Attributes
+    ----------
+    exit_code
+        As `contract/outputs.md` lists them.
+    text
+        For standard output.
+    errors
+        Lines for standard error.
+    timings
+        Stages and their seconds [s].
+    then
+        What the command goes on with once its text is printed, such as a window or a server that
+        stays; it returns a further outcome.
+    result
+        What `json=true` prints, as plain data.
+    wrote
+        Path where results lie.
+    next
+        The command that a user would sensibly give next.
 
-    `then` is what a command goes on with once that is printed, such as a window or a server that
-    stays; it returns what that came to, which may go on in turn.
     """
 
     exit_code: int = 0
@@ -36,7 +51,19 @@ PRECEDENCE = (INTERRUPTED, 5, 2, 1, 3, 4, 0)
 
 
 def first_that_applies(*codes: int) -> int:
-    """The exit code that `contract/outputs.md` puts first among those that apply."""
+    """The exit code that takes precedence among those that apply.
+
+    Parameters
+    ----------
+    *codes
+        Exit codes of `contract/outputs.md`.
+
+    Returns
+    -------
+    int
+        By `PRECEDENCE`; 0 where none is given.
+
+    """
     return min(codes, key=PRECEDENCE.index, default=0)
 
 
@@ -48,7 +75,14 @@ class Stopwatch:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Adds the wall time of the block to a stage [s]."""
+        """Adds the wall time of a `with` block to a stage.
+
+        Parameters
+        ----------
+        name
+            Of the stage; times of one name add up [s].
+
+        """
         start = time.perf_counter()
         try:
             yield

@@ -83,7 +83,19 @@ def number(text: str) -> float | None:
 
 
 def moment(text: str) -> datetime | None:
-    """The moment that ISO 8601 text names, with its zone where it has one; None for other text."""
+    """The moment that an ISO 8601 text names.
+
+    Parameters
+    ----------
+    text
+        Any text.
+
+    Returns
+    -------
+    datetime or None
+        With a time zone where the text has one; None for a text of another form.
+
+    """
     try:
         return datetime.fromisoformat(text)
     except ValueError:
@@ -91,9 +103,18 @@ def moment(text: str) -> datetime | None:
 
 
 def utc_moment(text: str) -> datetime | None:
-    """The moment that ISO 8601 text names, in UTC where it says no zone; None for other text.
+    """The moment that an ISO 8601 text names, in UTC.
 
-    None too where UTC would be before the year 1 or after 9999.
+    Parameters
+    ----------
+    text
+        Any text; without a zone it counts as UTC.
+
+    Returns
+    -------
+    datetime or None
+        None for a text of another form, and where UTC would be before the year 1 or after 9999.
+
     """
     found = moment(text)
     try:
@@ -103,7 +124,26 @@ def utc_moment(text: str) -> datetime | None:
 
 
 def decoded(data: bytes, encoding: str = "utf-8") -> str:
-    """The text of bytes; raises ParseError where they are no text in that encoding."""
+    """The text that bytes hold.
+
+    Parameters
+    ----------
+    data
+        Content of a file.
+    encoding
+        Name of a codec.
+
+    Returns
+    -------
+    str
+        Without a replacement for any byte.
+
+    Raises
+    ------
+    ParseError
+        The bytes are no text in that encoding, or there is no such encoding.
+
+    """
     try:
         return data.decode(encoding)
     except (UnicodeError, LookupError):
@@ -112,7 +152,14 @@ def decoded(data: bytes, encoding: str = "utf-8") -> str:
 
 
 def is_text(value: str) -> bool:
-    """Whether a text can be written: no half of a surrogate pair, as JSON can spell it."""
+    """Whether a text can be written as UTF-8: no half of a surrogate pair, as JSON can spell it.
+
+    Parameters
+    ----------
+    value
+        Any string.
+
+    """
     try:
         value.encode()
     except UnicodeEncodeError:

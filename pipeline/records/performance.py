@@ -13,10 +13,25 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Operation(PlainRecord):
-    """The conditions that a motor is operated at; `origin` says by name where each comes from.
+    """The conditions that a motor is operated at.
 
-    Currents are phase peaks. `voltage_share` is what the inverter uses of vdc/√3. `drop_v` [V] and
-    `on_ohm` are what one conducting device of it drops, None where that is not known.
+    Attributes
+    ----------
+    vdc_v
+        Voltage of the DC link [V].
+    current_a
+        Largest current, phase peak [A].
+    temp_winding_degc, temp_magnet_degc, temp_ambient_degc
+        Temperatures of operation [degC].
+    temp_limit_degc
+        Highest temperature of the winding [degC].
+    voltage_share
+        What the inverter uses of vdc/√3 [1].
+    drop_v, on_ohm
+        What one conducting device of the inverter drops [V, ohm]; None where not known.
+    origin
+        Where each condition comes from, by name.
+
     """
 
     vdc_v: float
@@ -33,7 +48,20 @@ class Operation(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Derived(PlainRecord):
-    """One number [unit]: value, 95 % interval, formula, and what is conventional in it."""
+    """One number of a motor's datasheet.
+
+    Attributes
+    ----------
+    name, words, unit
+        Name, meaning, and unit.
+    value, low, high
+        Value and ends of its 95 % interval [unit].
+    formula
+        How it follows from the constants.
+    convention
+        What in it is a convention and no property of the motor.
+
+    """
 
     name: str
     words: str
@@ -57,7 +85,18 @@ class Blank(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class Curve(PlainRecord):
-    """Values [n, unit] over `x` [n, the unit that ends `x_name`] with their 95 % intervals."""
+    """Values over one variable, with their 95 % intervals.
+
+    Attributes
+    ----------
+    name, words, unit
+        Name, meaning, and unit of the values.
+    x_name
+        Name of the variable; its unit is the last part.
+    x, value, low, high
+        [n] each.
+
+    """
 
     name: str
     words: str
@@ -71,8 +110,19 @@ class Curve(PlainRecord):
 
 @dataclass(frozen=True, slots=True)
 class MapCell(PlainRecord):
-    """One operating point of the efficiency map: the currents that give it with the least copper
-    loss, losses by place [W], efficiency and its 95 % interval [1].
+    """One operating point of the efficiency map.
+
+    Attributes
+    ----------
+    omega_mech_rad_s, torque_shaft_nm
+        The point [rad/s, N·m].
+    id_a, iq_a
+        The currents that give it with the least copper loss [A, phase peak].
+    copper_w, rotation_w, inverter_w
+        Losses [W]; None for an inverter that is not known.
+    efficiency, low, high
+        Efficiency and its 95 % interval [1].
+
     """
 
     omega_mech_rad_s: float
@@ -105,11 +155,43 @@ class Performance:
     notes: tuple[str, ...] = ()
 
     def number(self, name: str) -> Derived | None:
-        """A number by name, None where it is blank."""
+        """A number by name, None where it is blank.
+
+        Parameters
+        ----------
+        name
+            Of the number.
+
+        Attributes
+        ----------
+        number by name.
+
+        Returns
+        -------
+        Derived or None
+            None where the captures do not give it.
+
+        """
         return next((one for one in self.numbers if one.name == name), None)
 
     def curve(self, name: str) -> Curve | None:
-        """A curve by name, None where it is blank."""
+        """A curve by name, None where it is blank.
+
+        Parameters
+        ----------
+        name
+            Of the curve.
+
+        Attributes
+        ----------
+        curve by name.
+
+        Returns
+        -------
+        Curve or None
+            None where the captures do not give it.
+
+        """
         return next((one for one in self.curves if one.name == name), None)
 
     def document(self) -> dict[str, Any]:

@@ -65,7 +65,24 @@ def plain_of(value: Any) -> Any:
 
 
 def plain_fields(record: Any) -> dict[str, Any]:
-    """The fields of a record by name, each as `plain_of` gives it."""
+    """The fields of a record by name, each as a JSON value.
+
+    Parameters
+    ----------
+    record
+        A dataclass.
+
+    Returns
+    -------
+    dict
+        As `plain_of` gives each field, in the order of the fields.
+
+    Raises
+    ------
+    ValueError
+        A number is NaN or infinite.
+
+    """
     return {field.name: plain_of(getattr(record, field.name)) for field in fields(record)}
 
 
@@ -95,7 +112,14 @@ def record_of(kind: type[Record], document: Any) -> Record:
 
 @cache
 def hints_of(kind: type) -> Mapping[str, Any]:
-    """The kinds of a record's fields."""
+    """The types of a record's fields by name, with forward references resolved.
+
+    Parameters
+    ----------
+    kind
+        A dataclass or named tuple.
+
+    """
     return get_type_hints(kind)
 
 

@@ -42,22 +42,86 @@ class Entry:
 
 
 def derived(value: Number, unit: str, meaning: str, *, source: str) -> Any:
-    """A field whose default follows from something else: a formula, a distribution, a standard."""
+    """A field whose default follows from something else: a formula, a distribution, a standard.
+
+    Parameters
+    ----------
+    value
+        The default.
+    unit
+        Its unit.
+    meaning
+        What it is, in one sentence.
+    source
+        A formula, a distribution or a standard.
+
+    Attributes
+    ----------
+    field of a policy whose default follows from something else.
+
+    """
     return _field(value, unit, meaning, Origin("derived", source))
 
 
 def calibrated(value: Number, unit: str, meaning: str, *, by: str, on: str) -> Any:
-    """A field whose default was set `by` a command `on` data."""
+    """A field whose default was set `by` a command `on` data.
+
+    Parameters
+    ----------
+    value
+        The default.
+    unit
+        Its unit.
+    meaning
+        What it is, in one sentence.
+    by
+        The command.
+    on
+        The data that it was run on.
+
+    Attributes
+    ----------
+    field of a policy whose default was found by a command.
+
+    """
     return _field(value, unit, meaning, Origin("calibrated", f"`{by}` on {on}"))
 
 
 def chosen(value: Number, unit: str, meaning: str, *, why: str) -> Any:
-    """A field whose default is a judgement, and why it is that."""
+    """A field whose default is a judgement, and why it is that.
+
+    Parameters
+    ----------
+    value
+        The default.
+    unit
+        Its unit.
+    meaning
+        What it is, in one sentence.
+    why
+        Why it is that.
+
+    Attributes
+    ----------
+    field of a policy whose default is a judgement.
+
+    """
     return _field(value, unit, meaning, Origin("chosen", why))
 
 
 def section(kind: type[Made]) -> Made:
-    """A field that holds a section with its defaults."""
+    """A field that holds a section with its defaults.
+
+    Parameters
+    ----------
+    kind
+        The class of the section.
+
+    Attributes
+    ----------
+    field of a policy that holds a section with its defaults.
+
+    """
     made: Made = field(default_factory=kind)
     return made
 
@@ -67,7 +131,19 @@ def _field(value: Number, unit: str, meaning: str, origin: Origin) -> Any:
 
 
 def entries(policy: Any) -> Iterator[Entry]:
-    """Every number of a policy, section by section in the order of their fields."""
+    """Every number of a policy, section by section in the order of their fields.
+
+    Parameters
+    ----------
+    policy
+        A policy.
+
+    Yields
+    ------
+    Entry
+        Full name, value, unit, meaning and origin.
+
+    """
     for name, one, value in _numbers(policy):
         about = one.metadata
         yield Entry(name, value, about["unit"], about["meaning"], about["origin"])
@@ -113,14 +189,34 @@ def overrides(policy: Any, given: Mapping[str, Any]) -> Overrides:
 
 
 def with_overrides(policy: Made, changes: Overrides) -> Made:
-    """A policy with some of its numbers replaced; the names must be fields of it."""
+    """A policy with some of its numbers replaced; the names must be fields of it.
+
+    Parameters
+    ----------
+    policy
+        The policy; it is not changed.
+    changes
+        Full names of its fields with new values, as `overrides` gives them.
+
+    Attributes
+    ----------
+    policy with some of its numbers replaced.
+
+    """
     for name, value in changes:
         policy = _replaced(policy, name.split("."), value)
     return policy
 
 
 def policy_digest(policy: Any) -> str:
-    """sha256 of the names and values of a policy; not of units, meanings and origins."""
+    """sha256 of the names and values of a policy, not of units, meanings and origins.
+
+    Parameters
+    ----------
+    policy
+        A policy.
+
+    """
     return content_digest({entry.name: entry.value for entry in entries(policy)})
 
 

@@ -18,7 +18,14 @@ motors commonly promise their constants within 10 %, which is taken as two stand
 
 
 def may_be_stated(name: str) -> bool:
-    """Whether a key is a constant of the glossary that no other metadata key says already."""
+    """Whether a key may state a constant: one of the glossary that is no metadata key as well.
+
+    Parameters
+    ----------
+    name
+        The key.
+
+    """
     return name in CONSTANTS and name not in METADATA
 
 

@@ -23,6 +23,20 @@ class Contribution:
 
     `source` names the origin: an instrument (`current@rig-1`) or one fit's scatter
     (`scatter:spin_down:tau`). Equal sources are fully correlated, different ones independent.
+
+    Attributes
+    ----------
+    signed standard uncertainty from one source.
+    source
+        An instrument (`current@rig-1`) or the scatter of one fit (`scatter:spin_down:tau`). Equal
+        sources are fully correlated, different ones independent.
+    u
+        With the sign of the sensitivity [unit of the estimate].
+    kind
+        `A` from scatter, `B` from other knowledge.
+    dof
+        Degrees of freedom of u.
+
     """
 
     source: str
@@ -39,12 +53,42 @@ beyond their own uncertainties: part of u like any other, kept separate to show 
 
 
 def type_a(source: str, u: float, dof: float = math.inf) -> Budget:
-    """A budget of one scatter contribution (GUM 4.2)."""
+    """A budget of one scatter contribution (GUM 4.2).
+
+    Parameters
+    ----------
+    source
+        Name of the fit.
+    u
+        Standard uncertainty [unit of the estimate].
+    dof
+        Its degrees of freedom.
+
+    Attributes
+    ----------
+    budget of one contribution from scatter (GUM 4.2).
+
+    """
     return (Contribution(source, u, "A", dof),)
 
 
 def type_b(source: str, u: float, dof: float = math.inf) -> Budget:
-    """A budget of one contribution known from elsewhere (GUM 4.3), usually an instrument."""
+    """A budget of one contribution known from elsewhere (GUM 4.3), usually an instrument.
+
+    Parameters
+    ----------
+    source
+        Name of the instrument and its station.
+    u
+        Signed standard uncertainty [unit of the estimate].
+    dof
+        Its degrees of freedom.
+
+    Attributes
+    ----------
+    budget of one contribution known otherwise (GUM 4.3), usually of an instrument.
+
+    """
     return (Contribution(source, u, "B", dof),)
 
 
