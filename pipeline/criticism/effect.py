@@ -31,20 +31,45 @@ _NEIGHBOURS = 2
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of an effect. Sizes are in multiples of the machine's own `scale`.
+    """One number of an effect; sizes are in multiples of the machine's own `scale`.
 
-    `scale` names an entry of `Machine.scales` (`torque_nm`, `voltage_v`, ...) or is `1`.
-    `typical` is a size seen on real benches, `negligible` one that nobody would act on; both are
-    magnitudes; with a shape below its negligible one the effect is not there. `scan`: trial values
-    of a shape parameter, which has no influence while the amplitudes of its effect are zero; empty
-    for an amplitude. A `choice` takes one of these values and is never fitted. `optional`: the
-    parameters of one number above 0 form a term that the effect can do without; without it they
-    are zero. `u`: standard uncertainty, in its own unit, of a value that a discriminator gives.
-    `usual`: what handbooks say of the material, and its standard uncertainty, in its own unit: a
-    prior of every fit. `at_least`: another amplitude of the effect; if this one stays below half of
-    it, captures speak against the effect. `starts`: values, in multiples of `scale`, at which an
-    amplitude is tried too, since the residual bends too far from zero for its tangent. `order`:
-    the waves a turn that an amplitude is of.
+    Attributes
+    ----------
+    name, unit
+        Name within the effect, and the unit of its value.
+    typical
+        Magnitude that is seen on real benches [scales].
+    negligible
+        Magnitude that nobody would act on [scales]; with a shape parameter below it the effect is
+        absent.
+    scale
+        Entry of `Machine.scales`, such as `torque_nm`; `1` for the unit itself.
+    low, high
+        Bounds of the value [scales].
+    words
+        Meaning in a few words.
+    scan
+        Trial values of a shape parameter, which has no influence while the amplitudes of its effect
+        are zero; empty for an amplitude.
+    choice
+        Whether it takes one of the values of `scan` and is never fitted.
+    optional
+        Parameters of one number above 0 form a term that the effect can do without; without it they
+        are zero.
+    u
+        Standard uncertainty [unit] of a value that a discriminator gives.
+    at_least
+        Another amplitude of the effect; where this one stays below half of it, captures speak
+        against the effect.
+    usual
+        Value and standard uncertainty [unit] that handbooks give for the material: a prior of every
+        fit.
+    starts
+        Values [scales] at which an amplitude is tried too, where the tangent at zero does not lead
+        to it.
+    order
+        Waves a turn of which it is an amplitude.
+
     """
 
     name: str
@@ -72,18 +97,31 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What the captures say of the motor's size, before any fit.
+    """What the captures say of the size of the motor, before any fit.
 
-    `scales` [unit of the name's suffix]: the largest current, speed, torque and voltage seen,
-    the sample period, and what follows from them. `torque_orders` are the orders per turn that
-    stand out of a slow turn, `load_orders` others that a fit left in logs under load, whole
-    numbers or not, `slots` the nameplate's. `stated_u` is the standard uncertainty of the
-    station's gains and thermometers, by the name of the nuisance that stands for each;
-    `encoder_rad` the step of the encoder that the drive's logs show, 0 where they show none;
-    `travel_turns` how far the shaft goes in any one capture: a wave of the angle shows where it is
-    gone through once at least. `stated`: what somebody states of the motor's constants, value and
-    standard uncertainty by the name of the parameter, in its unit. `policy`: the constants of
-    judgement by which its captures are cut, and models of it fitted and judged.
+    Attributes
+    ----------
+    pole_pairs, slots
+        Counted or stated; `slots` of the nameplate.
+    scales
+        Largest current, speed, torque and voltage, the sample period, and what follows from them
+        [unit of the name's suffix].
+    torque_orders
+        Orders a turn that stand out of a slow turn.
+    stated_u
+        Standard uncertainty of the station's gains and thermometers, by the name of the nuisance
+        that stands for each.
+    encoder_rad
+        Step of the encoder that drive logs show; 0 where they show none.
+    load_orders
+        Other orders, whole numbers or not, that a fit left in logs under load.
+    travel_turns
+        How far the shaft turns in any one capture [turns].
+    stated
+        Stated constants of the motor: value and standard uncertainty by the name of the parameter.
+    policy
+        Constants of judgement.
+
     """
 
     pole_pairs: int
@@ -109,7 +147,19 @@ class Machine:
         return order if 0 < order <= self.policy.cutting.highest_order else None
 
     def scale(self, parameter: Parameter) -> float:
-        """Size [parameter.unit] of one relative unit of a parameter."""
+        """Size of one relative unit of a parameter.
+
+        Parameters
+        ----------
+        parameter
+            A parameter of an effect.
+
+        Returns
+        -------
+        float
+            In the unit of the parameter; 1 where it has no scale.
+
+        """
         return 1.0 if parameter.scale == "1" else self.scales[parameter.scale]
 
 
@@ -117,11 +167,19 @@ class Machine:
 class Supply:
     """How a drive feeds the machine, where that is known.
 
-    `pwm_s`, `vdc_v`: period of the inverter's switching and voltage of its link, 0 where not known.
-    `hold_s`: time for which a voltage vector stands while the rotor turns, 0 where not known.
-    `volts_v`: the voltage that the drive's log records, in the true rotor frame, where it has both
-    axes; a leg near zero current is judged by it. `q_alone`: the log shows the
-    q axis only, so that of a voltage's delay its envelope is what shows.
+    Attributes
+    ----------
+    pwm_s
+        Period of the inverter's switching [s]; 0 where not known.
+    vdc_v
+        Voltage of its link [V]; 0 where not known.
+    volts_v
+        Voltage of the drive's log in the true rotor frame [n, V], where it has both axes.
+    q_alone
+        Whether the log holds the q axis only, so that of a voltage's delay only its envelope shows.
+    hold_s
+        Time for which a voltage vector is constant while the rotor turns [s]; 0 where not known.
+
     """
 
     pwm_s: float = 0.0
@@ -135,10 +193,20 @@ class Supply:
 class ShaftState:
     """How the shaft is held and what records it.
 
-    `held`: a dynamometer holds the far end of the shaft; else the recorded torque is the far end's
-    load. `alone`: nothing records the torque that the shaft passes on, so that its load is a drag.
-    `finer`: points a sample of the angle. `run` [n] is the number of reversals before a sample and
-    `runs_rad` [runs] the angle turned from each to the next, negative backwards.
+    Attributes
+    ----------
+    held
+        Whether a dynamometer holds the far end; else the recorded torque is the load of the far
+        end.
+    alone
+        Whether nothing records the torque that the shaft passes on, so that its load is a drag.
+    finer
+        Points of the angle a sample.
+    run
+        Number of reversals before a sample [n].
+    runs_rad
+        Angle turned from each reversal to the next [runs, rad], negative backwards.
+
     """
 
     held: bool = False
@@ -150,11 +218,23 @@ class ShaftState:
 
 @dataclass(slots=True, kw_only=True)
 class Samples:
-    """What has one number a sample [n]: the machine's true state.
+    """What has one number a sample: the true state of the machine.
 
-    Currents are true machine currents in the true rotor frame (amplitude-invariant), angles and
-    speed are true shaft quantities. `travel_rad` is the angle turned since the last reversal,
-    infinite before the first.
+    Attributes
+    ----------
+    id_a, iq_a
+        True currents in the true rotor frame [n, A], amplitude-invariant.
+    eps_rad
+        True electrical angle [n].
+    theta_rad, omega_rad_s
+        True angle and speed of the shaft [n].
+    winding_k, magnet_k
+        Temperatures above 25 degC [n, K].
+    travel_rad
+        Angle turned since the last reversal [n]; infinite before the first.
+    freq_hz
+        Electrical frequency [n].
+
     """
 
     id_a: Any
@@ -189,11 +269,35 @@ class Operating(Samples):
     kept: dict[tuple[int, Hashable], tuple[Any, Any]] = field(default_factory=dict)
 
     def fed(self, **supply: Any) -> Operating:
-        """The same machine, fed and logged by a drive of which that much more is known."""
+        """The same machine, fed and logged by a drive of which more is known.
+
+        Parameters
+        ----------
+        **supply
+            Fields of `Supply` with new values.
+
+        """
         return replace(self, inverter=True, supply=replace(self.supply, **supply))
 
     def once(self, column: Any, name: Hashable, make: Callable[[], Any]) -> Any:
-        """What depends on a column alone, made once for all copies that share the array."""
+        """What depends on one array alone, computed once for all copies of the state that share the
+        array.
+
+        Parameters
+        ----------
+        column
+            The array; its identity is the key.
+        name
+            What is computed from it.
+        make
+            Computes it.
+
+        Returns
+        -------
+        object
+            The result of `make`, of this call or an earlier one.
+
+        """
         known = self.kept.get((id(column), name))
         if known is None:
             # the column is kept with it, so that nothing else takes its identity
@@ -201,17 +305,42 @@ class Operating(Samples):
         return known[1]
 
     def waves(self, order: int) -> tuple[Any, Any]:
-        """Cosine and sine of `order` times the electrical angle [n], computed once an angle."""
+        """Cosine and sine of a multiple of the electrical angle, computed once an angle.
+
+        Parameters
+        ----------
+        order
+            Multiple of the electrical angle.
+
+        Returns
+        -------
+        tuple of array [n]
+            Cosine and sine.
+
+        """
         waves: tuple[Any, Any] = self.once(self.eps_rad, order, lambda: _waves(order, self.eps_rad))
         return waves
 
     def shaft_waves(self, order: int) -> tuple[Array, Array]:
-        """Cosine and sine of `order` times the shaft angle [n], as a sample's torque has them.
+        """Cosine and sine of a multiple of the shaft angle, as a sample's torque contains them.
 
-        A free shaft's torque is given by the second difference of its angle, which is a mean under
-        a triangle of two samples: sinc² of the half turn of the wave in one. Of a coasting shaft
-        that mean is taken over `finer` points a sample, and each has the mean of its own part: a
-        wave that turns many times from point to point would beat with them.
+        Parameters
+        ----------
+        order
+            Waves a turn.
+
+        Returns
+        -------
+        tuple of array [n]
+            Cosine and sine, attenuated by the averaging within a sample.
+
+        Notes
+        -----
+        The torque of a free shaft is given by the second difference of its angle, which is a mean
+        under a triangle of two samples: sinc² of half the angle that the wave turns in one sample.
+        Of a coasting shaft that mean is taken over `finer` points a sample, each the mean of its
+        own part, else a wave that turns many times from point to point would alias.
+
         """
         name = ("shaft", order, self.shaft.held)
         waves: tuple[Array, Array] = self.once(self.theta_rad, name, lambda: self._turned(order))
@@ -231,7 +360,19 @@ class Operating(Samples):
         return replace(first, shaft=replace(first.shaft, run=None))
 
     def at(self, rows: NDArray[np.int64]) -> Operating:
-        """Some of the samples, for hooks that ask for nothing before or after a sample."""
+        """Some of the samples, for hooks that use nothing before or after a sample.
+
+        Parameters
+        ----------
+        rows
+            Indices of the samples.
+
+        Returns
+        -------
+        Operating
+            Without flux, torque and logged voltage, and without what `once` computed.
+
+        """
         samples = {one.name: getattr(self, one.name)[rows] for one in fields(Samples)}
         run = None if self.shaft.run is None else self.shaft.run[rows]
         return replace(
@@ -268,10 +409,19 @@ class Operating(Samples):
 
 
 def log1p(value: Any) -> Any:
-    """log(1 + value) of real values, or of values [n] a complex step aside.
+    """log(1 + x) of real values, or of values with a complex step in them.
 
-    To first order in the imaginary part, which is all that a complex step asks for, and ten times
-    as fast as the complex function.
+    Parameters
+    ----------
+    value
+        [n], real, or complex with a tiny imaginary part.
+
+    Returns
+    -------
+    array [n]
+        To first order in the imaginary part, which is all that a complex step needs, and ten times
+        as fast as the complex function.
+
     """
     if not np.iscomplexobj(value):
         return np.log1p(value)
@@ -289,12 +439,28 @@ def _waves(order: int, angle: Any) -> tuple[Any, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What sensor hooks may correct: complex dq current [A], shaft torque [N·m], on one clock.
+    """Recorded signals that sensor hooks may correct, on one clock.
 
-    `eps_rad` and `omega_e_rad_s` are electrical, `ts_s` the sample period; `instrument`: which
-    of a bench's (`drive` or `bench`), `phase` (0, 1, 2) whose line current a
-    two-terminal test recorded. `ahead`(delay): what current, torque and electrical angle are so
-    much later [s], less what they are now, from the whole log; without it, from these samples.
+    Attributes
+    ----------
+    i_a
+        Complex dq current [n, A].
+    torque_nm
+        Shaft torque [n].
+    eps_rad, omega_e_rad_s
+        Electrical angle and speed [n].
+    ts_s
+        Sample period.
+    inverter
+        Whether a drive fed and logged the machine.
+    instrument
+        `drive` or `bench`.
+    phase
+        Line (0, 1, 2) whose current a two-terminal test recorded.
+    ahead
+        Changes of current, torque and electrical angle within a delay [s], from the whole log; None
+        where these samples are all there is.
+
     """
 
     i_a: Complex
@@ -308,8 +474,19 @@ class Recorded:
     ahead: Callable[[float], tuple[Complex, Array, Array]] | None = None
 
     def later(self, delay_s: float) -> tuple[Complex, Array, Array]:
-        """Current [n, A] and torque [n, N·m] as they are recorded `delay_s` later, and the
-        electrical angle that the rotor turns until then [n, rad].
+        """Current and torque as they are recorded some time later, and what the rotor turns until
+        then.
+
+        Parameters
+        ----------
+        delay_s
+            How much later; may be a fraction of a sample.
+
+        Returns
+        -------
+        tuple of array [n]
+            Complex current [A], torque [N·m], electrical angle [rad].
+
         """
         if self.ahead is not None:
             current, torque, turned = self.ahead(delay_s)
@@ -324,6 +501,28 @@ def between(signal: Any, at: Array) -> Any:
 
     Through two samples by a cubic whose slopes there are the central differences. Reference:
     Catmull & Rom (1974), A class of local interpolating splines.
+
+    Parameters
+    ----------
+    signal
+        Samples [N], real or complex.
+    at
+        Places [n] in samples from the first; clipped to the record.
+
+    Attributes
+    ----------
+    signal at places between its samples, its ends constant.
+
+    Returns
+    -------
+    array [n]
+        Through two samples by a cubic whose slopes there are the central differences.
+
+    References
+    ----------
+    Catmull and Rom, A class of local interpolating splines, in Computer Aided Geometric Design,
+    Academic Press, 1974.
+
     """
     place = np.clip(at, 0.0, signal.size - 1.0)
     first = np.minimum(place.astype(np.int64), max(signal.size - 2, 0))
@@ -340,11 +539,21 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class FullLog:
-    """All of one drive log [n], with what the fitted model makes of it.
+    """All of one drive log, with what the fitted model gives for it.
 
-    `x` with its air-gap torque, `drag_nm` of everything else in the model, `shaft_nm` the true
-    torque at the shaft's sensor, `good` the samples that were recorded well; `u_*` are the standard
-    deviations of the noise of angle [rad], shaft torque and air-gap torque [N·m].
+    Attributes
+    ----------
+    x
+        State, with its air-gap torque.
+    drag_nm
+        Torque of everything else in the model [n].
+    shaft_nm
+        True torque at the sensor of the shaft [n].
+    good
+        Samples that were recorded well [n].
+    u_theta_rad, u_shaft_nm, u_air_gap_nm
+        Standard deviations of the noise of angle, shaft torque and air-gap torque.
+
     """
 
     x: Operating
@@ -379,11 +588,18 @@ DiscriminatorHook = Callable[[Sequence[FullLog], Values], Discrimination | None]
 
 @dataclass(frozen=True, slots=True)
 class LinearForm:
-    """The equation of an effect in other parameters, which it is linear in wherever they are.
+    """The equation of an effect in other parameters, in which it is linear wherever they are.
 
-    `effect` has these parameters; its name is never reported. `values`(q, base, machine): the
-    effect's own parameters from them and from the base constants, in their units; None where no
-    machine has such. `channel`: the signal in which it acts.
+    Attributes
+    ----------
+    effect
+        An effect with these parameters; its name is never reported.
+    channel
+        The signal in which it acts.
+    values
+        The effect's own parameters from the linear ones, the base constants and the machine, in
+        their units; None where no machine has such.
+
     """
 
     effect: Effect
@@ -481,20 +697,51 @@ class Effect(Description, Evidence, Hooks):
     left_out: tuple[int, ...] = ()
 
     def parameters_of(self, machine: Machine) -> tuple[Parameter, ...]:
-        """The parameters for one machine, `expand`ed where their number depends on it."""
+        """The parameters for one machine, without those of optional terms that are left out.
+
+        Parameters
+        ----------
+        machine
+            Determines how many there are, where the effect has `expand`.
+
+        """
         return tuple(p for p in self.every(machine) if p.optional not in self.left_out)
 
     def every(self, machine: Machine) -> tuple[Parameter, ...]:
-        """The parameters with those of the optional terms that are left out."""
+        """The parameters for one machine, with those of optional terms that are left out.
+
+        Parameters
+        ----------
+        machine
+            Determines how many there are, where the effect has `expand`.
+
+        """
         return self.expand(machine) if self.expand is not None else self.parameters
 
     def gone_through(self, machine: Machine) -> bool:
-        """Whether some capture goes through a whole period of one of its waves of the angle; of an
-        effect without such waves, always.
+        """Whether some capture goes through a whole period of a wave of the effect over the angle.
+
+        Parameters
+        ----------
+        machine
+            Holds how far the shaft turns.
+
+        Returns
+        -------
+        bool
+            True for an effect without such waves.
+
         """
         orders = [p.order for p in self.parameters_of(machine) if p.order]
         return not orders or max(orders) * machine.travel_turns >= 1.0
 
     def dof(self, machine: Machine) -> int:
-        """How many parameters are fitted."""
+        """How many parameters are fitted.
+
+        Parameters
+        ----------
+        machine
+            Determines how many there are.
+
+        """
         return sum(not p.choice for p in self.parameters_of(machine))

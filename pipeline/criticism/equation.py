@@ -29,13 +29,26 @@ Sensed = Callable[[Segment, Array, Model, Values], Mapping[str, Array]]
 class Channel:
     """One scalar equation of a segment: a signal that is predicted, and how large its errors are.
 
-    `name` is the recorded signal. `scale` names the entry of `Machine.scales` that is the machine's
-    own size in it; without one it is a bench meter's, and its size the largest reading of it and of
-    those `beside` it (an axis that stands still has the size of the other). With both, an error
-    also matters that is large beside the readings. `reported` is the signal's name in outputs, if
-    another. `acceleration`: the residual is one of a free shaft's acceleration [rad/s²];
-    `as_torque`: it is reported times the inertia [N·m]. `offset`: what a sensor may be off by in a
-    whole capture; a bench voltmeter has a zero besides its noise.
+    Attributes
+    ----------
+    name
+        The recorded signal.
+    scale
+        Entry of `Machine.scales` that is the machine's own size in it. Without one the signal is a
+        bench meter's, and its size is the largest reading of it and of those `beside` it.
+    beside
+        Signals of the same size: an axis whose current is zero has the size of the other. With a
+        `scale` as well, an error also matters that is large beside the readings.
+    reported
+        Name of the signal in outputs, if another.
+    acceleration
+        Whether the residual is one of a free shaft's acceleration [rad/s²].
+    as_torque
+        Whether it is reported times the inertia [N·m].
+    offset
+        What a sensor may be off by in a whole capture: a share of its noise, the zero of a bench
+        voltmeter besides, or nothing.
+
     """
 
     name: str
@@ -49,13 +62,23 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Observes:
-    """What an equation has in it, and so may observe.
+    """What an equation contains, and so may observe.
 
-    `constants` of the base model (`machine.model.BASE`); of effects the `hooks` (`flux`, `drop`,
-    `torque`), and the `sensors` whose errors are in it (`angle`, `current`, `voltage`, `load`,
-    `clock`, `lcr`). `torque_in` is the channel in which alone a drag is, as that much torque: a
-    segment without that channel does not observe it. `form`: whether the prediction is linear in
-    what the hooks give, affine, or neither, so that columns must be found by differences.
+    Attributes
+    ----------
+    constants
+        Constants of the base model (`machine.model.BASE`).
+    hooks
+        Of effects: `flux`, `drop`, `torque`.
+    sensors
+        Whose errors are in it: `angle`, `current`, `voltage`, `load`, `clock`, `lcr`.
+    torque_in
+        The only channel that a drag is in, as that much torque; a segment without that channel does
+        not observe it.
+    form
+        Whether the prediction is linear in what the hooks give, affine, or neither, so that columns
+        must be found by differences.
+
     """
 
     constants: tuple[str, ...] = ()
@@ -69,12 +92,19 @@ class Observes:
 class Sensing:
     """What the sensors add to an equation that no model predicts.
 
-    `reading`(segment, channel, model, values) is what a sensor's linearity is a share of [n, the
-    channel's unit]; without it the recorded signal itself. `errors`: those of `voltage_jumps`,
-    `current_jumps`, `encoder_lines`, `standstill` and `late_speed` that an equation of a drive's
-    log has.
-    `sensors` are the recorded signals that the channels are made of, if they are not the signals
-    themselves, and `sensed`(segment, residual, model, values) is the residual of each of them [n].
+    Attributes
+    ----------
+    reading
+        (segment, channel, model, values) -> what the linearity of a sensor is a share of [n, the
+        channel's unit]; None for the recorded signal itself.
+    errors
+        Those of `voltage_jumps`, `current_jumps`, `encoder_lines`, `standstill` and `late_speed`
+        that an equation of a drive's log has.
+    sensors
+        Recorded signals that the channels are made of, where these are not the signals themselves.
+    sensed
+        (segment, residual, model, values) -> the residual of each of `sensors` [n].
+
     """
 
     reading: Reading | None = None
@@ -87,12 +117,23 @@ class Sensing:
 class Use:
     """What segments of an equation serve for, beside the fit.
 
-    `shows`: of `current` and `turning`, what such a test is done under; a diagnosis needs both.
-    `warms`: hooks whose effects grow in it with a temperature; `at_rest`: in it no drive warmed the
-    winding. `free_runs`: tests in which the model is also left to itself, with these `currents` as
-    its state; a log with currents is looked through for orders too. `angle_maps`: errors are mapped
-    over the turn. `whole_beside`: equations beside whose segments one of this is held out as a
-    whole, and not in its blocks.
+    Attributes
+    ----------
+    shows
+        Of `current` and `turning`, what such a test is done under; a diagnosis needs both.
+    warms
+        Hooks whose effects grow in it with a temperature.
+    at_rest
+        Whether in it no drive warmed the winding.
+    free_runs
+        Tests in which the model is also simulated freely.
+    currents
+        State of such a simulation; a log with currents is searched for orders too.
+    angle_maps
+        Whether errors are mapped over the turn.
+    whole_beside
+        Equations beside whose segments one of this is held out as a whole, and not in its blocks.
+
     """
 
     shows: frozenset[str] = frozenset()
@@ -161,5 +202,17 @@ class Equation:
     rank: int = 0
 
     def channel(self, name: str) -> Channel:
-        """The channel of a signal; one that says nothing else where there is none."""
+        """The channel of a signal.
+
+        Parameters
+        ----------
+        name
+            The recorded signal.
+
+        Returns
+        -------
+        Channel
+            One with nothing but the name where the equation has no such channel.
+
+        """
         return next((one for one in self.channels if one.name == name), Channel(name))

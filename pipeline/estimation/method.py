@@ -36,7 +36,24 @@ class Method:
     terms: tuple[Term, ...] = ()
 
     def unit(self, constant: str) -> str:
-        """The unit of a constant, by this estimator's own terms, else by the glossary."""
+        """The unit of a constant, by this estimator's own terms, else by the glossary.
+
+        Parameters
+        ----------
+        constant
+            Name of the constant.
+
+        Returns
+        -------
+        str
+            Such as `N·m/A`.
+
+        Raises
+        ------
+        KeyError
+            Neither knows the constant.
+
+        """
         own = next((term for term in self.terms if term.name == constant), None)
         return (own or CONSTANTS[constant]).unit
 
@@ -98,15 +115,50 @@ class Method:
         )  # fmt: skip
 
     def missing(self, constant: str, note: str) -> Estimate:
-        """A constant that the captures do not determine; `note` names the test that would."""
+        """A constant that the captures do not determine; `note` names the test that would.
+
+        Parameters
+        ----------
+        constant
+            Its name.
+        note
+            The test that would determine it.
+
+        Attributes
+        ----------
+        constant that the captures do not determine.
+
+        """
         return not_identifiable(constant, self.unit(constant), self.name, note)
 
     def absent(self, constant: str, note: str) -> Estimate:
-        """A constant that was looked for and is not there; `note` says down to what size."""
+        """A constant that was looked for and is not there; `note` says down to what size.
+
+        Parameters
+        ----------
+        constant
+            Its name.
+        note
+            Down to what size it was searched for.
+
+        Attributes
+        ----------
+        constant that was searched for and is absent.
+
+        """
         return not_there(constant, self.unit(constant), self.name, note)
 
     def nothing(self, constants: Iterable[str], note: str) -> Fit:
-        """The result of an estimator that cannot determine any of its constants."""
+        """The result of an estimator that cannot determine any of its constants.
+
+        Parameters
+        ----------
+        constants
+            Their names.
+        note
+            The test that would determine them.
+
+        """
         return Fit(tuple(self.missing(constant, note) for constant in constants))
 
     def plot(

@@ -14,7 +14,16 @@ from pipeline.records.evidence import Evidence
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What an estimator found: estimates in order of preference, and what it looked at."""
+    """The result of an estimator.
+
+    Attributes
+    ----------
+    estimates
+        In order of preference.
+    evidence
+        Plots of what was measured beside what was fitted.
+
+    """
 
     estimates: tuple[Estimate, ...]
     evidence: tuple[Evidence, ...] = ()
@@ -25,22 +34,40 @@ FitFunction = Callable[[Campaign, Constants, Mapping[str, float]], Fit]
 
 @dataclass(frozen=True, slots=True)
 class Estimator:
-    """Declares what it gives and needs; `fit(campaign, known, options)` is pure.
+    """What an estimator gives, what it needs, and its pure function `fit(campaign, known,
+    options)`.
 
-    `gives`: constants (glossary names), all returned by every call, measured or not_identifiable.
-    `tests`: captures it can use; with none of them in the campaign it is not called and every
-        name it gives is not_identifiable with `experiment` as the note.
-    `uses`: constants of other estimators it reads from `known` where they are there; it runs
-        after all estimators that give them.
-    `either`: those of `uses` of which one is enough. `aids`: those of `uses` that refine its result
-        and that it does without; a plan sends nobody to record them for its sake.
-    `rank`: preference among estimators that give the same constant; the lowest is published.
-    `experiment`: the test to record, in words, when the constant is missing.
-    `terms`: glossary entries for constants of its own that `contract/outputs.md` does not name.
-    `clock_powers`: by constant, the power p of a clock that is wrong by a factor in what the
-        captures themselves say of it: an inertia is seen as (1 + gain)² of itself, a torque over a
-        current as it is (0, not in it). What comes with `known` constants is in their budgets.
-    `options`: its settings with defaults; `fit.NAME.KEY=` in the configuration overrides.
+    Attributes
+    ----------
+    name
+        Name of the method.
+    gives
+        Constants (glossary names); every call returns all of them, measured or not_identifiable.
+    tests
+        Captures that it can use. Without any of them it is not called, and all that it gives is
+        not_identifiable with `experiment` as the note.
+    experiment
+        The test to record where a constant is missing.
+    fit
+        Pure function of the captures, of the constants known so far, and of the options.
+    uses
+        Constants of other estimators that it takes from `known` where they are there; it runs after
+        all estimators that give them.
+    either
+        Those of `uses` of which one is enough.
+    aids
+        Those of `uses` that refine the result and are not needed; a plan asks nobody to record them
+        for that.
+    rank
+        Preference among estimators of one constant; the lowest is published.
+    terms
+        Glossary entries of constants that `contract/outputs.md` does not name.
+    clock_powers
+        By constant, the power p of a relative error of the clock in it: 2 for an inertia, 0 for a
+        torque over a current. What comes with `known` constants is in their budgets.
+    options
+        Settings with defaults; `fit.NAME.KEY=` overrides one.
+
     """
 
     name: str

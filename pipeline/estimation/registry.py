@@ -37,7 +37,14 @@ class Failure(NamedTuple):
 
 
 def homes() -> Mapping[str, str]:
-    """The module of every estimator, by the estimator's name."""
+    """The module of every estimator by the estimator's name.
+
+    Returns
+    -------
+    mapping of str to str
+        Dotted names of modules, of this package and of others.
+
+    """
     return {one.name: one.module for one in _found()}
 
 
@@ -47,7 +54,14 @@ def _found() -> tuple[PlugIn, ...]:
 
 @cache
 def estimators() -> tuple[Estimator, ...]:
-    """Every estimator, ordered so that each comes after those it uses."""
+    """Every estimator, of this package and of others.
+
+    Returns
+    -------
+    tuple of Estimator
+        In an order in which each comes after those that it uses; by rank and name otherwise.
+
+    """
     found: dict[str, Estimator] = {one.name: one.value for one in _found()}
     givers: dict[str, list[str]] = {}
     for estimator in found.values():

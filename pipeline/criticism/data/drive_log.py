@@ -26,6 +26,21 @@ _MOTION = ("theta_mech_rad", "omega_mech_rad_s", "theta_elec_rad")
 class DriveLog:
     """Columns [n] on an even clock, samples to keep [n], and what the recording says of its
     sensors; `speed` and `angle`: whether the log holds the drive's own speed, and an angle.
+
+    Attributes
+    ----------
+    log of a drive on an even clock.
+    period_s
+        Sample period.
+    columns
+        Signals by name [n].
+    keep
+        Samples to use [n].
+    sensors
+        Noise and steps of the columns.
+    speed, angle
+        Whether it holds the drive's own speed, and an angle.
+
     """
 
     period_s: float
@@ -37,7 +52,21 @@ class DriveLog:
 
 
 def drive_log(capture: Capture, machine: Machine) -> DriveLog | None:
-    """The log of a drive; None without a record of the motion, but that a heat run is at rest."""
+    """The log of a drive on an even clock.
+
+    Parameters
+    ----------
+    capture
+        A drive log or a heat run.
+    machine
+        Pole pairs and policy.
+
+    Returns
+    -------
+    DriveLog or None
+        None without a record of the motion, except for a heat run, which is at rest.
+
+    """
     moving = [name for name in _MOTION if capture.has(name)]
     if not moving and capture.meta.test != "heat_run":
         return None
@@ -68,5 +97,19 @@ def _on_time(capture: Capture, period: float, size: int) -> NDArray[np.bool_]:
 
 
 def in_time(middle: Array | NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    """Number of the twelfth of the capture's rows that each window's middle [W] is in."""
+    """Which twelfth of a capture each window lies in.
+
+    Parameters
+    ----------
+    middle
+        Middle row of each window [W].
+    size
+        Rows of the capture.
+
+    Returns
+    -------
+    array [W] of int
+        From 0.
+
+    """
     return np.minimum((middle * _BLOCKS // size).astype(np.int64), _BLOCKS - 1)

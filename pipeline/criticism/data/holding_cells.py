@@ -21,6 +21,19 @@ from pipeline.records.capture import Capture
 class Cells:
     """Mean angle [n, rad], current [n, A] and sense of arrival [n] of every cell, with the sector
     of the turn [n]; `noise_a` is the standard deviation of a cell's mean.
+
+    Attributes
+    ----------
+    holding current, averaged in cells of angle and sense.
+    theta_mech_rad, iq_a
+        Mean angle and current of each cell [n].
+    sense
+        Sense of arrival, +1 or −1 [n].
+    sector
+        Sector of the turn [n].
+    noise_a
+        Standard deviation of a cell's mean [A].
+
     """
 
     theta_mech_rad: Array

@@ -16,10 +16,24 @@ _METERS = ("gain_current", "gain_current_bench", "gain_voltage", "gain_commanded
 
 
 def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
-    """The nuisance that is the gain of each instrument, by kind, of every capture by path.
+    """The nuisance that is the gain of each instrument, by capture.
 
+    Parameters
+    ----------
+    captures
+        Captures of one motor.
+
+    Returns
+    -------
+    dict of dict
+        By path and kind (`gain_current`, `gain_voltage`, ...) the name of the nuisance.
+
+    Notes
+    -----
     Captures that state the same uncertainty of the same kind have the same instrument: a scope of
-    1.5 % is not the multimeter of 0.3 % beside it. The best of a kind has the name of the kind.
+    1.5 % is not the multimeter of 0.3 % beside it. The best of a kind has the name of the kind,
+    others a number.
+
     """
     used = {capture.path: _used(capture) for capture in captures}
     named = {}
@@ -31,8 +45,19 @@ def gains_of(captures: Iterable[Capture]) -> dict[str, dict[str, str]]:
 
 
 def stated_u(captures: Iterable[Capture]) -> dict[str, float]:
-    """Standard uncertainty of the station's gains [1] and thermometers [K], by nuisance; what no
-    capture states is not in it. Of what there is one of, the largest that is stated.
+    """Standard uncertainty of the station's gains and thermometers.
+
+    Parameters
+    ----------
+    captures
+        Captures of one motor.
+
+    Returns
+    -------
+    dict of float
+        By nuisance: gains [1], thermometers [K]; what no capture states is absent. The largest
+        value where several captures state one.
+
     """
     captures = tuple(captures)
     gains, found = gains_of(captures), {}

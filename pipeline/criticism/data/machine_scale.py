@@ -154,7 +154,19 @@ def encoder_step(campaign: Campaign, policy: Policy) -> float:
 
 
 def base_scales(machine: Machine) -> dict[str, float]:
-    """Order of magnitude [unit of the name] of every base constant."""
+    """Order of magnitude of every base constant.
+
+    Parameters
+    ----------
+    machine
+        Scales of the machine.
+
+    Returns
+    -------
+    dict of float
+        By name, in the unit of the name.
+
+    """
     s = machine.scales
     impedance = s["voltage_v"] / s["current_a"]
     return {
@@ -168,7 +180,22 @@ def base_scales(machine: Machine) -> dict[str, float]:
 
 
 def pole_pairs_of(campaign: Campaign, start: Constants) -> int | None:
-    """Electrical cycles a turn: counted, else from `start`, else the nameplate's; None unknown."""
+    """Electrical cycles a turn.
+
+    Parameters
+    ----------
+    campaign
+        Captures of the motor.
+    start
+        Constants that are known.
+
+    Returns
+    -------
+    int or None
+        Counted in an open-circuit spin, else from `start`, else of the nameplate; None where
+        nothing gives it.
+
+    """
     counted = counted_pole_pairs(campaign)
     if counted is not None:
         return counted

@@ -24,11 +24,19 @@ UNSMOOTHED = "theta_recorded_rad"
 class Sensors:
     """What a recording shows of its sensors.
 
-    `noise`: standard deviation of every column, its rounding in it. `steps`: resolution of the
-    columns that are rounded too coarsely for their noise to dither, so that the rounding error
-    follows the signal. `runs_rad`: angles turned between the reversals that stand out of the
-    angle's noise; the column `run` numbers the one at hand. `angle_step_rad`: resolution of an
-    angle whose noise is its rounding; None before anybody looked (`residuals.segments`).
+    Attributes
+    ----------
+    noise
+        Standard deviation of every column [its unit], rounding included.
+    steps
+        Resolution of columns that are rounded too coarsely for their noise to dither, so that the
+        rounding error follows the signal.
+    runs_rad
+        Angles turned between reversals that stand out of the noise of the angle; the column `run`
+        numbers the current one.
+    angle_step_rad
+        Resolution of an angle whose noise is its rounding; None where it was not determined.
+
     """
 
     noise: Mapping[str, float]
@@ -39,11 +47,20 @@ class Sensors:
 
 @dataclass(frozen=True, slots=True)
 class Instrument:
-    """What recorded a capture: `name` (drive or bench), how its voltages were sampled (`timing`),
-    and the nuisances that are the gains of its voltmeter (`meter`) and of its current sensors.
+    """What recorded a capture.
 
-    `frame`: how long before the middle of its hold the rotor frame of a logged voltage vector is
-    that of [holds], 0 or a half.
+    Attributes
+    ----------
+    name
+        `drive` or `bench`.
+    timing
+        How its voltages were sampled: `instant`, `held` or `centred`.
+    meter, ammeter
+        Nuisances that are the gains of voltmeter and current sensors.
+    frame
+        How long before the middle of its hold the rotor frame of a logged voltage vector is taken
+        [holds]: 0 or 0.5.
+
     """
 
     name: str
@@ -55,10 +72,15 @@ class Instrument:
 
 @dataclass(frozen=True, slots=True)
 class Disturbances:
-    """What may disturb a capture and is no effect of the machine; the noise floor takes it out.
+    """What may disturb a capture and is no effect of the machine; the noise floor absorbs it.
 
-    `offsets` [K, n]: offsets of the channel, of their prior size. `lines` [K, C, W, M]: weak
-    samples of mains lines and of the drift of sensors.
+    Attributes
+    ----------
+    offsets
+        Offsets of the channel, of their prior size [K, n].
+    lines
+        Weak samples of mains lines and of drift of sensors [K, C, W, M].
+
     """
 
     offsets: Array | None = None
@@ -67,10 +89,15 @@ class Disturbances:
 
 @dataclass(frozen=True, slots=True)
 class Unthinned:
-    """Columns [N] of a log before it was thinned to its windows.
+    """Columns of a log before it was thinned to its windows.
 
-    `columns`: those of a drive log, with `good`, the samples that were recorded well. `late`: what
-    an instrument may be late with.
+    Attributes
+    ----------
+    columns
+        Those of a drive log [N], with `good`, the samples that were recorded well.
+    late
+        Signals that an instrument may record late [N].
+
     """
 
     columns: Mapping[str, Array] | None = None
@@ -79,14 +106,37 @@ class Unthinned:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """One capture's signals [n] for one kind of equation, with its weak form.
+    """The signals of one capture for one kind of equation, with its weak form.
 
-    `kind` is the name of its equation (`equation.Equation`). `recorded` holds capture columns on an
-    even clock of period `ts_s`. `channels` are the equations: the recorded signal that each
-    predicts. `fixed` holds numbers of the capture (`theta_elec_rad`, `pwm_s`, `vdc_v`,
-    `ke_v_s_rad`, `ambient_k`, 1 by the name of each unlogged temperature's nuisance). `blocks` [W]
-    numbers the parts of a capture that are held out one by one where there is no other capture to
-    predict it from.
+    Attributes
+    ----------
+    capture, test
+        Path and test of the capture.
+    kind
+        Name of the equation (`equation.Equation`).
+    ts_s
+        Period of the even clock.
+    recorded
+        Columns [n] on that clock.
+    channels
+        Recorded signals that are predicted.
+    weak
+        Windows and test functions; None for a table.
+    instrument
+        What recorded it.
+    sensors
+        Noise and steps of the columns.
+    fixed
+        Numbers of the capture: `theta_elec_rad`, `pwm_s`, `vdc_v`, `ke_v_s_rad`, `ambient_k`, and 1
+        by the name of each unlogged temperature's nuisance.
+    disturbances
+        Offsets, mains lines and drift.
+    unthinned
+        The log before it was thinned.
+    blocks
+        Number of the part of a capture that each window [W] belongs to; parts are held out one by
+        one where there is no other capture to predict it from.
+
     """
 
     capture: str
@@ -123,7 +173,38 @@ def segment_of(
     offsets: Array | None = None,
     **fixed: float,
 ) -> Segment:
-    """A segment with what the capture's metadata says of it."""
+    """A segment with what the capture's metadata says of it.
+
+    Parameters
+    ----------
+    capture
+        The capture.
+    kind
+        Name of the equation.
+    instrument
+        `drive` or `bench`.
+    period
+        Of the even clock [s].
+    found
+        Columns [n].
+    sensors
+        Noise and steps of the columns.
+    channels
+        Recorded signals that are predicted.
+    weak
+        Windows; None for a table.
+    blocks
+        Part of each window [W]; None to hold the capture out as a whole.
+    offsets
+        Offsets of prior size [K, n].
+    **fixed
+        Further numbers of the capture.
+
+    Attributes
+    ----------
+    segment with what the metadata of its capture say.
+
+    """
     stated = capture.meta.ambient_degc
     ambient = 0.0 if stated is None else stated - REFERENCE_DEGC
     pwm_hz = capture.meta.pwm_hz
@@ -149,18 +230,57 @@ def segment_of(
 
 
 def with_lines(segment: Segment, lines: Array) -> Segment:
-    """A segment with other weak samples [K, C, W, M] of what may disturb it."""
+    """A segment with other weak samples [K, C, W, M] of what may disturb it.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+    lines
+        Weak samples [K, C, W, M].
+
+    Attributes
+    ----------
+    segment with other disturbances.
+
+    """
     return replace(segment, disturbances=replace(segment.disturbances, lines=lines))
 
 
 def clock(segment: Segment) -> Array:
-    """Time [n, s] of every sample; a log that was thinned to its windows has its own in `t_s`."""
+    """Time of every sample.
+
+    Parameters
+    ----------
+    segment
+        Any segment; a log that was thinned to its windows has its time in the column `t_s`.
+
+    Returns
+    -------
+    array [n]
+        In s, from the first sample.
+
+    """
     even: Array = segment.ts_s * np.arange(segment.size, dtype=np.float64)
     return segment.recorded.get("t_s", even)
 
 
 def projected(segment: Segment, sampled: Array) -> Array:
-    """Weak samples [C, W, M] of sampled channels [C, n]; a table is its own projection."""
+    """Weak samples of sampled channels.
+
+    Parameters
+    ----------
+    segment
+        Its windows.
+    sampled
+        Channels [C, n].
+
+    Returns
+    -------
+    array [C, W, M]
+        A table is its own projection: W = n, M = 1.
+
+    """
     if segment.weak is None:
         return sampled[:, :, None]
     return segment.weak.project(sampled)
@@ -169,7 +289,20 @@ def projected(segment: Segment, sampled: Array) -> Array:
 def row_index(
     segment: Segment,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_], tuple[tuple[str, int], ...]]:
-    """Group and window of every weak sample [C, W, M], which are valid, and the group names."""
+    """Group and window of every weak sample.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+
+    Returns
+    -------
+    tuple
+        Group [C, W, M], window [C, W, M], which are valid [C, W, M], and (channel, order) of each
+        group.
+
+    """
     weak = segment.weak
     orders = np.zeros(1, dtype=np.int64) if weak is None else weak.orders
     windows = segment.size if weak is None else weak.starts.size
@@ -186,15 +319,37 @@ def row_index(
 
 
 def electrical_orders(machine: Machine) -> tuple[float, ...]:
-    """Orders a turn at which electrical effects show: 1ε, 2ε, 6ε, 12ε and once a turn; and others
-    that were seen under load.
+    """Orders a turn at which electrical effects show.
+
+    Parameters
+    ----------
+    machine
+        Pole pairs p, and orders that were seen under load.
+
+    Returns
+    -------
+    tuple of float
+        1, 2, p, 2p, 6p, 12p and those seen, sorted.
+
     """
     p = machine.pole_pairs
     return tuple(sorted({1, 2, p, 2 * p, 6 * p, 12 * p, *machine.load_orders}))
 
 
 def slow_orders(machine: Machine) -> tuple[float, ...]:
-    """Orders a turn looked at in a slow turn."""
+    """Orders a turn that are examined in a slow turn.
+
+    Parameters
+    ----------
+    machine
+        Pole pairs, slots, and orders that were seen.
+
+    Returns
+    -------
+    tuple of float
+        Electrical orders, those seen, slots, and the cogging order with its double, sorted.
+
+    """
     seen = set(electrical_orders(machine)) | set(machine.torque_orders)
     if machine.slots:
         seen.add(machine.slots)

@@ -293,7 +293,19 @@ def _coherence(parts: Array, steps: Array) -> Array:
 
 
 def is_rounded(signal: Array, step: float, policy: SensorNoise) -> bool:
-    """Whether a moving signal's values are whole multiples of a step, but for a common offset."""
+    """Whether the values of a moving signal are whole multiples of a step, except for a common
+    offset.
+
+    Parameters
+    ----------
+    signal
+        Samples [n].
+    step
+        The step [unit of the signal].
+    policy
+        How many steps a signal must move through, and how coherent its phase must be.
+
+    """
     if step <= 0.0 or float(np.ptp(signal)) < policy.moving * step:
         return False
     return abs(complex(np.exp(2j * np.pi / step * signal).mean())) > policy.in_step

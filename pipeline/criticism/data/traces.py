@@ -35,8 +35,19 @@ _SHORTEST = 24
 
 
 def with_values(capture: Capture) -> Capture | None:
-    """The capture without columns that hold no value at the samples of its richest table; None
-    where nothing is left, and of a test with a clock, where that does not rise or is too short.
+    """The capture without columns that hold no value at the samples of its richest table.
+
+    Parameters
+    ----------
+    capture
+        Any capture.
+
+    Returns
+    -------
+    Capture or None
+        None where nothing remains, and for a test with a clock whose time does not rise or is too
+        short.
+
     """
     table = max(capture.tables, key=lambda t: (len(t.columns), t.height), default=None)
     if table is None or table.height == 0:
@@ -158,7 +169,21 @@ def smoothed(signal: Array, width: int) -> Array:
 
 
 def decimated(signal: Array, factor: int) -> Array:
-    """Means [n // factor] of consecutive samples."""
+    """Means of consecutive samples.
+
+    Parameters
+    ----------
+    signal
+        [n].
+    factor
+        Samples a mean.
+
+    Returns
+    -------
+    array [n // factor]
+        Samples beyond the last whole group are dropped.
+
+    """
     n = signal.size // factor * factor
     mean: Array = signal[:n].reshape(-1, factor).mean(axis=1)
     return mean
@@ -283,20 +308,67 @@ def thinned(
 
 
 def whole_log(found: Mapping[str, Array], period: float, policy: Cutting) -> dict[str, Array]:
-    """Currents and torque of all samples, which may be late by many, and the angle, smoothed."""
+    """The signals of a log that an instrument may record late, of all samples.
+
+    Parameters
+    ----------
+    found
+        Columns [N].
+    period
+        Sample period [s].
+    policy
+        Smoothing of the speed.
+
+    Returns
+    -------
+    dict of array [N]
+        Currents, torque, and the smoothed angle.
+
+    """
     names = ("id_a", "iq_a", "torque_shaft_nm")
     turned = smoothed(found["theta_mech_rad"], 2 * round(policy.speed_s / period / 2) + 1)
     return {"theta_mech_rad": turned, **{name: found[name] for name in names if name in found}}
 
 
 def window_of(period: float, size: int, policy: Cutting) -> int:
-    """Samples a window: 20 ms, but 40 samples at least and four windows in the capture."""
+    """Samples a window.
+
+    Parameters
+    ----------
+    period
+        Sample period [s].
+    size
+        Samples of the capture.
+    policy
+        Length of a window.
+
+    Returns
+    -------
+    int
+        The policy's time, but no fewer than its samples, and four windows in the capture where that
+        leaves enough.
+
+    """
     wanted = max(round(policy.window_s / period), policy.window_samples)
     return max(min(wanted, size // 4), policy.least_window)
 
 
 def with_angle(capture: Capture, names: list[str]) -> list[str]:
-    """The columns and the first there is of those that give the angle."""
+    """Some columns and the first column that gives the angle.
+
+    Parameters
+    ----------
+    capture
+        Any capture.
+    names
+        Columns.
+
+    Returns
+    -------
+    list of str
+        `names` alone where there is no angle or speed.
+
+    """
     for name in ("theta_mech_rad", "theta_elec_rad", "omega_mech_rad_s"):
         if capture.has(name):
             return [*names, name]
@@ -304,7 +376,19 @@ def with_angle(capture: Capture, names: list[str]) -> list[str]:
 
 
 def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> None:
-    """Puts `theta_mech_rad` [n] into the columns, from whatever gives the angle."""
+    """Adds the shaft angle to columns, from whatever gives it.
+
+    Parameters
+    ----------
+    found
+        Columns [n]; `theta_mech_rad` is put in, an electrical angle or a speed taken out. Without
+        any of them the angle is 0.
+    period
+        Sample period [s].
+    machine
+        Pole pairs.
+
+    """
     if "theta_mech_rad" in found:
         return
     if "theta_elec_rad" in found:
@@ -319,8 +403,22 @@ def shaft_angle(found: dict[str, Array], period: float, machine: Machine) -> Non
 
 
 def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
-    """Noise, coarse steps and runs of columns; smooths the temperatures and adds the travel since a
-    reversal.
+    """Noise, coarse steps and runs of columns.
+
+    Parameters
+    ----------
+    found
+        Columns [n]; temperatures are smoothed in place, and `travel_rad` and `run` are added.
+    period
+        Sample period [s].
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    Sensors
+        For `segment_of`.
+
     """
     noise, steps = noise_and_steps(found, policy.sensor_noise)
     width = max(2 * round(policy.cutting.temperature_s / period) + 1, 51)
@@ -337,8 +435,20 @@ def prepared(found: dict[str, Array], period: float, policy: Policy) -> Sensors:
 def noise_and_steps(
     found: Mapping[str, Array], policy: SensorNoise
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Noise of columns, and the steps of those that are rounded too coarsely for it; an angle has
-    its own.
+    """Noise of columns, and steps of those that are rounded too coarsely for it.
+
+    Parameters
+    ----------
+    found
+        Columns [n].
+    policy
+        Constants of judgement.
+
+    Returns
+    -------
+    tuple of dict
+        Standard deviations and steps by name; an angle has no step here.
+
     """
     angles = {name: name.startswith("theta") for name in found}
     noise = {n: sensor_noise(column, policy, angles[n]) for n, column in found.items()}
@@ -393,9 +503,26 @@ def even_angle(
 def evened(
     capture: Capture, found: dict[str, Array], sensors: Sensors, machine: Machine, window: int
 ) -> Sensors:
-    """The sensors of a log after `even_angle`, which a torque map has: a dynamometer turns it.
+    """The sensors of a log once the angle of a torque map is smoothed by `even_angle`.
 
-    Its encoder is as coarse as the drive's logs show: an even speed hides the step.
+    Parameters
+    ----------
+    capture
+        Any capture; only a torque map is changed, since a dynamometer turns it evenly.
+    found
+        Columns [n]; the angle is replaced in place.
+    sensors
+        Noise of the columns.
+    machine
+        Step of its encoder, which drive logs show; an even speed hides it.
+    window
+        Samples a window.
+
+    Returns
+    -------
+    Sensors
+        With the noise of the smoothed angle.
+
     """
     if capture.meta.test != "torque_map":
         return sensors
@@ -422,7 +549,23 @@ def _parabolas(signal: Array, width: int) -> Array:
 
 
 def with_travel(found: dict[str, Array], noise: Mapping[str, float], policy: Cutting) -> Array:
-    """Adds travel and run to the columns; returns the runs [runs, rad]."""
+    """Adds travel since the last reversal and number of the run to columns.
+
+    Parameters
+    ----------
+    found
+        Columns [n]; `travel_rad` and `run` are put in.
+    noise
+        Standard deviation of `theta_mech_rad`.
+    policy
+        How far beyond the noise a reversal must go.
+
+    Returns
+    -------
+    array [runs]
+        Angle turned in each run [rad]; the first is infinite.
+
+    """
     slack = policy.reversal_u * noise["theta_mech_rad"]
     found["travel_rad"], found["run"], runs = travel(found["theta_mech_rad"], slack)
     return runs

@@ -11,7 +11,21 @@ from pipeline.numerics.weak_rows import WeakRows, smooth_speed, weak_rows
 
 
 def runs_free(log: DriveLog, machine: Machine) -> bool:
-    """Whether current and drags alone explain how the shaft of a log moves."""
+    """Whether current and drags alone explain how the shaft of a log moves.
+
+    Parameters
+    ----------
+    log
+        A drive log.
+    machine
+        Orders and policy.
+
+    Returns
+    -------
+    bool
+        False where the log is too short to decide.
+
+    """
     share = unexplained_share(log, machine)
     return share is not None and share < machine.policy.cutting.unexplained_share
 

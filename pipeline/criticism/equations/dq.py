@@ -57,7 +57,18 @@ TORQUE = "torque_shaft_nm"
 def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Voltages, currents and angle of a log; with its torque where the shaft turns.
 
-    None without a record of the motion, but that a heat run is at rest.
+    Parameters
+    ----------
+    capture
+        A torque map, a drive log or a heat run.
+    machine
+        Orders and policy.
+
+    Returns
+    -------
+    Segment or None
+        None without a record of the motion, except for a heat run, which is at rest.
+
     """
     temperatures = [name for name in SMOOTHED if capture.has(name)]
     names = with_angle(capture, ["vd_v", "vq_v", "id_a", "iq_a", *temperatures])
@@ -94,7 +105,25 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True currents, angle and speed [n] of a machine that a drive feeds and logs."""
+    """True currents, angle and speed of a machine that a drive feeds and logs.
+
+    Parameters
+    ----------
+    segment
+        The log, on its true clock.
+    signals
+        Recorded columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The state [n], with the logged voltage.
+
+    """
     motion = motion_of(segment, signals, model.machine)
     current = drive_current(segment, signals, model, values, motion.theta_rad.size)
     x = operating(segment, signals, model, values, current, motion)
@@ -107,7 +136,25 @@ def state(
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
-    """Recorded voltages, and the torque less the dynamics of its transducer [C, n]."""
+    """Recorded voltages, and the torque less the dynamics of its transducer.
+
+    Parameters
+    ----------
+    segment
+        The log, on its true clock.
+    signals
+        Recorded columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [C, n]
+        v_d and v_q [V], and with its channel the torque [N·m].
+
+    """
     rows = [signals[name] for name in VOLTS]
     if TORQUE in segment.channels:
         rows.append(true_load(segment, signals, model, values, inverter=True))
@@ -118,6 +165,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """Voltages v_d, v_q [V], and with its channel the torque at the shaft [N·m]: [C, n].
+
+    Parameters
+    ----------
+    segment
+        The log, on its true clock.
+    x
+        True state [n].
+    pieces
+        Flux, drops and drags of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [C, n]
+        As `measured`.
 
     Notes
     -----

@@ -20,7 +20,22 @@ LINKAGES = ("psi_d_wb", "psi_q_wb")
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Flux linkages of both axes, or of a sweep along one, whose other axis stands still."""
+    """Flux linkages of both axes, or of a sweep along one axis.
+
+    Parameters
+    ----------
+    capture
+        A flux map.
+    machine
+        Policy of tables.
+
+    Returns
+    -------
+    Segment or None
+        None where neither current, or neither linkage, varies. Rows of one d current are held out
+        together, since a map is often its own mirror image in i_q.
+
+    """
     names = ("id_a", "iq_a", *LINKAGES)
     found = capture.arrays(*names)
     policy = machine.policy.tables
@@ -55,7 +70,25 @@ def _axes_noise(
 def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True currents [n] of a table's rows."""
+    """True currents of the rows of a table.
+
+    Parameters
+    ----------
+    segment
+        The table.
+    signals
+        Recorded columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The state [n] of a rotor at rest.
+
+    """
     current = signals["id_a"] + 1j * signals["iq_a"]
     rest = at_rest(current.size)
     current = table_current(segment, current, rest.theta_rad, rest.omega_rad_s, model, values)

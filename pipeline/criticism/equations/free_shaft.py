@@ -39,7 +39,22 @@ SPEED, TORQUE, RECORDER = "omega_mech_rad_s", "torque_shaft_nm", "shaft"
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """The angle of a coast; of a slow turn the torque, averaged to some samples a wave."""
+    """The angle of a coast; of a slow turn the torque, averaged to some samples a wave.
+
+    Parameters
+    ----------
+    capture
+        A spin-down or a cogging turn.
+    machine
+        Orders and policy.
+
+    Returns
+    -------
+    Segment or None
+        None without an angle or speed, of a slow turn without a torque, and of one that does not
+        turn.
+
+    """
     names = with_angle(capture, [])
     if not names:
         return None
@@ -133,7 +148,25 @@ def _slow_turn(
 def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True angle and speed [n·m] of a shaft without current, m points a sample of a coast."""
+    """True angle and speed of a shaft without current.
+
+    Parameters
+    ----------
+    segment
+        The capture, on its true clock.
+    signals
+        Recorded columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The state [n m], with m points a sample of a coast.
+
+    """
     slow = segment.test == "cogging"
     finer = 1 if slow else finer_of(segment, model.machine, model.policy.cutting.coast_parts)
     motion = motion_of(segment, signals, model.machine, finer)
@@ -143,7 +176,25 @@ def state(
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
-    """Nothing of a coast, whose angle is in the prediction; the torque of a slow turn: [1, n]."""
+    """Zero for a coast, whose angle is in the prediction; the torque of a slow turn.
+
+    Parameters
+    ----------
+    segment
+        The capture.
+    signals
+        Recorded columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In rad/s² or N·m.
+
+    """
     if SPEED in segment.channels:
         return np.zeros((1, segment.size))
     return true_load(segment, signals, model, values)[None]
@@ -153,6 +204,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """Acceleration that the drags leave unexplained [rad/s²], or the shaft's torque [N·m]: [1, n].
+
+    Parameters
+    ----------
+    segment
+        The capture, on its true clock.
+    x
+        True state [n m].
+    pieces
+        Drags of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In rad/s² of a coast, in N·m of a slow turn.
 
     Notes
     -----

@@ -26,7 +26,21 @@ _CRAWL = 1e-9
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Mean angle, current and sense of arrival of every cell; sectors are held out one by one."""
+    """Mean angle, current and sense of arrival of every cell of the turn.
+
+    Parameters
+    ----------
+    capture
+        A holding current.
+    machine
+        Policy.
+
+    Returns
+    -------
+    Segment or None
+        None with too few cells; sectors of the turn are held out one by one.
+
+    """
     cells = holding_cells(capture, machine.policy)
     if cells is None:
         return None
@@ -46,7 +60,25 @@ def cut(capture: Capture, machine: Machine) -> Segment | None:
 def state(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True current [n] of a held rotor, which creeps the way it came."""
+    """True current of a held rotor, which creeps in the sense of its arrival.
+
+    Parameters
+    ----------
+    segment
+        The cells.
+    signals
+        Their columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The state [n], at a speed that has a sign and no other effect.
+
+    """
     theta, omega = signals["theta_mech_rad"], _CRAWL * signals["sense"]
     pole_pairs = model.machine.pole_pairs
     current = np.zeros(theta.size) + 1j * signals["iq_a"]
@@ -56,7 +88,25 @@ def state(
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
-    """The true q current [1, n], in amperes of the sensor."""
+    """The true q current, in amperes of the sensor.
+
+    Parameters
+    ----------
+    segment
+        The cells.
+    signals
+        Their columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In A.
+
+    """
     true = state(segment, signals, model, values).i_a.imag
     return (true / _current_slope(segment, model, values))[None]
 
@@ -65,6 +115,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """The q current that holds the rotor against its drags [1, n], in amperes of the sensor.
+
+    Parameters
+    ----------
+    segment
+        The cells.
+    x
+        True state [n].
+    pieces
+        Flux and drags of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In A.
 
     Notes
     -----

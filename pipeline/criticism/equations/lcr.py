@@ -23,6 +23,18 @@ _PROBE = 1e-3
 def cut(capture: Capture, machine: Machine) -> Segment | None:
     """A table over the angle.
 
+    Parameters
+    ----------
+    capture
+        An LCR table of pair ab.
+    machine
+        Policy.
+
+    Returns
+    -------
+    Segment or None
+        None with fewer than six angles.
+
     Notes
     -----
     Its noise is the scatter about a mean and two waves a turn, but never less than the rounding of
@@ -76,6 +88,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """Incremental line inductance and resistance [C, n] at zero current, pair ab.
+
+    Parameters
+    ----------
+    segment
+        The table.
+    x
+        State at rest at each angle [n].
+    pieces
+        Not used: flux and drop are evaluated at two small currents.
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [C, n]
+        Line inductance [H], and with its channel the line resistance [ohm].
 
     Notes
     -----

@@ -39,8 +39,20 @@ _BOTH_AXES = ("vd_v", "vq_v", "id_a", "iq_a")
 def cut(capture: Capture, machine: Machine) -> Segment | None:
     """Current, torque and angle of a log that has no voltages of both axes.
 
-    A d current that was not logged is taken as zero, and what its reluctance torque may be of the
-    magnet's is a nuisance.
+    Parameters
+    ----------
+    capture
+        A torque map or a drive log with a transducer.
+    machine
+        Orders and policy.
+
+    Returns
+    -------
+    Segment or None
+        None where `dq` takes the log, or without a record of the motion. A d current that was not
+        logged is taken as zero; a nuisance stands for what its reluctance torque may be of the
+        magnet's.
+
     """
     angle = with_angle(capture, [])
     if capture.has(*_BOTH_AXES) or not angle:
@@ -93,6 +105,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """The torque that the transducer shows [1, n, N·m].
+
+    Parameters
+    ----------
+    segment
+        The log, on its true clock.
+    x
+        True state [n].
+    pieces
+        Flux and drags of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In N·m.
 
     Notes
     -----

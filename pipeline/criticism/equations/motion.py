@@ -37,9 +37,21 @@ _PAD = 8
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Angle and current, in a selection of the windows: waves of the angle are dear at speed.
+    """Angle and current of a free shaft, in a selection of the windows.
 
-    Only where there is an angle and no transducer, and where the current alone drives the shaft.
+    Parameters
+    ----------
+    capture
+        A drive log without a transducer.
+    machine
+        Orders and policy.
+
+    Returns
+    -------
+    Segment or None
+        None without an angle, with a transducer, and where something else than the current drives
+        the shaft. Windows are few because waves of the angle take long to compute at speed.
+
     """
     log = None if capture.has(TORQUE) else drive_log(capture, machine)
     if log is None or not log.angle or not runs_free(log, machine):
@@ -84,6 +96,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """Acceleration that current and drags leave unexplained [1, n, rad/s²].
+
+    Parameters
+    ----------
+    segment
+        The log, on its true clock.
+    x
+        True state [n m].
+    pieces
+        Flux and drags of the model there.
+    model
+        Clock of the log.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In rad/s².
 
     Notes
     -----

@@ -39,7 +39,22 @@ _LINE_RAD = {f"v{pair}_v": angle for pair, angle in PAIR_RAD.items()}
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Line voltages and angle; the windows of steady speed."""
+    """Line voltages and angle of an open-circuit spin, in the windows of steady speed.
+
+    Parameters
+    ----------
+    capture
+        An open-circuit spin.
+    machine
+        Orders and policy.
+
+    Returns
+    -------
+    Segment or None
+        None with fewer than two line voltages. Without an encoder the angle is that of the voltage
+        itself.
+
+    """
     lines = [n for n in LINES_V if capture.has(n)]
     if len(lines) < 2:
         return None
@@ -130,6 +145,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """Voltages v_d, v_q [2, n, V] of a winding without current.
+
+    Parameters
+    ----------
+    segment
+        The spin, on its true clock.
+    x
+        True state [n].
+    pieces
+        Flux of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [2, n]
+        In V, in the frame of the recorded angle.
 
     Notes
     -----

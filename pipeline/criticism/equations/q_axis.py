@@ -28,11 +28,26 @@ _BOTH_AXES = ("vd_v", "vq_v", "id_a", "iq_a")
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """The q voltage, and the drive's own speed beside an angle.
+    """The q voltage, and the drive's own speed where there is an angle beside it.
 
-    The d current is taken as held at zero, which is what a drive that logs the q axis alone does.
-    Where there is an angle, the voltage is predicted from its speed, and the drive's own speed,
-    which comes late, is compared with it; `sample_delay` says how late.
+    Parameters
+    ----------
+    capture
+        A drive log or heat run without both axes.
+    machine
+        Policy.
+
+    Returns
+    -------
+    Segment or None
+        None where `dq` takes the log, or without a record of the motion.
+
+    Notes
+    -----
+    The d current is taken as zero, which is what a drive that logs the q axis alone controls it to.
+    With an angle, the voltage is predicted from its speed, and the drive's own speed, which comes
+    late, is compared with it; `sample_delay` is how late.
+
     """
     log = None if capture.has(*_BOTH_AXES) else drive_log(capture, machine)
     if log is None:
@@ -77,6 +92,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """The q voltage [V], and the angle's speed as the drive's estimate gives it [rad/s]: [C, n].
+
+    Parameters
+    ----------
+    segment
+        The log, on its true clock.
+    x
+        True state [n].
+    pieces
+        Flux and drops of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [C, n]
+        v_q [V], and with its channel the speed [rad/s].
 
     Notes
     -----

@@ -18,10 +18,25 @@ from pipeline.records.capture import Capture
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Levels of d current, each run at several speeds: v_q, the drop of i_q taken off.
+    """Steady q voltages at levels of d current, each at several speeds.
 
-    Each level has a free offset of its own, since what the inverter drops along q depends on the
-    current. The noise is the scatter of a level's voltages about a straight line over speed.
+    Parameters
+    ----------
+    capture
+        A table without a clock.
+    machine
+        Policy of tables.
+
+    Returns
+    -------
+    Segment or None
+        None where `flux_map` takes it, and with too few rows a level.
+
+    Notes
+    -----
+    Each level has a free offset, since what the inverter drops along q depends on the current. The
+    noise is the scatter of a level's voltages about a straight line over speed.
+
     """
     if capture.has("id_a", "iq_a", "psi_d_wb", "psi_q_wb"):
         return None
@@ -82,6 +97,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """The q voltage [1, n, V].
+
+    Parameters
+    ----------
+    segment
+        The table.
+    x
+        True state [n].
+    pieces
+        Flux and drops of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In V.
 
     Notes
     -----

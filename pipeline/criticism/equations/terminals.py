@@ -20,7 +20,22 @@ from pipeline.records.capture import Capture
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Voltage and current of one pair; the windows at rest, or those clear of the steps."""
+    """Voltage and current of one pair of terminals of a rotor at rest.
+
+    Parameters
+    ----------
+    capture
+        A resistance test, or a current step at a stated angle.
+    machine
+        Policy.
+
+    Returns
+    -------
+    Segment or None
+        None without a pair, a current of it, or the angle of a current step. Of a resistance test
+        only the settled windows are used, of a step those clear of its edges.
+
+    """
     pair = capture.meta.pair
     if pair is None or not capture.has(f"v{pair}_v"):
         return None
@@ -75,6 +90,22 @@ def state(
 ) -> Operating:
     """True current [n] of a rotor at rest.
 
+    Parameters
+    ----------
+    segment
+        The capture, on its true clock.
+    signals
+        Recorded columns [n].
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The state [n] of a rotor at rest.
+
     Notes
     -----
     i = (2/√3) i_pair e^{j(pair − 30° − ε)}: a current through two terminals, the third without.
@@ -104,6 +135,24 @@ def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
     """The pair's voltage [1, n, V].
+
+    Parameters
+    ----------
+    segment
+        The capture, on its true clock.
+    x
+        True state [n].
+    pieces
+        Flux and drops of the model there.
+    model
+        Effects of its sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [1, n]
+        In V.
 
     Notes
     -----

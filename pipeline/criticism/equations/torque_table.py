@@ -27,11 +27,27 @@ _TERMS = 3
 
 
 def cut(capture: Capture, machine: Machine) -> Segment | None:
-    """Rows of the table; levels of current, or parts of a sweep, are held out one by one.
+    """Rows of a table of torque against current.
 
-    The noise is the scatter about T0 + k i + s i³, with a curve of its own for every rotor angle:
-    friction that holds torque back on the way up and down is in it. The transducer's zero, and the
+    Parameters
+    ----------
+    capture
+        A table without a clock.
+    machine
+        Policy of tables.
+
+    Returns
+    -------
+    Segment or None
+        None with too few levels of current or too few rows; levels, or parts of a sweep, are held
+        out one by one.
+
+    Notes
+    -----
+    The noise is the scatter about T0 + k i + s i³, with a curve for every rotor angle: friction
+    that holds torque back on the way up and down is in it. The zero of the transducer, and the
     weight of an arm, is an offset that the table may have.
+
     """
     names = ("iq_a", TORQUE, *(name for name in _BESIDE if capture.has(name)))
     found = capture.arrays(*names)

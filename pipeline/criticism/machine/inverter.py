@@ -16,14 +16,38 @@ _SIN_120 = 0.5 * 3.0**0.5
 
 
 def turning(eps_rad: Array) -> Complex:
-    """Unit vector [n] of the rotor in the stationary frame: e^{jε} of an angle [n, rad]."""
+    """Unit vector of the rotor in the stationary frame.
+
+    Parameters
+    ----------
+    eps_rad
+        Electrical angle [n].
+
+    Returns
+    -------
+    array [n], complex
+        e^{jε}.
+
+    """
     turn = np.empty(eps_rad.shape, dtype=np.complex128)
     turn.real, turn.imag = np.cos(eps_rad), np.sin(eps_rad)
     return turn
 
 
 def phases_of(vector: Complex) -> Array:
-    """Components [3, n] along the phases a, b, c of a vector [n] of the stationary frame."""
+    """Components along the phases a, b and c of a vector of the stationary frame.
+
+    Parameters
+    ----------
+    vector
+        Complex [n], α on phase a.
+
+    Returns
+    -------
+    array [3, n]
+        In the unit of the vector.
+
+    """
     phases = np.empty((3, vector.size))
     phases[0] = vector.real
     across = _SIN_120 * vector.imag
@@ -33,7 +57,19 @@ def phases_of(vector: Complex) -> Array:
 
 
 def vector_of(phases: Array) -> Complex:
-    """Vector [n] of the stationary frame that phases [3, n] make: 2/3 Σ x_k e^{j2πk/3}."""
+    """Vector of the stationary frame of three phases, amplitude-invariant.
+
+    Parameters
+    ----------
+    phases
+        [3, n].
+
+    Returns
+    -------
+    array [n], complex
+        2/3 Σ x_k e^{j2πk/3}.
+
+    """
     vector = np.empty(phases.shape[1], dtype=np.complex128)
     vector.real = 2.0 / 3.0 * (phases[0] - 0.5 * (phases[1] + phases[2]))
     vector.imag = 2.0 / 3.0 * _SIN_120 * (phases[1] - phases[2])

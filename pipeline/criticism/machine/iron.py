@@ -21,6 +21,18 @@ PARALLEL = Parameter(
 def loss_current(x: Operating, drag_nm: Array) -> Complex:
     """Current [n, A] that feeds the iron's loss, by the drag [n, N·m] that the loss makes.
 
+    Parameters
+    ----------
+    x
+        True state, with its flux linkage [n].
+    drag_nm
+        Drag that the loss makes [n].
+
+    Returns
+    -------
+    array [n], complex
+        In A; zero for a machine that no inverter feeds.
+
     Notes
     -----
     The loss is fed at the terminals by the induced voltage e = j ω_e ψ, so its power is

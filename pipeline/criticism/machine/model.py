@@ -40,6 +40,19 @@ _STEP = 1e-30
 class Constant:
     """A parameter of the base model: unit, and the centre of a nuisance's prior; its standard
     uncertainty (`policy.priors`) is in multiples of a scale of the machine.
+
+    Attributes
+    ----------
+    parameter of the base model.
+    name, unit, words
+        Name, unit and meaning.
+    center
+        Centre of a nuisance's prior [unit].
+    hook
+        Where it enters.
+    scale
+        What its standard uncertainty (`policy.priors`) is in multiples of.
+
     """
 
     name: str
@@ -109,7 +122,14 @@ def _prior(name: str, priors: Priors) -> float | None:
 
 
 def base_of(machine: Machine) -> tuple[Constant, ...]:
-    """The base's constants, and the gains of further instruments that the station has."""
+    """The constants of the base model, and gains of further instruments that the station has.
+
+    Parameters
+    ----------
+    machine
+        Its `stated_u` names the gains.
+
+    """
     known = {constant.name for constant in BASE}
     further = sorted(set(machine.stated_u) - known)
     words = "gain of a further instrument"
@@ -118,7 +138,17 @@ def base_of(machine: Machine) -> tuple[Constant, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A machine, its base constants and effects; parameters are addressed `effect.parameter`."""
+    """A machine, its base constants and effects; parameters are addressed `effect.parameter`.
+
+    Attributes
+    ----------
+    machine, its base constants and effects; parameters are addressed `effect.parameter`.
+    machine
+        Size and policy.
+    effects
+        In the order in which they are applied.
+
+    """
 
     machine: Machine
     effects: tuple[Effect, ...]
@@ -137,9 +167,14 @@ class Model:
         }
 
     def priors(self) -> dict[str, tuple[float, float]]:
-        """Centre and standard uncertainty of every nuisance: what the station states of its own
-        instruments, else the constant's own; of what handbooks say of materials; and of what
-        somebody states of this motor.
+        """Centre and standard uncertainty of every nuisance and stated parameter.
+
+        Returns
+        -------
+        dict of tuple
+            By name [unit of the parameter]: what the station states of its instruments, else the
+            policy's value; what handbooks say of materials; and what is stated of this motor.
+
         """
         stated = self.machine.stated_u
         sizes = {"1": 1.0, **self.machine.scales}
@@ -158,16 +193,46 @@ class Model:
         return {name: both for name, both in self.machine.stated.items() if name in own}
 
     def with_effects(self, *effects: Effect) -> Model:
-        """This model and further effects."""
+        """This model and further effects.
+
+        Parameters
+        ----------
+        *effects
+            Added behind those there are.
+
+        """
         return replace(self, effects=self.effects + effects)
 
     def without(self, *names: str) -> Model:
-        """This model less the named effects."""
+        """This model less some effects.
+
+        Parameters
+        ----------
+        *names
+            Names of effects.
+
+        """
         return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
 
 
 def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, float]:
-    """One effect's parameters by their short names, in their units; zero what is left out."""
+    """The parameters of one effect by their short names.
+
+    Parameters
+    ----------
+    effect
+        An effect of the model.
+    machine
+        Determines which parameters there are.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    dict of float
+        In their units; 0 for those of optional terms that are left out.
+
+    """
     found = {p.name: values[f"{effect.name}.{p.name}"] for p in effect.parameters_of(machine)}
     if not effect.left_out:
         return found
@@ -175,7 +240,23 @@ def values_of(effect: Effect, machine: Machine, values: Values) -> dict[str, flo
 
 
 def clock_gain(recorder: str | None, model: Model, values: Values) -> float:
-    """Recorded time over true time, less one [1], of one of the `RECORDERS`; 0 of a table."""
+    """Recorded time over true time, less one.
+
+    Parameters
+    ----------
+    recorder
+        One of `RECORDERS`; None for a table.
+    model
+        Effects of clocks.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    float
+        Gain of the station's clock and of the effects together [1]; 0 for a table.
+
+    """
     if recorder is None:
         return 0.0
     gains = [
@@ -188,7 +269,20 @@ def clock_gain(recorder: str | None, model: Model, values: Values) -> float:
 
 @dataclass(slots=True)
 class Pieces:
-    """What the hooks give at each sample [n]: the model's equations are linear in these."""
+    """What the hooks give at each sample; the equations of the model are linear in these.
+
+    Attributes
+    ----------
+    psi_wb
+        Flux linkage, complex d + jq [n].
+    slope_wb
+        ∂W/∂ε, of which 1.5 p is a torque [n, Wb·A].
+    drop_v
+        Resistive and other drops, complex d + jq [n].
+    drag_nm
+        Torque that opposes positive rotation [n].
+
+    """
 
     psi_wb: Complex
     slope_wb: Array
@@ -197,13 +291,41 @@ class Pieces:
 
 
 def base_flux(x: Operating, base: Mapping[str, float]) -> Complex:
-    """Flux linkage [Wb] of magnet and constant inductances."""
+    """Flux linkage of magnet and constant inductances.
+
+    Parameters
+    ----------
+    x
+        True state [n].
+    base
+        Constants of the base model.
+
+    Returns
+    -------
+    array [n], complex
+        L_d i_d + ψ_m + j L_q i_q [Wb].
+
+    """
     flux: Complex = base["ld_h"] * x.id_a + base["psi_wb"] + 1j * base["lq_h"] * x.iq_a
     return flux
 
 
 def flux_of(current: Complex, base: Values) -> Complex:
-    """Flux linkage [n, Wb] that a current [n, A] makes in the constant inductances."""
+    """Flux linkage that a current makes in the constant inductances.
+
+    Parameters
+    ----------
+    current
+        Complex [n, A].
+    base
+        Constants of the base model.
+
+    Returns
+    -------
+    array [n], complex
+        L_d i_d + j L_q i_q [Wb].
+
+    """
     flux: Complex = base["ld_h"] * current.real + 1j * base["lq_h"] * current.imag
     return flux
 
@@ -359,7 +481,28 @@ def ripple(x: Operating, part: float, values: Values) -> tuple[Complex, Complex]
 
 
 def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
-    """Runs every hook but the sensors'; leaves flux and torque in `x` for those who ask."""
+    """Evaluates every hook of a model but those of sensors.
+
+    Parameters
+    ----------
+    model
+        Base and effects.
+    x
+        True state [n]; flux and air-gap torque are stored in it.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Pieces
+        Flux, drops and drags [n].
+
+    Notes
+    -----
+    Flux effects first, then the current that flows in parallel with the magnetising one, which
+    lowers the flux; drops at the mean current of the sample period, drags at the samples.
+
+    """
     flux, slope = base_flux(x, values), np.zeros(x.omega_rad_s.shape)
     for effect in model.effects:
         if effect.coenergy is not None:
@@ -386,7 +529,23 @@ def evaluate(model: Model, x: Operating, values: Values) -> Pieces:
 
 
 def zero(effect: Effect, model: Model, at: Iterable[tuple[str, float]] = ()) -> dict[str, float]:
-    """Values of an effect that is not there: amplitudes zero, shapes as in `at` or the first."""
+    """Values of an effect that is absent.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    model
+        Its machine.
+    at
+        Values of shape parameters by short name.
+
+    Returns
+    -------
+    dict of float
+        By full name: amplitudes 0, shapes as in `at` or the first of their trial values.
+
+    """
     shapes = dict(at)
     found = {}
     for p in effect.parameters_of(model.machine):

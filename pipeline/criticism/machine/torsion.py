@@ -37,11 +37,25 @@ from pipeline.criticism.policy.machine import Torsion
 
 @dataclass(frozen=True, slots=True)
 class Shaft:
-    """One capture of a shaft whose far end is free: angle [rad] and torques [N·m], all [n].
+    """One capture of a shaft whose far end is free.
 
-    `through_nm` less `near_kgm2` θ″ is what the coupling passes on; `momentum_nm` is what turns
-    `inertia_kgm2` (known to a few per cent). `kept` [n] are good samples, `u_*` the standard
-    deviations of a sample's noise; that of `through_nm` is in `momentum_nm` as well.
+    Attributes
+    ----------
+    ts_s
+        Sample period.
+    theta_rad
+        Angle of the motor [n].
+    through_nm
+        Torque that, less `near_kgm2` times the acceleration, the coupling passes on [n].
+    momentum_nm
+        Torque that turns `inertia_kgm2` [n].
+    near_kgm2, inertia_kgm2
+        Inertias; the latter is known to a few per cent.
+    u_theta_rad, u_through_nm, u_momentum_nm
+        Standard deviations of a sample's noise; that of `through_nm` is in `momentum_nm` as well.
+    kept
+        Good samples [n].
+
     """
 
     ts_s: float
@@ -58,9 +72,19 @@ class Shaft:
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """Softness 1/k [rad/(N·m)] and gap [rad] of a coupling, with standard uncertainties; times
-    the far share f where the load was recorded. `torque_nm` is the root mean square that it passes
-    in the `windows` in which the torque presses to both sides.
+    """Stiffness and gap of a coupling; times the far share f where the load was recorded.
+
+    Attributes
+    ----------
+    softness, u_softness
+        1/k and its standard uncertainty [rad/(N·m)].
+    gap_rad, u_gap_rad
+        Gap and its standard uncertainty.
+    torque_nm
+        Rms torque that it passes in the `windows`.
+    windows
+        Windows in which the torque presses to both sides.
+
     """
 
     softness: float

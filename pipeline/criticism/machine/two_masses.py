@@ -112,7 +112,19 @@ def linear_far_drag(x: Operating, q: Values) -> Array:
 
 
 def inertia_scale(machine: Machine) -> float:
-    """Order of magnitude of an inertia [kg·m²]: a tenth of a second to full speed."""
+    """Order of magnitude of an inertia: a tenth of a second to full speed.
+
+    Parameters
+    ----------
+    machine
+        Torque and speed scales.
+
+    Returns
+    -------
+    float
+        0.1 T/ω [kg·m²].
+
+    """
     return 0.1 * machine.scales["torque_nm"] / machine.scales["speed_rad_s"]
 
 

@@ -25,9 +25,20 @@ _CURRENTS = frozenset({"id_a", "iq_a", "i_pair_a"})
 class Fit:
     """Segments, a model of them, and the values that fit best.
 
-    `sigma` is each segment's noise floor by group, computed at the values `near`. Reading errors
-    are computed there too: those of a coasting shaft go with 1/J, and a fit could win by making J
-    small. `tolerance` is what the forms of effects found may be wrong by; empty: nothing.
+    Attributes
+    ----------
+    segments, model
+        What is fitted.
+    values
+        Parameters by full name, in their units.
+    sigma
+        Noise floor of each segment by group, computed at the values `near`.
+    near
+        Values at which reading errors are computed: those of a coasting shaft go with 1/J, and a
+        fit could win by making J small.
+    tolerance
+        What the forms of effects found may be wrong by; empty for nothing.
+
     """
 
     segments: tuple[Segment, ...]
@@ -48,28 +59,72 @@ class Fit:
         return self.model.machine
 
     def effect(self, name: str) -> Effect:
-        """An effect of the model by its name."""
+        """An effect of the model.
+
+        Parameters
+        ----------
+        name
+            Its name.
+
+        """
         return next(effect for effect in self.model.effects if effect.name == name)
 
     def size(self, effect: Effect, parameter: Parameter) -> float:
-        """Magnitude [unit of the parameter] of one parameter of an effect."""
+        """Magnitude of one parameter of an effect.
+
+        Parameters
+        ----------
+        effect
+            An effect of the model.
+        parameter
+            One of its parameters.
+
+        Returns
+        -------
+        float
+            In the unit of the parameter.
+
+        """
         return abs(self.values[f"{effect.name}.{parameter.name}"])
 
     def without(self, *names: str) -> Fit:
-        """The model less some effects; every other value stays."""
+        """The fit less some effects; every other value stays.
+
+        Parameters
+        ----------
+        *names
+            Names of effects.
+
+        """
         gone = tuple(f"{name}." for name in names)
         values = {name: v for name, v in self.values.items() if not name.startswith(gone)}
         return replace(self, model=self.model.without(*names), values=values)
 
     def at(self, values: Values) -> Fit:
-        """The same with other values where they are given, moved inside their bounds."""
+        """The fit with other values.
+
+        Parameters
+        ----------
+        values
+            By full name; each is moved inside its bounds.
+
+        """
         inside = {**self.values, **values}
         for name, (low, high) in limits_of(self.model).items():
             inside[name] = min(max(inside[name], low), high)
         return replace(self, values=inside)
 
     def moved(self, columns: Sequence[Column], step: Array) -> Fit:
-        """The same after a step along columns, each as far as its bounds."""
+        """The fit after a step.
+
+        Parameters
+        ----------
+        columns
+            Parameters that move.
+        step
+            Change of each [units of the parameters]; none goes beyond its bounds.
+
+        """
         moves = zip(columns, step.tolist(), strict=True)
         return self.at({c.name: self.values[c.name] + change for c, change in moves})
 
@@ -81,14 +136,40 @@ class Fit:
 
 
 def floors(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Array, ...]:
-    """Noise floor of every segment."""
+    """Noise floor of every segment.
+
+    Parameters
+    ----------
+    segments
+        The segments.
+    model
+        The model at which noise is propagated.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    tuple of array [groups]
+        Seeds are fixed, so the same input gives the same floors.
+
+    """
     seeds = range(_SEED, _SEED + len(segments))
     return on_each(noise_floor, segments, [(model, values, seed) for seed in seeds])
 
 
 def floors_grown(fit: Fit) -> tuple[Array, ...]:
-    """Noise floor of every segment at a fit's values, over the one that the fit was made with; the
-    same noise is added in both.
+    """Noise floor of every segment at the values of a fit, over the one that the fit was made with.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+
+    Returns
+    -------
+    tuple of array [groups]
+        Ratios [1]; the same noise is added in both, and 1 where there are no currents.
+
     """
     what = fit.model, fit.values
     each = [(*what, sigma, _SEED + n) for n, sigma in enumerate(fit.sigma)]
@@ -103,6 +184,20 @@ def _floor_grown(segment: Segment, model: Model, values: Values, sigma: Array, s
 
 
 def tolerances(fit: Fit, added: Sequence[Effect]) -> tuple[Array, ...]:
-    """What the forms of the effects found may be wrong by, of every segment."""
+    """What the forms of effects that were found may be wrong by.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    added
+        The effects that were found.
+
+    Returns
+    -------
+    tuple of array [groups]
+        One a segment, in the scale of `sigma`.
+
+    """
     what = fit.model, fit.values, tuple(added)
     return on_each(form_tolerance, fit.segments, [what] * len(fit.segments))

@@ -30,7 +30,21 @@ _SIDES = (
 
 
 def start_values(model: Model, machine: Machine) -> dict[str, float]:
-    """Where Gauss-Newton begins: orders of magnitude; the base is linear in its constants."""
+    """Where Gauss-Newton begins: orders of magnitude, absent effects, and stated constants.
+
+    Parameters
+    ----------
+    model
+        The model.
+    machine
+        Its scales.
+
+    Returns
+    -------
+    dict of float
+        By full name, in their units.
+
+    """
     scales = base_scales(machine)
     values = {c.name: scales.get(c.name, c.center) for c in base_of(machine)}
     for effect in model.effects:
@@ -171,7 +185,20 @@ def _pinned(model: Model) -> Model:
 
 
 def first_fit(near: Fit) -> LinearSystem:
-    """Fits a model from a rough fit, every equation by its noise floor."""
+    """Fits a model from a rough fit, every equation weighted by its noise floor.
+
+    Parameters
+    ----------
+    near
+        The rough fit.
+
+    Returns
+    -------
+    LinearSystem
+        Of a short programme of captures, the best of three starts: all equations together, those of
+        the winding first, and those of the shaft first.
+
+    """
     floor = floors(near.segments, near.model, near.values)
     begun = replace(near, model=_pinned(near.model), sigma=floor, near=near.values)
     ends = [gauss_newton(begun)]
@@ -186,6 +213,26 @@ def rough_anew(fit: Fit) -> Fit:
 
     Before an effect came in, its absence may have moved constants, and the floors made by them, to
     where no step leads back from: an encoder off its centre shakes a light rotor less.
+
+    Parameters
+    ----------
+    fit
+        The fit whose model is meant.
+
+    Attributes
+    ----------
+    rough fit, begun once more from orders of magnitude; shapes of effects keep their values.
+
+    Returns
+    -------
+    Fit
+        With the tolerance of the former one.
+
+    Notes
+    -----
+    Before an effect was added, its absence may have moved constants, and the floors made by them,
+    to where no step leads back from: an encoder off its centre shakes a light rotor less.
+
     """
     model = fit.model
     shapes = [name for name, (_, p) in model.parameters().items() if not p.amplitude]

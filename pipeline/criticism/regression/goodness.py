@@ -31,13 +31,21 @@ _MOST_BLOCKS = 10_000
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
-    """A fit's errors where each capture is predicted without itself.
+    """The errors of a fit where each capture is predicted without itself.
 
-    `residual` [R] is NaN in a capture that alone carries a constant, and so is always in the fit.
-    `total` is the rms of the others over what may be expected: the noise floor, times `widening`
-    [R] for what the other captures and the instruments leave open of the prediction; of the fit
-    itself if there are none. `steps` [own columns] are how far the parameters move without a
-    capture, by its number.
+    Attributes
+    ----------
+    residual
+        [R]; NaN in a capture that alone carries a constant, and so is always in the fit.
+    total
+        Rms of the others over what may be expected of a prediction [1]; of the fit itself where
+        there are none.
+    steps
+        How far the parameters move without a capture [own columns], by its number.
+    widening
+        Factor on the noise floor for what the other captures and the instruments leave open of a
+        prediction [R].
+
     """
 
     residual: Array
@@ -56,7 +64,25 @@ class HeldOut:
     def of(
         cls, system: LinearSystem, residual: Array, steps: Mapping[int, Array], widening: Array
     ) -> HeldOut:
-        """With the total over the rows that are held out, or over those of the fit if none is."""
+        """The held-out errors with their total.
+
+        Parameters
+        ----------
+        system
+            The fit.
+        residual
+            Held-out residual, NaN in captures that are always in the fit [R].
+        steps
+            How far the parameters move without a capture, by its number.
+        widening
+            Factor on the noise floor [R].
+
+        Returns
+        -------
+        HeldOut
+            The total is over the rows that are held out, or over those of the fit where none is.
+
+        """
         predicted = np.isfinite(residual)
         made = cls(residual, 0.0, steps, widening)
         errors = made.or_fit(system) / (system.noise_ratio * widening)
@@ -64,7 +90,19 @@ class HeldOut:
         return replace(made, total=math.sqrt(float((errors**2).mean())))
 
     def or_fit(self, system: LinearSystem) -> Array:
-        """The residual [R], that of the fit where a capture is always in it."""
+        """The held-out residual, that of the fit where a capture is always in it.
+
+        Parameters
+        ----------
+        system
+            The fit.
+
+        Returns
+        -------
+        array [R]
+            Whitened.
+
+        """
         return np.where(np.isfinite(self.residual), self.residual, system.residual)
 
 
@@ -157,7 +195,21 @@ def in_common(fits: Sequence[LinearSystem], held: Sequence[HeldOut]) -> tuple[He
 
 
 def predicted_chi2(system: LinearSystem, held: HeldOut) -> Array:
-    """χ²/n [G] of every group as `held` out; captures that are always in the fit as fitted."""
+    """χ²/n of every group as predicted without its capture.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    held
+        Its held-out residual.
+
+    Returns
+    -------
+    array [G]
+        Over what may be expected of a prediction; captures that are always in the fit as fitted.
+
+    """
     return system.reduced_chi2(held.or_fit(system) / held.widening)
 
 
@@ -184,7 +236,21 @@ def _lost(less: Array, normal: Array, policy: Goodness) -> bool:
 
 
 def signal_errors(system: LinearSystem, residual: Array) -> dict[str, float]:
-    """Rms error [unit of the signal] of each signal's window means."""
+    """Rms error of the window means of each signal.
+
+    Parameters
+    ----------
+    system
+        Scale of each row.
+    residual
+        Whitened [R]; NaN rows are left out.
+
+    Returns
+    -------
+    dict of float
+        By reported name, in the unit of the signal.
+
+    """
     found: dict[str, float] = {}
     plain = (
         reported_signal(system.segments[number], channel) if order == 0 else ""
@@ -224,9 +290,21 @@ def remainder(system: LinearSystem, large: bool = False) -> tuple[Remainder, ...
 
 
 def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ...]:
-    """Groups that are over their floor significantly, at any size, the worst first.
+    """Groups that are significantly over their floor, at any size.
 
-    They say where a held-out error over the floor comes from when `remainder` is empty.
+    Parameters
+    ----------
+    system
+        The fit.
+    large
+        Whether an error must be large beside the machine's own size, and not beside the readings.
+
+    Returns
+    -------
+    tuple of Remainder
+        Those that matter first, then by χ²/n. They show where a held-out error over the floor comes
+        from when `remainder` is empty.
+
     """
     found = []
     for place, chi2_per_n, size, matters in _over(system, system.noise_ratio, large):
@@ -239,8 +317,18 @@ def over_floor(system: LinearSystem, large: bool = False) -> tuple[Remainder, ..
 
 
 def significant_groups(system: LinearSystem) -> NDArray[np.bool_]:
-    """Groups [G] that a fit leaves over their floor, judged as `remainder` does, but with the
-    tolerance of form of the effects found in that floor.
+    """Groups that a fit leaves over their floor, as `remainder` judges it.
+
+    Parameters
+    ----------
+    system
+        The fit.
+
+    Returns
+    -------
+    array [G] of bool
+        The floor here has the tolerance of form of the effects found in it.
+
     """
     significant = np.zeros(len(system.labels), dtype=bool)
     as_whitened = np.ones(system.size)

@@ -36,12 +36,21 @@ _EDGE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What a fit knows of its `own` parameters.
+    """What a fit determines of its own parameters.
 
-    `found` is what the rows and the priors of the station say of them, `steps` [K, own] how far
-    they move without each capture that can be left out, `rest` [own] the step that the equations
-    still ask for where a bound or the end of the iterations keeps it from being done. `misfit`
-    [own, own]: the factor of `goodness.misfit`, or zeros where the form is taken for right.
+    Attributes
+    ----------
+    found
+        What rows and priors determine.
+    steps
+        How far the parameters move without each capture that can be left out [K, own].
+    rest
+        Step [own] that the equations would still take where a bound or the last iteration prevents
+        it.
+    misfit
+        Factor [own, own] of what errors of the model's form may do; zeros where the form is taken
+        as right.
+
     """
 
     found: Identified
@@ -112,7 +121,23 @@ def known(system: LinearSystem, held: HeldOut) -> Known:
 
 
 def known_by(system: LinearSystem, held: HeldOut, sizes: Array) -> Known:
-    """The same with the parameters' `sizes` [own] given."""
+    """What a system and its priors determine, with the sizes of the parameters given.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    held
+        Its held-out residual.
+    sizes
+        Magnitudes [own] at which the parameters matter.
+
+    Returns
+    -------
+    Known
+        Without errors of the model's form.
+
+    """
     own = system.own.size
     weight = system.weights(system.reduced_chi2(system.residual))
     matrix, prior_precision = system.matrix[:, :own], system.prior_precision[:own]
@@ -170,12 +195,27 @@ def _over(values: Array, one: int, other: int) -> Array:
 
 
 def reported_parameters(system: LinearSystem, held: HeldOut) -> dict[str, ModelParameter]:
-    """Every physical parameter of a fit by name; without a value where it is not determined.
+    """Every physical parameter of a fit; without a value where it is not determined.
 
-    Determined is what is known better than to its own size. A constant that no motor is without
-    must have an interval without zero, and no bound that holds it; another parameter's interval
-    must be narrower than sizes that are seen on real benches. A number that was chosen of a few, or
-    given by a discriminator, is determined where an amplitude of its effect is.
+    Parameters
+    ----------
+    system
+        The fit.
+    held
+        Its held-out residual.
+
+    Returns
+    -------
+    dict of ModelParameter
+        By name.
+
+    Notes
+    -----
+    A parameter is determined where it is known better than to its own size. A constant that no
+    motor is without must have an interval without zero, and stand at no bound; the interval of
+    another parameter must be narrower than sizes that are seen on real benches. A number that was
+    chosen of a few, or given by a discriminator, is determined where an amplitude of its effect is.
+
     """
     fit, model, own = system.fit, system.fit.model, system.columns[: system.own.size]
     sure_of = _reported(system, held)
@@ -211,6 +251,18 @@ def _or_stated(one: ModelParameter, stated: tuple[float, float] | None) -> Model
 
 def against_stated(system: LinearSystem, held: HeldOut) -> tuple[str, ...]:
     """Notes of the stated constants that the captures, without them, speak against.
+
+    Parameters
+    ----------
+    system
+        The fit.
+    held
+        Its held-out residual.
+
+    Returns
+    -------
+    tuple of str
+        One sentence a constant.
 
     Notes
     -----
@@ -259,10 +311,25 @@ def _at(value: float, limits: tuple[float, float] | None) -> bool:
 
 
 def reported_combinations(system: LinearSystem, held: HeldOut) -> tuple[KnownCombination, ...]:
-    """Combinations that the captures determine of parameters that they do not, one by one.
+    """Combinations that the captures determine of parameters that they do not determine one by one.
 
-    A matrix speaks of where the fit stands. So the directions without information are walked: what
-    is reported must be all there is to know far from here as well.
+    Parameters
+    ----------
+    system
+        The fit.
+    held
+        Its held-out residual.
+
+    Returns
+    -------
+    tuple of KnownCombination
+        Ratios, products and sums.
+
+    Notes
+    -----
+    A matrix describes where the fit stands. So the directions without information are followed to
+    either end: what is reported must be all that there is to know far from the fit as well.
+
     """
     fit, policy = system.fit, system.policy.fit
     names = [c.name for c in system.columns[: system.own.size]]

@@ -40,17 +40,42 @@ ColumnKey = tuple[str, tuple[tuple[str, float], ...]]
 
 @dataclass(frozen=True, slots=True)
 class LinearSystem:
-    """Weak samples of all segments around a fit: residual [R] and columns [R, P], over the noise.
+    """Weak samples of all segments, linearised at a fit.
 
-    `group` [R] numbers the groups of (segment, channel, order), `labels` names them. `unit` [R] is
-    a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by
-    `row_weight` [R]; `noise_ratio` [R] is the noise floor over the scale that a row is divided by,
-    below 1 where a tolerance of form was added. Rows of a group that misses its noise floor, χ²/n =
-    q > 1, count 1/q: the likelihood of a group whose scatter is at least the floor but otherwise
-    unknown. So an equation that lacks an effect does not move constants that sound equations know.
-    `prior_precision` [P] is the inverse prior variance of nuisances, `prior_gradient` [P] the
-    penalty's slope. Columns of the model's own parameters come first, `own_count` of them;
-    `made_at` holds the values at which each column was computed.
+    Rows of a group that misses its noise floor, χ²/n = q > 1, count 1/q: the likelihood of a group
+    whose scatter is at least the floor but otherwise unknown. So an equation that lacks an effect
+    does not move constants that sound equations determine.
+
+    Attributes
+    ----------
+    columns
+        Parameters; those of the model first, then candidates.
+    residual, matrix
+        Residual [R] and its derivatives [R, P], over the noise.
+    group
+        Number of the (segment, channel, order) of each row [R].
+    window
+        Window of each row [R].
+    unit
+        A residual of one as a window's mean, in the unit of the signal [R].
+    noise_ratio
+        Noise floor over the scale that a row was divided by [R]; below 1 where a tolerance of form
+        was added.
+    row_weight
+        What rows were multiplied by [R].
+    labels
+        Segment, channel and order of each group [G].
+    prior_precision
+        Inverse prior variance [P]; 0 without a prior.
+    prior_gradient
+        Half the slope of the priors' cost [P].
+    fit
+        Where it was linearised.
+    own_count
+        Number of columns of the model.
+    made_at
+        Values at which each column was computed.
+
     """
 
     columns: tuple[Column, ...]
@@ -113,8 +138,20 @@ class LinearSystem:
     def prior_costs(
         self, places: NDArray[np.int64] | None = None, step: Array | None = None
     ) -> Array:
-        """Squared distance [P] of every parameter from its prior's centre, in its standard
-        uncertainties, after a step along `places`; 0 where there is no prior.
+        """Squared distance of every parameter from the centre of its prior, after a step.
+
+        Parameters
+        ----------
+        places
+            Columns that move; None for no step.
+        step
+            Change of each of them.
+
+        Returns
+        -------
+        array [P]
+            In squared standard uncertainties; 0 without a prior.
+
         """
         gradient = self.prior_gradient.copy()
         if places is not None and step is not None:
@@ -122,33 +159,100 @@ class LinearSystem:
         return prior_costs(gradient, self.prior_precision)
 
     def weights(self, reduced_chi2: Array) -> Array:
-        """How much each weak sample [R] counts where groups have these χ²/n."""
+        """How much each weak sample counts.
+
+        Parameters
+        ----------
+        reduced_chi2
+            χ²/n of the groups [G].
+
+        Returns
+        -------
+        array [R]
+            1/max(χ²/n, 1) of the row's group.
+
+        """
         each: Array = 1.0 / np.maximum(reduced_chi2, 1.0)
         return each[self.group]
 
     def foreseen(self, step: Array) -> float:
-        """Deviance after a step along the first columns, to first order."""
+        """Deviance after a step along the first columns, to first order.
+
+        Parameters
+        ----------
+        step
+            Change of the first k parameters [k].
+
+        Returns
+        -------
+        float
+            −2 log likelihood and the cost of the priors.
+
+        """
         places = np.arange(step.size)
         cost = float(self.prior_costs(places, step).sum())
         return self.deviance_of(self.reduced_chi2(self.after(places, step))) + cost
 
     def reduced_chi2(self, residual: Array) -> Array:
-        """χ²/n [G] of each group, 1 where empty."""
+        """χ²/n of each group.
+
+        Parameters
+        ----------
+        residual
+            Whitened [R].
+
+        Returns
+        -------
+        array [G]
+            1 for an empty group.
+
+        """
         counts = self.counts
         total = np.bincount(self.group, residual**2, minlength=counts.size)
         return np.where(counts > 0, total / np.maximum(counts, 1.0), 1.0)
 
     def deviance_of(self, reduced_chi2: Array) -> float:
-        """−2 log likelihood of groups with these χ²/n [G]."""
+        """−2 log likelihood of the groups.
+
+        Parameters
+        ----------
+        reduced_chi2
+            χ²/n of the groups [G].
+
+        """
         return deviance_of(self.counts, reduced_chi2)
 
     def place(self, names: Iterable[str]) -> NDArray[np.int64]:
-        """Indices of columns by name."""
+        """Indices of columns by name.
+
+        Parameters
+        ----------
+        names
+            Full names of parameters.
+
+        Returns
+        -------
+        array of int
+            In the order of the columns; names without a column are left out.
+
+        """
         wanted = set(names)
         return np.array([n for n, c in enumerate(self.columns) if c.name in wanted], dtype=int)
 
     def normal_equations(self, places: NDArray[np.int64] | None = None) -> NormalEquations:
-        """Normal matrices by group of the columns at `places`, of all without."""
+        """Normal matrices by group.
+
+        Parameters
+        ----------
+        places
+            Columns; None for all.
+
+        Returns
+        -------
+        NormalEquations
+            The priors of the other columns cost what they cost at the fit.
+
+        """
         along = np.arange(len(self.columns)) if places is None else places
         elsewhere = self.prior_costs()
         elsewhere[along] = 0.0
@@ -159,7 +263,14 @@ class LinearSystem:
         return NormalEquations.of(rows, self.group, len(self.labels), prior, self.policy.fit)
 
     def along(self, places: NDArray[np.int64]) -> LinearSystem:
-        """The same system with some of its columns."""
+        """The same system with some of its columns.
+
+        Parameters
+        ----------
+        places
+            Indices of the columns.
+
+        """
         columns = tuple(self.columns[n] for n in places.tolist())
         prior_precision, prior_gradient = self.prior_precision[places], self.prior_gradient[places]
         matrix = self.matrix[:, places]
@@ -399,7 +510,14 @@ def _priors(model: Model, columns: Sequence[Column], values: Values) -> tuple[Ar
 
 
 def own_columns(model: Model) -> list[Column]:
-    """The columns of a model's own parameters, base first."""
+    """The columns of a model's own parameters, those of the base first.
+
+    Parameters
+    ----------
+    model
+        The model.
+
+    """
     columns = base_columns(model.machine, base_scales(model.machine))
     for effect in model.effects:
         columns += effect_columns(effect, model)

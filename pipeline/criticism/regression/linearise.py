@@ -51,9 +51,19 @@ _NOTHING = 1e-40
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One direction of the parameter space: a base constant, or a parameter of an effect.
+    """One direction of the parameter space.
 
-    `at` fixes the effect's shape parameters while its amplitudes are zero.
+    Attributes
+    ----------
+    name
+        A base constant, or `effect.parameter`.
+    step
+        Of its finite difference [unit of the parameter].
+    effect
+        The effect; None for a base constant.
+    at
+        Values of the effect's shape parameters while its amplitudes are zero.
+
     """
 
     name: str
@@ -69,12 +79,23 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Weak samples of one segment: residual [R] and columns [R, P], both over the noise.
+    """Weak samples of one segment, over the noise.
 
-    `group` [R] numbers (channel, order) pairs listed in `groups`, `window` [R] the window. `unit`
-    [R] is a residual of one as a window's mean, in the signal's own unit. Rows are multiplied by
-    `row_weight` [R]; `noise_ratio` [R] is the noise floor over the scale that a row is divided by,
-    below 1 where a tolerance of form was added.
+    Attributes
+    ----------
+    residual, columns
+        [R] and [R, P].
+    group, window
+        Group and window of each row [R].
+    unit
+        A residual of one as a window's mean, in the unit of the signal [R].
+    noise_ratio
+        Noise floor over the scale that a row was divided by [R].
+    row_weight
+        What rows were multiplied by [R].
+    groups
+        Channel and order of each group.
+
     """
 
     residual: Array
@@ -94,7 +115,27 @@ def linearise(
     columns: Sequence[Column],
     floor: Floor,
 ) -> Rows:
-    """Whitened residual and columns of one segment at `values`."""
+    """Whitened residual and columns of one segment.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    model
+        The model.
+    values
+        Parameters by full name, where it is linearised.
+    columns
+        Directions wanted.
+    floor
+        What rows are divided by.
+
+    Returns
+    -------
+    Rows
+        Disturbances absorbed; a column that the segment does not observe is zero.
+
+    """
     group, window, valid, groups = row_index(segment)
     sampler = _Sampler(segment, model, dict(values))
     noise, scale = floor.noise_and_scale(segment, model, sampler.x)
@@ -168,9 +209,19 @@ def _weak_columns(
 
 
 def absorb(rows: Array, unknown: Sequence[Array]) -> None:
-    """Whitens rows [R, P] in place for the disturbances [R each, of standard size] in `unknown`.
+    """Whitens rows in place for disturbances of unknown size.
 
+    Parameters
+    ----------
+    rows
+        [R, P].
+    unknown
+        Disturbances of their standard size [R each].
+
+    Notes
+    -----
     The factor is (1 + N Nᵀ)^(−1/2), N the disturbances: what is orthogonal to them stays as it is.
+
     """
     if unknown:
         axes, sizes, _ = np.linalg.svd(np.column_stack(list(unknown)), full_matrices=False)
@@ -181,9 +232,27 @@ def absorb(rows: Array, unknown: Sequence[Array]) -> None:
 def whitened_anew(
     segment: Segment, rows: Array, before: Array, after: Array, policy: NoiseFloors
 ) -> Array:
-    """Rows [R, P] of one segment, whitened by `after` [R] instead of `before` [R].
+    """Rows of one segment, whitened by other weights.
 
-    Disturbances are absorbed anew as well: beside a louder noise an offset is absorbed less.
+    Parameters
+    ----------
+    segment
+        Its disturbances, which are absorbed anew as well: beside a louder noise an offset is
+        absorbed less.
+    rows
+        [R, P].
+    before
+        Weights that they have now [R].
+    after
+        Weights that they are to have [R].
+    policy
+        Prior sizes of offsets.
+
+    Returns
+    -------
+    array [R, P]
+        A new array.
+
     """
     _, _, valid, _ = row_index(segment)
     bare = rows.copy()
@@ -376,14 +445,39 @@ class _Sampler:
 
 
 def base_columns(machine: Machine, scales: Mapping[str, float]) -> list[Column]:
-    """One column a base constant, with the step of its finite difference."""
+    """One column a base constant, with the step of its finite difference.
+
+    Parameters
+    ----------
+    machine
+        The machine.
+    scales
+        Orders of magnitude by name.
+
+    """
     return [Column(c.name, 1e-3 * scales.get(c.name, 1.0)) for c in base_of(machine)]
 
 
 def effect_columns(
     effect: Effect, model: Model, at: tuple[tuple[str, float], ...] = ()
 ) -> list[Column]:
-    """One column a parameter: amplitudes, and shapes too once the effect is in the model."""
+    """One column a parameter of an effect.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    model
+        The model, with the effect or without.
+    at
+        Values of shape parameters while the amplitudes are zero.
+
+    Returns
+    -------
+    list of Column
+        Amplitudes; shapes too once the effect is in the model.
+
+    """
     inside = effect in model.effects
     made = []
     for p in effect.parameters_of(model.machine):

@@ -42,6 +42,19 @@ class Hum:
     """A line that the recordings of one signal share: frequency [Hz], rms [the signal's unit].
 
     `kind` is that of the equations: terminals, drive and slow turn have instruments of their own.
+
+    Attributes
+    ----------
+    line of the mains that the recordings of one signal share.
+    kind
+        Of the equations: terminals, drive and slow turn have instruments of their own.
+    signal
+        The recorded signal.
+    freq_hz
+        Frequency.
+    rms
+        Rms [unit of the signal].
+
     """
 
     kind: str
@@ -51,11 +64,29 @@ class Hum:
 
 
 def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[Hum, ...]:
-    """The mains lines of every signal, from the residuals around a rough fit.
+    """The mains lines of every signal, from the residuals of a rough fit.
 
-    A line is there if its power is 20 times that beside it in three captures, in whatever signals.
-    A signal then has the line if it stands out there in half of the captures that can show it. A
-    capture cannot if an order of its turning shaft, or the rate of a map's levels, is too near.
+    Parameters
+    ----------
+    segments
+        The segments.
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    tuple of Hum
+        Empty where no line stands out.
+
+    Notes
+    -----
+    A line is present if its power is many times that beside it in enough captures, in whatever
+    signals. A signal then has the line if it stands out there in half of the captures that can show
+    it. A capture cannot if an order of its turning shaft, or the rate of a map's levels, is too
+    near.
+
     """
     policy = model.policy.mains_hum
     powers: dict[tuple[str, str, float], list[tuple[float, float]]] = defaultdict(list)
@@ -92,16 +123,42 @@ def hum_of(segments: Sequence[Segment], model: Model, values: Values) -> tuple[H
 def with_hum(
     segments: Sequence[Segment], hums: Sequence[Hum], model: Model, values: Values
 ) -> tuple[Segment, ...]:
-    """The segments, each knowing the lines that its channels may have.
+    """The segments with the lines that their channels may have.
 
-    A sensor of current may pick up as much as one of voltage, both in multiples of their noise. The
-    model says what that does: its share of a torque grows with the current.
+    Parameters
+    ----------
+    segments
+        The segments.
+    hums
+        The lines.
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    tuple of Segment
+        A current sensor may pick up as much as a voltage sensor, both in multiples of their noise;
+        the model determines what that does, as its share of a torque grows with the current.
+
     """
     return tuple(_humming(segment, hums, model, values) for segment in segments)
 
 
 def hum_notes(hums: Sequence[Hum]) -> tuple[str, ...]:
-    """A note on every signal with mains hum in it."""
+    """A note on every signal with mains hum in it.
+
+    Parameters
+    ----------
+    hums
+        The lines.
+
+    Attributes
+    ----------
+    note on every signal with mains hum in it.
+
+    """
     notes = []
     for signal in dict.fromkeys(hum.signal for hum in hums):
         mine = [hum for hum in hums if hum.signal == signal]

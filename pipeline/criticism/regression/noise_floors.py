@@ -29,8 +29,17 @@ SPEED = "omega_mech_rad_s"
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """What the rows of a segment are divided by: noise `sigma` [groups], the reading error at the
-    values `near`, and what the forms of effects may be wrong by, `tolerance` [groups].
+    """What the rows of a segment are divided by.
+
+    Attributes
+    ----------
+    sigma
+        Noise [groups].
+    near
+        Values at which reading errors are computed.
+    tolerance
+        What the forms of effects may be wrong by [groups]; None for nothing.
+
     """
 
     sigma: Array
@@ -40,7 +49,23 @@ class Floor:
     def noise_and_scale(
         self, segment: Segment, model: Model, state: Operating
     ) -> tuple[Array, Array]:
-        """Noise floor [R] of the weak samples, and the same with the tolerance of form."""
+        """Noise floor of the weak samples, without and with the tolerance of form.
+
+        Parameters
+        ----------
+        segment
+            The segment.
+        model
+            The model.
+        state
+            True state of the segment.
+
+        Returns
+        -------
+        tuple of array [R]
+            Both as weak samples of the residual.
+
+        """
         group, _, valid, _ = row_index(segment)
         reading = reading_error(segment, model, self.near, state)[valid]
         noise: Array = np.hypot(self.sigma[group[valid]], reading)
@@ -127,7 +152,27 @@ def _shifts(segment: Segment, count: int, seed: int) -> dict[str, Array]:
 
 
 def rough_floor(segment: Segment, model: Model, values: Values) -> Array:
-    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise."""
+    """A twentieth of the machine's own scale [groups], as weak samples, whatever the noise.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    model
+        Its policy.
+    values
+        Parameters by full name.
+
+    Attributes
+    ----------
+    floor by the machine's own scale, whatever the noise.
+
+    Returns
+    -------
+    array [groups]
+        As weak samples.
+
+    """
     _, _, _, groups = row_index(segment)
     scales = [channel_scale(segment, channel, model.machine, values) for channel, _ in groups]
     floor: Array = (
@@ -276,11 +321,28 @@ def _of_torque(
 
 
 def steep_drops(model: Model, values: Values, x: Operating) -> Complex:
-    """How far the drops of effects are off [n, V], d + jq, where their currents are by a twentieth.
+    """How far the drops of effects are off where the currents at which they change are off.
 
-    A drop that jumps with the current, as that of an inverter whose ripple just exceeds it, is
-    off by all of that jump where the current at which it does is off by little. What follows the
-    current itself is a resistance, which a fit knows.
+    Parameters
+    ----------
+    model
+        The model.
+    values
+        Parameters by full name.
+    x
+        True state [n].
+
+    Returns
+    -------
+    array [n], complex
+        d + jq [V].
+
+    Notes
+    -----
+    A drop that jumps with the current, as that of an inverter whose ripple just exceeds it, is off
+    by all of that jump where the current at which it jumps is off by little. What is in proportion
+    to the current is a resistance, which a fit determines.
+
     """
     known = dict(values)
     for effect in model.effects:
@@ -380,8 +442,24 @@ def _encoder_lines(segment: Segment, values: Values, policy: NoiseFloors) -> Arr
 def offsets(
     segment: Segment, valid: NDArray[np.bool_], row_weight: Array, policy: NoiseFloors
 ) -> list[Array]:
-    """Whitened weak samples of the disturbances that a segment may hold, each of its prior size: an
-    offset of each channel's sensor, mains lines and drift.
+    """Whitened weak samples of the disturbances that a segment may hold.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    valid
+        Weak samples that are used [C, W, M].
+    row_weight
+        Weights of the rows [R].
+    policy
+        Prior sizes of offsets.
+
+    Returns
+    -------
+    list of array [R]
+        An offset of each channel's sensor, mains lines and drift, each of its prior size.
+
     """
     shapes, lines = segment.disturbances.offsets, segment.disturbances.lines
     made = [] if lines is None else [line[valid] * row_weight for line in lines]

@@ -22,8 +22,17 @@ rounding moves them."""
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """Where a fit along some columns ends: step [k], χ²/n [G] of every group after it, and its
-    deviance, the cost of the priors included.
+    """Where a fit along some columns ends.
+
+    Attributes
+    ----------
+    step
+        Change of the parameters [k].
+    reduced_chi2
+        χ²/n of every group after it [G].
+    deviance
+        −2 log likelihood there, the cost of the priors included.
+
     """
 
     step: Array
@@ -33,8 +42,17 @@ class Descent:
 
 @dataclass(frozen=True, slots=True)
 class Prior:
-    """What is known of k parameters beforehand: inverse prior variance `precision` [k], half the
-    `gradient` [k] of its cost, and what the priors of other parameters cost, `elsewhere`.
+    """What is known of k parameters beforehand.
+
+    Attributes
+    ----------
+    precision
+        Inverse prior variance [k].
+    gradient
+        Half the gradient of its cost [k].
+    elsewhere
+        Cost of the priors of other parameters.
+
     """
 
     precision: Array
@@ -42,12 +60,31 @@ class Prior:
     elsewhere: float = 0.0
 
     def cost(self, step: Array | float = 0.0) -> float:
-        """Squared distance from the centres after a step [k], in standard uncertainties."""
+        """Squared distance from the centres after a step.
+
+        Parameters
+        ----------
+        step
+            Change of the parameters [k].
+
+        Returns
+        -------
+        float
+            In squared standard uncertainties.
+
+        """
         gradient = self.gradient + self.precision * step
         return float(prior_costs(gradient, self.precision).sum())
 
     def along(self, places: NDArray[np.int64]) -> Prior:
-        """The same for some of the parameters."""
+        """The prior of some of the parameters.
+
+        Parameters
+        ----------
+        places
+            Their indices; the cost of the others goes into `elsewhere`.
+
+        """
         out = np.setdiff1d(np.arange(self.precision.size), places)
         rest = float(prior_costs(self.gradient[out], self.precision[out]).sum())
         return Prior(self.precision[places], self.gradient[places], self.elsewhere + rest)
@@ -57,8 +94,21 @@ class Prior:
 class NormalEquations:
     """What a fit along k columns needs of the rows of G groups.
 
-    `counts` [G] are their weak samples, `power` [G] the residuals' sums of squares, `slope` [G, k]
-    the columns times the residual and `normal` [G, k, k] the columns times each other.
+    Attributes
+    ----------
+    counts
+        Weak samples [G].
+    power
+        Sums of squares of the residuals [G].
+    slope
+        Columns times the residual [G, k].
+    normal
+        Columns times each other [G, k, k].
+    prior
+        What is known of the parameters beforehand.
+    policy
+        When a fit has converged.
+
     """
 
     counts: Array
@@ -72,7 +122,22 @@ class NormalEquations:
     def of(
         cls, rows: Array, group: NDArray[np.int64], count: int, prior: Prior, policy: GaussNewton
     ) -> NormalEquations:
-        """From residual and columns `rows` [R, 1 + k], their groups numbered below `count`."""
+        """The normal equations of some rows.
+
+        Parameters
+        ----------
+        rows
+            Residual and columns [R, 1 + k].
+        group
+            Group of each row [R].
+        count
+            Number of groups.
+        prior
+            What is known of the parameters beforehand.
+        policy
+            When a fit has converged.
+
+        """
         both = rows[np.argsort(group, kind="stable")]
         counts = np.bincount(group, minlength=count)
         edges = np.concatenate([[0], np.cumsum(counts)])
@@ -90,7 +155,14 @@ class NormalEquations:
         )
 
     def along(self, places: NDArray[np.int64]) -> NormalEquations:
-        """The same for some of the columns."""
+        """The normal equations of some of the columns.
+
+        Parameters
+        ----------
+        places
+            Their indices.
+
+        """
         return NormalEquations(
             self.counts,
             self.power,
@@ -101,7 +173,16 @@ class NormalEquations:
         )
 
     def moved(self, places: NDArray[np.int64], step: Array) -> NormalEquations:
-        """The same around where a step along some columns leads; priors stay where they were."""
+        """The normal equations at the end of a step; the priors stay where they were.
+
+        Parameters
+        ----------
+        places
+            Columns that move.
+        step
+            Change of each.
+
+        """
         rows = self.normal[:, places]
         power = _after(self.power, self.slope[:, places], rows[:, :, places], step)
         return replace(self, power=power, slope=self.slope + step @ rows)
@@ -221,13 +302,43 @@ def _after(power: Array, slope: Array, normal: Array, step: Array) -> Array:
 
 
 def prior_costs(gradient: Array, precision: Array) -> Array:
-    """Squared distances [k] from the priors' centres in standard uncertainties."""
+    """Squared distances from the centres of priors.
+
+    Parameters
+    ----------
+    gradient
+        Half the slope of the cost [k].
+    precision
+        Inverse prior variance [k].
+
+    Returns
+    -------
+    array [k]
+        In squared standard uncertainties; 0 without a prior.
+
+    """
     costs: Array = gradient**2 / np.where(precision > 0, precision, np.inf)
     return costs
 
 
 def unit_diagonal(normal: Array) -> Array:
-    """A normal matrix [k, k] with each column in its own size, so that its diagonal is 1."""
+    """A normal matrix [k, k] with each column in its own size, so that its diagonal is 1.
+
+    Parameters
+    ----------
+    normal
+        [k, k].
+
+    Attributes
+    ----------
+    normal matrix with each column divided by its own size, so that the diagonal is 1.
+
+    Returns
+    -------
+    array [k, k]
+        Symmetric.
+
+    """
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     unit: Array = normal / np.outer(scale, scale)
     return unit

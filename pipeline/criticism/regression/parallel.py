@@ -21,7 +21,23 @@ _THREADS = 2
 def by_threads(
     work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
 ) -> tuple[Any, ...]:
-    """On two threads: numpy leaves the interpreter to the other where arrays are large."""
+    """Maps a function over segments on two threads.
+
+    Parameters
+    ----------
+    work
+        Function of a segment and its arguments.
+    segments
+        The segments.
+    arguments
+        Further arguments of each.
+
+    Returns
+    -------
+    tuple
+        Results in the order of the segments. numpy releases the interpreter where arrays are large.
+
+    """
     with ThreadPoolExecutor(max_workers=_THREADS) as pool:
         return tuple(pool.map(lambda one, with_: work(one, *with_), segments, arguments))
 
@@ -31,7 +47,14 @@ _DOING: ContextVar[Doing] = ContextVar("doing", default=by_threads)
 
 @contextmanager
 def done_by(doing: Doing) -> Iterator[None]:
-    """Inside the block work on segments is done as `doing` does it."""
+    """Inside the block, work on segments is done by another function.
+
+    Parameters
+    ----------
+    doing
+        Takes `work`, segments and arguments, as `by_threads` does.
+
+    """
     before = _DOING.set(doing)
     try:
         yield
@@ -42,5 +65,21 @@ def done_by(doing: Doing) -> Iterator[None]:
 def on_each(
     work: Work, segments: Sequence[Segment], arguments: Sequence[tuple[Any, ...]]
 ) -> tuple[Any, ...]:
-    """`work(segment, *arguments)` of every segment, in order; `work` is a module's function."""
+    """Maps a function over segments, as `done_by` says, on threads by default.
+
+    Parameters
+    ----------
+    work
+        Function of a module, so that another process can find it.
+    segments
+        The segments.
+    arguments
+        Further arguments of each.
+
+    Returns
+    -------
+    tuple
+        Results in the order of the segments.
+
+    """
     return _DOING.get()(work, segments, arguments)

@@ -13,28 +13,88 @@ from pipeline.criticism.library.equations import equation_of
 
 
 def channel_of(segment: Segment, name: str) -> Channel:
-    """What the equation of a segment says of one of its channels."""
+    """The channel of a segment, as its equation declares it.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    name
+        Recorded signal of the channel.
+
+    """
     return equation_of(segment).channel(name)
 
 
 def reported_signal(segment: Segment, channel: str) -> str:
-    """A channel as outputs name it: of a coasting shaft the equation gives an acceleration."""
+    """The name of a channel in outputs.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    channel
+        Recorded signal; of a coasting shaft the equation gives an acceleration.
+
+    """
     return channel_of(segment, channel).reported or channel
 
 
 def of_acceleration(segment: Segment, channel: str) -> bool:
-    """Whether an equation is one of accelerations [rad/s²]: of a shaft that runs free."""
+    """Whether a residual is one of acceleration: of a shaft that runs free.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    channel
+        Recorded signal of the channel.
+
+    """
     return channel_of(segment, channel).acceleration
 
 
 def reported_unit(segment: Segment, values: Values) -> float:
-    """The channel's own unit a unit of the residual: a free shaft's is an acceleration [rad/s²]."""
+    """What one unit of the residual is in the unit of the channel.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    float
+        J for a free shaft whose acceleration [rad/s²] is reported as a torque [N·m], else 1.
+
+    """
     as_torque = any(channel_of(segment, name).as_torque for name in segment.channels)
     return values["j_kgm2"] if as_torque else 1.0
 
 
 def channel_scale(segment: Segment, channel: str, machine: Machine, values: Values) -> float:
-    """The machine's own size in a channel's unit; of a bench meter its largest reading."""
+    """The machine's own size in the unit of a channel.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    channel
+        Recorded signal of the channel.
+    machine
+        Its scales.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    float
+        Of a bench meter its largest reading, of an axis whose current is zero that of the other
+        axis.
+
+    """
     one = channel_of(segment, channel)
     if not one.scale:
         # an axis that stands still has the scale of the other one
@@ -44,5 +104,14 @@ def channel_scale(segment: Segment, channel: str, machine: Machine, values: Valu
 
 
 def largest_reading(segment: Segment, names: Sequence[str]) -> float:
-    """Largest magnitude of any of these recorded signals."""
+    """Largest magnitude of some recorded signals.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    names
+        Recorded signals.
+
+    """
     return max(float(np.abs(segment.recorded[name]).max()) for name in names)

@@ -8,14 +8,32 @@ from pipeline.criticism.library.equations import equation_of
 
 
 def observes_sensor(segment: Segment, sensor: str) -> bool:
-    """Whether an error of a sensor is in a segment's equation."""
+    """Whether an error of a sensor is in the equation of a segment.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    sensor
+        `angle`, `current`, `voltage`, `load`, `clock` or `lcr`.
+
+    """
     if sensor == "load" and "torque_shaft_nm" not in segment.channels:
         return False
     return sensor in equation_of(segment).observes.sensors
 
 
 def observes(segment: Segment, effect: Hooks) -> bool:
-    """Whether what an effect does is in a segment's equation at all."""
+    """Whether an effect is in the equation of a segment at all.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    effect
+        Its hooks.
+
+    """
     if effect.hook == "sensor":
         return any(observes_sensor(segment, sensor) for sensor in _sensors_of(effect))
     seen = equation_of(segment).observes

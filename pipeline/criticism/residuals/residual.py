@@ -17,7 +17,25 @@ from pipeline.numerics.projection import Projection
 def residual(
     segment: Segment, model: Model, values: Values, recorded: Mapping[str, Array] | None = None
 ) -> Array:
-    """Recorded less predicted [C, n] of every channel of a segment."""
+    """Recorded less predicted signals of a segment, sample by sample.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    model
+        The model.
+    values
+        Parameters by full name.
+    recorded
+        Other recorded columns in place of the segment's, such as noisy ones.
+
+    Returns
+    -------
+    array [C, n]
+        In the units of the channels.
+
+    """
     signals = segment.recorded if recorded is None else recorded
     equation = equation_of(segment)
     segment = on_true_clock(segment, equation.recorder, model, values)
@@ -30,14 +48,50 @@ def residual(
 def operate(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values
 ) -> Operating:
-    """True currents, angle and speed [n] of a segment, the sensor effects taken out."""
+    """True currents, angle and speed of a segment, the errors of its sensors taken out.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    signals
+        Recorded columns [n].
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The state [n].
+
+    """
     equation = equation_of(segment)
     segment = on_true_clock(segment, equation.recorder, model, values)
     return equation.state(segment, signals, model, values)
 
 
 def measured(segment: Segment, signals: Mapping[str, Array], model: Model, values: Values) -> Array:
-    """Recorded signals [C, n] of the channels, in the units of the prediction."""
+    """Recorded signals of the channels, in the units of the prediction.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    signals
+        Recorded columns [n].
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [C, n]
+        One row a channel.
+
+    """
     equation = equation_of(segment)
     segment = on_true_clock(segment, equation.recorder, model, values)
     return equation.measured(segment, signals, model, values)
@@ -46,7 +100,27 @@ def measured(segment: Segment, signals: Mapping[str, Array], model: Model, value
 def predicted(
     segment: Segment, x: Operating, pieces: Pieces, model: Model, values: Values
 ) -> Array:
-    """Predicted signals [C, n] of the channels from the pieces the hooks gave."""
+    """Predicted signals of the channels.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    x
+        True state [n].
+    pieces
+        What the hooks gave there.
+    model
+        The model.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [C, n]
+        One row a channel.
+
+    """
     equation = equation_of(segment)
     segment = on_true_clock(segment, equation.recorder, model, values)
     return equation.predicted(segment, x, pieces, model, values)
@@ -55,8 +129,28 @@ def predicted(
 def disturbed(
     segment: Segment, weak: Projection, model: Model, values: Values, name: str, waves: Array
 ) -> Array:
-    """What additions to one sensor, waves [K, n] in its unit, do to the weak samples
-    [K, C, W, M].
+    """What additions to one sensor do to the weak samples.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    weak
+        Its windows.
+    model
+        The model.
+    values
+        Parameters by full name.
+    name
+        The recorded signal.
+    waves
+        Additions [K, n] in its unit.
+
+    Returns
+    -------
+    array [K, C, W, M]
+        Change of the weak residual.
+
     """
     here, column = residual(segment, model, values), segment.recorded[name]
     moved = ({**segment.recorded, name: column + wave} for wave in waves)

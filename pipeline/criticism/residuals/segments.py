@@ -19,8 +19,21 @@ from pipeline.records.capture import Campaign, Capture
 
 
 def segments(campaign: Campaign, machine: Machine) -> tuple[Segment, ...]:
-    """Every usable capture as a segment, in path order; a capture that lacks what its test's
-    equation needs, is too short, or whose clock does not rise, is left out.
+    """Every usable capture as segments, in the order of paths.
+
+    Parameters
+    ----------
+    campaign
+        Captures of one motor.
+    machine
+        Size of the motor.
+
+    Returns
+    -------
+    tuple of Segment
+        A capture is left out that lacks what the equation of its test needs, is too short, or whose
+        clock does not rise.
+
     """
     made: list[Segment] = []
     gains = gains_of(campaign.captures)
@@ -94,7 +107,25 @@ def _by_encoder(segment: Segment, machine: Machine) -> Segment:
 
 
 def sparse(segment: Segment, windows: int) -> Segment:
-    """The same segment with a few of its windows only, for a first, rough fit."""
+    """The same segment with a few of its windows only, for a first, rough fit.
+
+    Parameters
+    ----------
+    segment
+        The segment.
+    windows
+        How many windows are kept.
+
+    Attributes
+    ----------
+    segment with a few of its windows only, for a first, rough fit.
+
+    Returns
+    -------
+    Segment
+        The same where it has no more, and for a table.
+
+    """
     weak = segment.weak
     if weak is None or weak.starts.size <= windows:
         return segment

@@ -18,12 +18,42 @@ TORQUE_RIPPLES = ("ripple_mean", "ripple_torque", "ripple_held")
 
 
 def net_torque(x: Operating, pieces: Pieces) -> Array:
-    """Torque of the air gap less the drags [n, N·m]: 1.5 p [Im(ψ* i) + ∂W/∂ε] − drags."""
+    """Torque of the air gap less the drags.
+
+    Parameters
+    ----------
+    x
+        True state [n].
+    pieces
+        Flux and drags of the model there.
+
+    Returns
+    -------
+    array [n]
+        1.5 p [Im(ψ* i) + ∂W/∂ε] − drags [N·m].
+
+    """
     return air_gap_torque(x, pieces.psi_wb, pieces.slope_wb) - pieces.drag_nm
 
 
 def torque_reading(segment: Segment, model: Model, values: Values) -> Array:
-    """Torque [n, N·m] of the length of a drive's recorded current."""
+    """Torque that the length of a drive's recorded current would give.
+
+    Parameters
+    ----------
+    segment
+        A log with currents.
+    model
+        Number of pole pairs.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [n]
+        1.5 p ψ_m |i| [N·m].
+
+    """
     kt = 1.5 * model.machine.pole_pairs * values["psi_wb"]
     direct = segment.recorded.get("id_a", np.zeros(segment.size))
     torque: Array = kt * np.hypot(direct, segment.recorded["iq_a"])
@@ -31,9 +61,26 @@ def torque_reading(segment: Segment, model: Model, values: Values) -> Array:
 
 
 def moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
-    """What the current moves on by within a part of a sample period [n, A]: c T_s di/dt.
+    """Change of the current within a part of a sample period.
 
-    Steps of the current come at one phase of a log's samples, which are its means at none.
+    Parameters
+    ----------
+    segment
+        A log.
+    x
+        True state [n m].
+    values
+        Parameters by full name; `ripple_torque` is the part c.
+
+    Returns
+    -------
+    array [n m], complex
+        c T_s di/dt [A].
+
+    Notes
+    -----
+    Steps of the current come at one phase of the samples of a log, which are means over no period.
+
     """
     period = segment.ts_s * segment.size / x.theta_rad.size
     current: Complex = values["ripple_torque"] * segment.ts_s * central(x.i_a, period)
@@ -41,7 +88,23 @@ def moved_on(segment: Segment, x: Operating, values: Values) -> Complex:
 
 
 def torque_of_current(x: Operating, pieces: Pieces, current: Complex) -> Array:
-    """Torque [n, N·m] of a small further current [n, A] at the same flux."""
+    """Torque of a small further current at the same flux.
+
+    Parameters
+    ----------
+    x
+        True state [n].
+    pieces
+        Flux of the model there.
+    current
+        Complex [n, A].
+
+    Returns
+    -------
+    array [n]
+        1.5 p Im(ψ* i) [N·m].
+
+    """
     torque: Array = 1.5 * x.machine.pole_pairs * (np.conj(pieces.psi_wb) * current).imag
     return torque
 
@@ -113,7 +176,27 @@ def sensed_torque(
 
 
 def as_sensed(torque_nm: Array, model: Model, values: Values) -> Array:
-    """A true torque [n, N·m] of the shaft as its transducer shows it."""
+    """A true torque [n, N·m] of the shaft as its transducer shows it.
+
+    Parameters
+    ----------
+    torque_nm
+        True torque [n].
+    model
+        Effects of the transducer.
+    values
+        Parameters by full name.
+
+    Attributes
+    ----------
+    true torque of the shaft as its transducer shows it.
+
+    Returns
+    -------
+    array [n]
+        In N·m.
+
+    """
     for effect in model.effects:
         if effect.shaft is not None:
             torque_nm = effect.shaft(torque_nm, values_of(effect, model.machine, values))

@@ -35,7 +35,18 @@ from pipeline.criticism.policy.captures import Cutting
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Angle [n, rad] and speed [n, rad/s] of the shaft, electrical frequency [n, Hz]."""
+    """Motion of the shaft.
+
+    Attributes
+    ----------
+    theta_rad
+        Angle [n].
+    omega_rad_s
+        Speed [n].
+    freq_hz
+        Electrical frequency [n].
+
+    """
 
     theta_rad: Array
     omega_rad_s: Array
@@ -43,13 +54,37 @@ class Motion:
 
 
 def on_true_clock(segment: Segment, recorder: str | None, model: Model, values: Values) -> Segment:
-    """The segment with its true sample period in place of the recorded one."""
+    """The segment with its true sample period in place of the recorded one.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+    recorder
+        Whose clock it goes by; None for a table.
+    model
+        Effects of clocks.
+    values
+        Parameters by full name.
+
+    Attributes
+    ----------
+    segment with its true sample period in place of the recorded one.
+
+    """
     gain = clock_gain(recorder, model, values)
     return replace(segment, ts_s=segment.ts_s / (1.0 + gain)) if gain else segment
 
 
 def at_rest(size: int) -> Motion:
-    """The motion of a shaft that stands still [size]."""
+    """The motion of a shaft that stands still.
+
+    Parameters
+    ----------
+    size
+        Samples.
+
+    """
     zero = np.zeros(size)
     return Motion(zero, zero, zero)
 
@@ -57,8 +92,25 @@ def at_rest(size: int) -> Motion:
 def motion_of(
     segment: Segment, signals: Mapping[str, Array], machine: Machine, finer: int = 1
 ) -> Motion:
-    """The shaft's motion from its angle; `finer` points a sample where the shaft turns so far in
-    one that the samples alone would miss an order of the torque.
+    """The motion of a shaft from its recorded angle.
+
+    Parameters
+    ----------
+    segment
+        Sample period.
+    signals
+        `theta_mech_rad` [n].
+    machine
+        Pole pairs and policy.
+    finer
+        Points m a sample, where the shaft turns so far in one that the samples alone would miss an
+        order of the torque.
+
+    Returns
+    -------
+    Motion
+        [n m], between samples on straight lines; the speed is smoothed.
+
     """
     theta = signals["theta_mech_rad"]
     if finer > 1:
@@ -69,7 +121,23 @@ def motion_of(
 
 
 def finer_of(segment: Segment, machine: Machine, finest: int) -> int:
-    """How many points a sample the torque of a free shaft is averaged over."""
+    """How many points a sample the torque of a free shaft is averaged over.
+
+    Parameters
+    ----------
+    segment
+        A capture with an angle.
+    machine
+        Orders of its torque.
+    finest
+        Most points.
+
+    Returns
+    -------
+    int
+        1 where the highest order hardly turns within a sample.
+
+    """
     highest, policy = max(*slow_orders(machine), 1), machine.policy.cutting
     turn = highest * float(np.abs(np.diff(segment.recorded["theta_mech_rad"])).max())
     if turn < policy.instant_rad:
@@ -85,7 +153,29 @@ def operating(
     current: Complex,
     motion: Motion,
 ) -> Operating:
-    """Where the machine is at each sample of a bench, its true current and motion known."""
+    """The state of a machine whose true current and motion are known.
+
+    Parameters
+    ----------
+    segment
+        What is known of supply, temperatures and shaft.
+    signals
+        Recorded columns [n].
+    model
+        The machine.
+    values
+        Parameters by full name.
+    current
+        True complex current [n m, A].
+    motion
+        True motion [n m].
+
+    Returns
+    -------
+    Operating
+        As of a bench; `Operating.fed` makes it that of a drive.
+
+    """
     theta = motion.theta_rad
     return Operating(
         machine=model.machine,
@@ -117,13 +207,45 @@ def operating(
 
 
 def hold_s(segment: Segment, policy: Cutting) -> float:
-    """Time [s] for which a voltage vector is held: a PWM period, or that of a log as fast."""
+    """Time for which a voltage vector is constant.
+
+    Parameters
+    ----------
+    segment
+        Its PWM period, where stated.
+    policy
+        How much slower a log must be than the PWM.
+
+    Returns
+    -------
+    float
+        The PWM period, or the sample period of a log as fast [s].
+
+    """
     pwm_s = segment.fixed.get("pwm_s", math.inf)
     return pwm_s if pwm_s < policy.slower_share * segment.ts_s else segment.ts_s
 
 
 def at_true_angle(segment: Segment, x: Operating, model: Model, values: Values) -> Operating:
-    """The state with the errors of the angle's sensor taken out of angle, speed and frame."""
+    """The state with the errors of the angle sensor taken out of angle, speed and frame.
+
+    Parameters
+    ----------
+    segment
+        Lateness and zero of the sensor.
+    x
+        State by the recorded angle [n].
+    model
+        Effects of the angle.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    Operating
+        The error is evaluated at the true angle by a few rounds of iteration.
+
+    """
     if late := segment.fixed.get(LATE_SPEED, 0.0) * values[LATE_SPEED]:
         x = _in_time(segment, x, late)
     zero = zero_angle(segment, values)
@@ -163,7 +285,27 @@ def _in_time(segment: Segment, x: Operating, late_s: float) -> Operating:
 def drive_current(
     segment: Segment, signals: Mapping[str, Array], model: Model, values: Values, size: int
 ) -> Complex:
-    """True current [size, A] of a drive's log, between its samples on straight lines."""
+    """True current of a drive's log.
+
+    Parameters
+    ----------
+    segment
+        The log.
+    signals
+        Recorded columns [n].
+    model
+        Effects of the current sensors.
+    values
+        Parameters by full name.
+    size
+        Points wanted; beyond the samples, on straight lines between them.
+
+    Returns
+    -------
+    array [size], complex
+        d + jq [A].
+
+    """
     recorded = _recorded(segment, signals, model)
     zero = values["zero_alpha_a"] + 1j * values["zero_beta_a"]
     if zero and _both_axes(segment):
@@ -183,7 +325,29 @@ def table_current(
     model: Model,
     values: Values,
 ) -> Complex:
-    """True current [n, A] of a table's rows, at their electrical angle and speed [n]."""
+    """True current of the rows of a table.
+
+    Parameters
+    ----------
+    segment
+        The table.
+    current
+        Recorded, complex [n, A].
+    eps_rad
+        Electrical angle [n].
+    omega_e_rad_s
+        Electrical speed [n].
+    model
+        Effects of the current sensors.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [n], complex
+        In A.
+
+    """
     nothing = np.zeros(current.size)
     recorded = Recorded(
         current, nothing, eps_rad, omega_e_rad_s, segment.ts_s, False, segment.instrument.name
@@ -244,8 +408,23 @@ def _recorded(segment: Segment, signals: Mapping[str, Array], model: Model) -> R
 def ahead_in(
     segment: Segment, signals: Mapping[str, Array], pole_pairs: int
 ) -> Callable[[float], tuple[Complex, Array, Array]] | None:
-    """What currents, torque and electrical angle are later in the whole log of a segment, less what
-    they are now; None where nothing was thinned. The segment is on its true clock.
+    """Changes of currents, torque and angle within a delay, from the whole log of a segment.
+
+    Parameters
+    ----------
+    segment
+        On its true clock; its `unthinned` part holds the whole log.
+    signals
+        Recorded columns [n].
+    pole_pairs
+        Turns the angle into an electrical one.
+
+    Returns
+    -------
+    callable or None
+        delay [s] -> changes of complex current [n, A], torque [n, N·m] and electrical angle [n,
+        rad]; None where nothing was thinned.
+
     """
     log, rows = segment.unthinned.late, segment.recorded.get("t_s")
     if not log or rows is None:
@@ -270,7 +449,25 @@ def ahead_in(
 
 
 def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values) -> Complex:
-    """True complex current [n, A] of a recorded one: gain and effects of its sensors taken out."""
+    """True complex current of a recorded one: gain and effects of its sensors taken out.
+
+    Parameters
+    ----------
+    recorded
+        Recorded signals [n].
+    ammeter
+        Nuisance that is the gain of the instrument.
+    model
+        Effects of the current sensors, taken out in their order.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [n], complex
+        In A.
+
+    """
     gain = 1.0 + values[ammeter]
     ahead = recorded.ahead
     recorded = replace(recorded, i_a=recorded.i_a / gain)
@@ -289,7 +486,21 @@ def true_current(recorded: Recorded, ammeter: str, model: Model, values: Values)
 
 
 def zero_angle(segment: Segment, values: Values) -> float:
-    """Recorded less true electrical angle [rad] where the drive's encoder has its zero."""
+    """Recorded less true electrical angle where the drive's encoder has its zero.
+
+    Parameters
+    ----------
+    segment
+        Any segment.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    float
+        In rad; 0 unless it is a drive's log of both currents.
+
+    """
     return values["zero_angle_rad"] if _both_axes(segment) else 0.0
 
 
@@ -301,7 +512,23 @@ def _both_axes(segment: Segment) -> bool:
 
 
 def angle_error(x: Operating, model: Model, values: Values) -> Array:
-    """Recorded less true electrical angle [n, rad] by the sensor effects of a model."""
+    """Recorded less true electrical angle by the sensor effects of a model.
+
+    Parameters
+    ----------
+    x
+        State at which it is evaluated [n].
+    model
+        Effects of the angle; their errors add up.
+    values
+        Parameters by full name.
+
+    Returns
+    -------
+    array [n]
+        In rad.
+
+    """
     total = np.zeros(x.omega_rad_s.shape)
     for effect in model.effects:
         if effect.angle is not None:

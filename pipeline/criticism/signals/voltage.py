@@ -152,7 +152,19 @@ def forward(signal: Any, period_s: float) -> Any:
 
 
 def ahead(signal: Any) -> Any:
-    """Mean [n] of each sample and the next; the last as it is."""
+    """Mean of each sample and the next.
+
+    Parameters
+    ----------
+    signal
+        [n].
+
+    Returns
+    -------
+    array [n]
+        The last sample as it is.
+
+    """
     mean = signal.copy()
     mean[:-1] = 0.5 * (signal[:-1] + signal[1:])
     return mean

@@ -31,7 +31,20 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One measured voltage [n]: v = gain Re(x e^{-j angle}) of the space vector x."""
+    """One measured voltage: v = gain Re(x e^{−j angle}) of the space vector x.
+
+    Attributes
+    ----------
+    name
+        Column of the capture.
+    v_v
+        Samples [n, V].
+    gain
+        √3 for a line voltage, 1 for a phase voltage.
+    angle_rad
+        Electrical angle of the channel's axis from phase a.
+
+    """
 
     name: str
     v_v: Array
@@ -41,7 +54,20 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Spin:
-    """The voltages of one open-circuit capture on one clock; angle and speed where there."""
+    """The voltages of one open-circuit capture on one clock.
+
+    Attributes
+    ----------
+    t_s
+        Sampling instants [n, s].
+    channels
+        One or more voltages.
+    theta_rad, omega_rad_s
+        Mechanical angle and speed [n], None where not recorded.
+    temp_degc
+        Temperature of the magnets or near them [n], None where not recorded.
+
+    """
 
     t_s: Array
     channels: tuple[Channel, ...]
@@ -153,7 +179,18 @@ def read_spin(capture: Capture, temp_column: str | None) -> Spin:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Rows of one steady speed with the voltage's own phase [rad] and its rate [rad/s] at each."""
+    """Rows of one steady speed, with the phase of the voltage itself.
+
+    Attributes
+    ----------
+    rows
+        Indices [m] into the arrays of the spin.
+    phase_rad
+        Smoothed electrical phase of the voltage vector [m, rad].
+    omega_elec_rad_s
+        Its rate [m, rad/s].
+
+    """
 
     rows: NDArray[np.intp]
     phase_rad: Array
@@ -317,9 +354,23 @@ def _steady_core(speeds: Array, start: int, stop: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class StretchFlux:
-    """Flux and harmonics of one stretch: psi [Wb], relative complex harmonics, uncertainties.
+    """Flux linkage and harmonics of one stretch.
 
-    `u_harmonic` is that of each component, real and imaginary, of a relative harmonic.
+    Attributes
+    ----------
+    psi_wb, u_psi_wb
+        Amplitude of the fundamental over the speed, and its standard uncertainty [Wb].
+    harmonics
+        Complex harmonic relative to the fundamental, by order.
+    u_harmonic
+        Standard uncertainty of each component, real and imaginary [1].
+    speed_elec_rad_s
+        Mean electrical speed, signed by the phase order [rad/s].
+    temp_degc
+        Mean temperature; None where not recorded.
+    amplitude_v
+        Mean amplitude of the fundamental, phase peak [V].
+
     """
 
     psi_wb: float

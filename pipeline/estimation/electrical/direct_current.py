@@ -35,7 +35,26 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Means over one settled plateau with their standard errors, and where it came from."""
+    """Means over one settled plateau of current.
+
+    Attributes
+    ----------
+    capture
+        Index among the resistance captures of the campaign.
+    pair
+        Terminals that the current flows through.
+    v_v, i_a
+        Mean voltage and current of the pair [V, A].
+    temp_degc
+        Mean winding temperature.
+    u_v, u_i
+        Standard errors of the means, correlation included [V, A].
+    meta
+        Metadata of the capture.
+    temp_logged
+        Whether the temperature was recorded and not assumed.
+
+    """
 
     capture: int
     pair: str
@@ -103,7 +122,16 @@ def direct_current_points(
 
 
 def captures_of(campaign: Campaign, points: Sequence[Point]) -> tuple[Capture, ...]:
-    """The captures that the points came from, in path order."""
+    """The captures that some points came from, in the order of their paths.
+
+    Parameters
+    ----------
+    campaign
+        The captures of the motor.
+    points
+        Points of `direct_current_points` on the same campaign.
+
+    """
     captures = campaign.of(TEST)
     return tuple(captures[k] for k in sorted({p.capture for p in points}))
 
@@ -126,7 +154,21 @@ def _points_of(capture: Capture, index: int, pair: str, temp_degc: float) -> lis
 
 
 def uncertainties_of(points: Sequence[Point], captures: Sequence[Capture]) -> dict[str, float]:
-    """Standard uncertainty of each source of `shifted`: gains relative, temperatures [K]."""
+    """Standard uncertainty of each source of `shifted`.
+
+    Parameters
+    ----------
+    points
+        The points of a fit.
+    captures
+        The captures that they came from.
+
+    Returns
+    -------
+    dict
+        By source: relative for gains [1], absolute for temperatures [K].
+
+    """
     found = instrument_uncertainties(captures)
     if any(not point.temp_logged for point in points):
         found[UNLOGGED] = policy().magnet.unlogged_k

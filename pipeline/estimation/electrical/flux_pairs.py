@@ -15,7 +15,22 @@ from pipeline.numerics.least_squares import linear_fit
 
 @dataclass(frozen=True, slots=True)
 class Flux:
-    """Flux linkages of one pair of points with +i_q and -i_q at one speed and one d current."""
+    """Flux linkages of one pair of points with opposite q current, at one speed and d current.
+
+    Attributes
+    ----------
+    group
+        Number of the constant-speed stretch.
+    id_a, iq_a
+        Currents in the frame of the magnet [A].
+    psi_d_wb, psi_q_wb
+        Flux linkages [Wb].
+    u_d_wb, u_q_wb
+        Their standard uncertainties from scatter [Wb].
+    temp_magnet_degc
+        Mean temperature of the magnets.
+
+    """
 
     group: int
     id_a: float

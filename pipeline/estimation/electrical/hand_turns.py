@@ -21,9 +21,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What one voltage channel says: cycles a turn, flux amplitude [Wb, phase peak], traces.
+    """What one voltage channel gives of a turn by hand.
 
-    `dof` are the degrees of freedom of `u_psi_wb`, infinite where the noise is known beforehand.
+    Attributes
+    ----------
+    channel
+        Column of the capture.
+    cycles
+        Electrical cycles in the record [1].
+    psi_wb, u_psi_wb
+        Flux amplitude, phase peak, and its standard uncertainty [Wb].
+    dof
+        Degrees of freedom of `u_psi_wb`; infinite where the noise is known beforehand.
+    t_s, flux_wb, fitted_wb
+        Traces for a plot [n].
+
     """
 
     channel: str

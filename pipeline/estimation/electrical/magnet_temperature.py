@@ -19,22 +19,58 @@ UNPOWERED = ("open_circuit", "hand_turn")
 
 
 def magnet_column(capture: Capture) -> str | None:
-    """The column of the magnets' temperature; without current also one near them."""
+    """The column that stands for the temperature of the magnets.
+
+    Parameters
+    ----------
+    capture
+        Any capture.
+
+    Returns
+    -------
+    str or None
+        `temp_magnet_degc`; in tests without current also the winding's or the case's, which are
+        about as warm then. None where no such column holds a value.
+
+    """
     near = NEAR if capture.meta.test in UNPOWERED else ()
     return first_temperature(capture, "magnet", *near)
 
 
 def assumed_temperature(capture: Capture, otherwise_degc: float = 25.0) -> float:
-    """Where nothing records the magnets' temperature: the ambient one, else `otherwise_degc`."""
+    """The temperature of the magnets where nothing records it.
+
+    Parameters
+    ----------
+    capture
+        A capture without a column of `magnet_column`.
+    otherwise_degc
+        What is taken where the capture states no ambient temperature.
+
+    Returns
+    -------
+    float
+        The ambient temperature of the metadata, else `otherwise_degc`.
+
+    """
     ambient = capture.meta.ambient_degc
     return otherwise_degc if ambient is None else ambient
 
 
 def magnet_source(capture: Capture) -> str:
-    """The source of the error of the magnets' temperature.
+    """The source of the error of the magnets' temperature in a capture.
 
-    What stands in for a thermometer is one error in all captures of a test: they were recorded one
-    after the other.
+    Parameters
+    ----------
+    capture
+        Any capture.
+
+    Returns
+    -------
+    str
+        The thermometer of the station; else a source that all captures of a test share, since they
+        were recorded one after the other.
+
     """
     column = magnet_column(capture)
     if column == "temp_magnet_degc":
@@ -68,7 +104,19 @@ def magnet_uncertainties(captures: Iterable[Capture]) -> dict[str, float]:
 
 
 def unlogged_note(captures: Iterable[Capture]) -> str:
-    """Where the magnets' temperature is assumed, in words, or an empty string."""
+    """Where the temperature of the magnets is assumed, in words.
+
+    Parameters
+    ----------
+    captures
+        Captures of one fit.
+
+    Returns
+    -------
+    str
+        Empty where a thermometer of the magnets recorded all of them.
+
+    """
     found = {}
     for capture in captures:
         column = magnet_column(capture)

@@ -29,12 +29,30 @@ TURN_RAD = 2.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Means over one settled step; NaN where a column is missing.
+    """Means over one settled step of a constant-speed test; NaN where a column is missing.
 
-    `omega_mech_rad_s` is the slope of the angle where it is there; `u_torque_nm`, `u_vd_v` and
-    `u_vq_v` are standard errors of means, correlation included. `cos_turn`, `sin_turn` are means
-    over the shaft angle (0 where it is missing), `period_s` the sampling period. `group` numbers
-    the constant-speed stretches, and of a shaft that stands (speed 0) its angles.
+    Attributes
+    ----------
+    group
+        Number of the constant-speed stretch; of a shaft that stands, of its angle.
+    rows
+        Samples in the mean.
+    omega_mech_rad_s
+        Slope of the angle where there is one, else the mean of the speed; 0 for a shaft that
+        stands.
+    id_a, iq_a, vd_v, vq_v, torque_nm
+        Means in the frame of the drive [A, V, N·m].
+    u_torque_nm, u_vd_v, u_vq_v
+        Standard errors of the means, correlation included.
+    temp_magnet_degc
+        Mean, or assumed.
+    cos_turn, sin_turn
+        Means of cosine and sine of the shaft angle; 0 where it was not recorded.
+    period_s
+        Sampling period [s].
+    capture
+        Where the point comes from.
+
     """
 
     group: int
@@ -104,7 +122,19 @@ class PointTable:
     rows: int
 
     def column(self, name: str) -> Array:
-        """One attribute of every point [n]."""
+        """One attribute of every point.
+
+        Parameters
+        ----------
+        name
+            A field of `Point`.
+
+        Returns
+        -------
+        array [n]
+            In the unit of the field.
+
+        """
         return np.array([getattr(point, name) for point in self.points], dtype=np.float64)
 
     def note(self) -> str:

@@ -22,7 +22,18 @@ from pipeline.records.estimate import Estimate
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """One steady speed of one capture."""
+    """One steady speed of one capture.
+
+    Attributes
+    ----------
+    capture, spin, stretch
+        The capture, its voltages, and the rows of this speed.
+    flux
+        Flux linkage and harmonics.
+    temp_degc
+        Temperature of the magnets, recorded or assumed.
+
+    """
 
     capture: Capture
     spin: Spin

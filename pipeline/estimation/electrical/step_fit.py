@@ -26,10 +26,26 @@ Sigmas = Sequence[tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """The model, its fit over the free parameters, and the noise of current and voltage found.
+    """The step model fitted to all captures.
 
-    `weights` [2, rows] of each capture weighted the residuals of this fit, `scatter` [n] is the
-    standard deviation that each of them turned out to have, correlated ones counted.
+    Attributes
+    ----------
+    model
+        The model.
+    parameters
+        All parameters [k], fixed ones too.
+    free
+        Which of them [k] were fitted.
+    fit
+        The fit over the free parameters.
+    weights
+        Weights [2, rows] of the residuals of current and voltage of each capture.
+    sigmas
+        Standard deviations of current and voltage found for each capture [A, V].
+    scatter
+        Standard deviation [n] that each weighted residual turned out to have, correlated ones
+        counted.
+
     """
 
     model: StepModel
@@ -41,8 +57,14 @@ class Solution:
     scatter: Array
 
     def covariance(self) -> Array:
-        """Covariance over all parameters [k, k], zero where one was held, of infinite variance
-        where the steps do not determine one.
+        """Covariance over all parameters.
+
+        Returns
+        -------
+        array [k, k]
+            Zero for a parameter that was fixed; an infinite variance for one that the steps do not
+            determine.
+
         """
         full = np.zeros((self.free.size, self.free.size))
         where = np.flatnonzero(self.free)

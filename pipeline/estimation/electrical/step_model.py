@@ -47,7 +47,20 @@ class Own:
 
 
 def own_of(record: StepRecord) -> Own:
-    """The places of a capture's own parameters."""
+    """The places of a capture's own parameters.
+
+    Parameters
+    ----------
+    record
+        The capture, as the model reads it.
+
+    Returns
+    -------
+    Own
+        Counted from the capture's first parameter; None for a parameter that the capture has no
+        need of.
+
+    """
     wave, at = record.wave, 1
     places: list[int | None] = []
     for there in (
@@ -78,7 +91,19 @@ class Layout:
 
 
 def layout_of(records: Sequence[StepRecord]) -> Layout:
-    """The layout for these captures."""
+    """The layout of the parameters for some captures.
+
+    Parameters
+    ----------
+    records
+        In the order of the fit.
+
+    Returns
+    -------
+    Layout
+        The shared parameters first, then those of each capture in turn.
+
+    """
     own = tuple(own_of(record) for record in records)
     starts = np.cumsum([len(SHARED), *(o.size for o in own[:-1])])
     return Layout(tuple(int(s) for s in starts), own)
@@ -198,7 +223,17 @@ Inductances = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 
 class StepModel:
-    """Predicts the current of every capture for every variant of the parameters in one sweep."""
+    """Predicts the current of every capture for every variant of the parameters in one sweep.
+
+    Parameters
+    ----------
+    records
+        The captures, as the model reads them.
+    inductances
+        Incremental L_d and L_q [m, H] from the shared parameters [m, 10] and the fluxes of the
+        currents along d and q [m, Wb].
+
+    """
 
     def __init__(self, records: Sequence[StepRecord], inductances: Inductances) -> None:
         self.records = tuple(records)
@@ -208,7 +243,14 @@ class StepModel:
         self._count = max(grid[0].size for grid in self._grids)
 
     def of(self, records: Sequence[StepRecord]) -> StepModel:
-        """The same equation for other records."""
+        """The same equation for other records.
+
+        Parameters
+        ----------
+        records
+            In the same number and order, so that the parameters keep their places.
+
+        """
         return StepModel(records, self.inductances)
 
     def predict(self, variants: Sequence[Array]) -> list[Array]:
@@ -341,7 +383,20 @@ class StepModel:
         return np.concatenate(blocks), np.vstack(slopes)
 
     def predict_both(self, variants: Sequence[Array]) -> list[tuple[Array, Array]]:
-        """Currents and voltages [n, m each] of each capture; a voltage of no level is 0."""
+        """Currents and voltages of every capture for every variant of the parameters.
+
+        Parameters
+        ----------
+        variants
+            For each capture, rows of all parameters [m, k].
+
+        Returns
+        -------
+        list of tuple
+            For each capture current and voltage [n, m] in A and V; the voltage of a sample that
+            belongs to no level of the supply is 0.
+
+        """
         found = []
         for current, record, rows, at, own in zip(
             self.predict(variants),
@@ -385,7 +440,21 @@ class StepModel:
         return low, high
 
     def columns_of(self, capture: int, free: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Those of the free parameters that a capture depends on."""
+        """The free parameters that the prediction for a capture depends on.
+
+        Parameters
+        ----------
+        capture
+            Its index in `records`.
+        free
+            Indices of the free parameters.
+
+        Returns
+        -------
+        array of int
+            Those that are shared, and the capture's own.
+
+        """
         start, size = self.layout.starts[capture], self.layout.own[capture].size
         own = (free >= start) & (free < start + size)
         return free[own | (free < len(SHARED))]

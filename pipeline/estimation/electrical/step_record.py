@@ -22,11 +22,31 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class StepRecord:
-    """One current_step capture: means [n] of `count` samples of current and voltage.
+    """One capture of a voltage step, as means over groups of samples.
 
-    `level` [n] is the supply's level of each mean of the voltage, `BETWEEN` where it is none.
-    `axis_rad` is the angle from the d axis to the pair's current; `l_start_h`, `r_start_ohm` come
-    from the integrated form; `commanded` says that an inverter's drop is in the voltage.
+    Attributes
+    ----------
+    capture, pair
+        The capture, and the terminals that the current flows through.
+    axis_rad
+        Electrical angle from the d axis to the axis of the pair's current.
+    wave
+        The voltage that drives the model.
+    t_s, i_a, v_v
+        Means [n] of time, current and voltage.
+    level
+        The supply's level of each mean [n]; `BETWEEN` for a mean taken while the voltage rose.
+    count
+        Samples of each mean [n].
+    l_start_h, r_start_ohm
+        Between the terminals, from the integrated form; start values of the fit.
+    commanded
+        Whether the voltage is an inverter's command, so that its drop is in it.
+    starts_settled
+        Whether the record begins with the current settled.
+    current_noise, voltage_noise
+        Noise of the channels.
+
     """
 
     capture: Capture

@@ -36,9 +36,17 @@ BETWEEN = -1
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """A channel's scatter from sample to sample, and what rounding leaves in a level's mean.
+    """The noise of one channel, in its unit.
 
-    `step` is the converter's resolution; all three in the channel's unit.
+    Attributes
+    ----------
+    sigma
+        Standard deviation from sample to sample.
+    rounding
+        Rms error that rounding leaves in the mean over a level.
+    step
+        Resolution of the converter.
+
     """
 
     sigma: float
@@ -48,11 +56,23 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Waveform:
-    """Voltages [s] between edges [s + 1]; `moves` [s + 1, f] says which edges move together.
+    """The voltage of a step test between its edges.
 
-    With a supply, `levels_v` are where its open voltages start in the fit, `source_ohm` where its
-    resistance does, and `level_of` [n] is the level of each sample. Without, `level_of` is empty
-    and `levels_v` is what the motor gets.
+    Attributes
+    ----------
+    edges_s
+        Instants of the edges [s + 1].
+    levels_v
+        Voltage between two edges [s]; with a supply, where its open voltages start in the fit.
+    moves
+        Which edges move together [s + 1, f], one column a free shift.
+    period_s
+        Sampling period [s].
+    source_ohm
+        Where the resistance of the supply starts in the fit; 0 without a supply.
+    level_of
+        Level of each sample [n]; empty where no supply describes the samples.
+
     """
 
     edges_s: Array

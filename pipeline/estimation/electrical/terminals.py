@@ -32,14 +32,37 @@ def pair_of(capture: Capture) -> str | None:
 
 
 def voltage_columns(capture: Capture, pair: str) -> tuple[str, ...]:
-    """The columns that make the pair's voltage: its own, or its two phase voltages."""
+    """The columns that give the voltage of a terminal pair.
+
+    Parameters
+    ----------
+    capture
+        Any capture.
+    pair
+        `ab`, `bc` or `ca`.
+
+    Returns
+    -------
+    tuple of str
+        The line voltage, else both phase voltages, else empty.
+
+    """
     own = (f"v{pair}_v",)
     phases = (f"v{pair[0]}_v", f"v{pair[1]}_v")
     return next((names for names in (own, phases) if capture.has(*names)), ())
 
 
 def current_columns(capture: Capture, pair: str) -> tuple[str, ...]:
-    """The line currents of the pair's terminals that are there, the first terminal's first."""
+    """The line currents of a terminal pair that a capture holds, the first terminal's first.
+
+    Parameters
+    ----------
+    capture
+        Any capture.
+    pair
+        `ab`, `bc` or `ca`.
+
+    """
     return tuple(n for n in (f"i{pair[0]}_a", f"i{pair[1]}_a") if capture.has(n))
 
 

@@ -29,14 +29,39 @@ REMEDY = (
 
 @dataclass(frozen=True, slots=True)
 class Fall:
-    """A coast: its sense, and speed [n, rad/s] in that sense over time [n, s]."""
+    """One coast.
+
+    Attributes
+    ----------
+    sense
+        Sense of rotation, +1 or −1.
+    t_s
+        Instants [n, s].
+    speed_rad_s
+        Speed in that sense [n, rad/s].
+
+    """
 
     sense: int
     t_s: Array
     speed_rad_s: Array
 
     def deceleration(self, high_rad_s: float, low_rad_s: float) -> float:
-        """Mean deceleration [rad/s²] from one speed to a lower one."""
+        """Mean deceleration from one speed to a lower one.
+
+        Parameters
+        ----------
+        high_rad_s
+            Speed at the beginning, in the sense of the coast.
+        low_rad_s
+            Speed at the end.
+
+        Returns
+        -------
+        float
+            Speed difference over time difference [rad/s²].
+
+        """
         ends = [float(self.t_s[np.argmax(self.speed_rad_s <= s)]) for s in (high_rad_s, low_rad_s)]
         return (high_rad_s - low_rad_s) / max(ends[1] - ends[0], 1e-300)
 
@@ -89,7 +114,14 @@ def coast_setups(captures: Sequence[Capture]) -> tuple[Setup, ...]:
 
 
 def setup_words(setups: Sequence[Setup]) -> str:
-    """Which files belong together, in words."""
+    """Which files belong to one set-up, in words.
+
+    Parameters
+    ----------
+    setups
+        At least two.
+
+    """
     named = []
     for setup in setups:
         files = ", ".join(capture.path for capture in setup.captures)

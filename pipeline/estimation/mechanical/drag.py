@@ -60,11 +60,30 @@ CURVE = tuple(f"knot {k}" for k in range(len(KNOTS)))
 
 @dataclass(frozen=True, slots=True)
 class DragFit:
-    """Coefficients of A = g T - sum a_m f_m(w) - nuisances, how sure, and what they mean.
+    """The equation of motion A = g T − Σ a_m f_m(ω) − nuisances, fitted to weak-form rows.
 
-    `free`: the drag curve was left free (columns `CURVE`) as Coulomb and viscous drag
-    with the known additions did not hold. `u_form` [3] is the allowance for the form of drag on
-    J, T_c, B; `reasons` [3] says why one of them is not identifiable, else is empty.
+    Attributes
+    ----------
+    names
+        Names of the columns.
+    coefficients, covariance
+        [k] and [k, k]; g = 1/J first.
+    residuals
+        [w, rad/s²].
+    dof
+        Degrees of freedom of the covariance.
+    free
+        Whether the drag curve was left free (columns `CURVE`), because Coulomb and viscous drag
+        with the known additions did not hold.
+    u_form
+        Allowance [3] for the form of drag on J, T_c and B.
+    reasons
+        Why J, T_c or B is not identifiable; empty for one that is.
+    design, sigma, target
+        Columns [w, k], standard deviations [w] and accelerations [w] of the fit.
+    fastest_rad_s
+        Highest speed of the rows.
+
     """
 
     names: tuple[str, ...]
@@ -236,7 +255,19 @@ def drag_of(rows: ShaftRows, law: Array, nuisances: Sequence[str], level: float)
 
 
 def freedom(rows: ShaftRows) -> int:
-    """Disjoint drive windows beyond the columns that drives alone must determine."""
+    """Disjoint drive windows beyond the columns that drives alone must determine.
+
+    Parameters
+    ----------
+    rows
+        Rows of the equation of motion.
+
+    Returns
+    -------
+    int
+        Degrees of freedom; negative where there are too few windows.
+
+    """
     return rows.disjoint(DRIVE) - _drive_columns(rows)
 
 
@@ -454,7 +485,14 @@ def _form(coefficients: Array, free: bool, rows: ShaftRows) -> tuple[Array, tupl
 
 
 def drag_words(found: DragFit) -> str:
-    """What stands in the fit beside Coulomb and viscous drag, in words."""
+    """What the fit holds beside Coulomb and viscous drag, in words.
+
+    Parameters
+    ----------
+    found
+        The fit.
+
+    """
     added = [n for n in found.names if n not in ("torque", "coulomb", "viscous", *CURVE)]
     words = "drag curve left free, its form is not Coulomb and viscous" if found.free else ""
     return "; ".join(w for w in (words, allowed_for(added)) if w) or "Coulomb and viscous drag hold"

@@ -90,7 +90,21 @@ def ripple_share(angles_rad: Array, pole_pairs: int | None, known: Constants) ->
 
 
 def standstill_words(points: Sequence[Point], found: Sequence[Point]) -> str:
-    """What becomes of points at standstill among those `found`: in `points`, left out, or none."""
+    """What becomes of operating points at standstill, in words.
+
+    Parameters
+    ----------
+    points
+        The points that a fit uses.
+    found
+        All points that there are.
+
+    Returns
+    -------
+    str
+        Empty where no point stands still.
+
+    """
     count = sum(p.standing for p in found)
     if not count:
         return ""

@@ -29,11 +29,33 @@ DRIVE, COAST = 0, 1
 
 @dataclass(frozen=True, slots=True)
 class ShaftRows:
-    """Rows of several captures; every array is [w].
+    """Rows of the equation of motion of several captures; every array is [w].
 
-    `q_current_a`, `warm_current_k_a` and `product_a2` are window means of i_q, i_q (T_m - 25) and
-    i_d i_q; `load_nm` that of the shaft torque. `speed_rad_s` [w] is signed; `columns` holds what
-    a nuisance adds to the acceleration per unit. `kind` is DRIVE or COAST.
+    Attributes
+    ----------
+    captures, capture
+        The captures, and the index of each row's capture.
+    kind
+        `DRIVE` or `COAST`.
+    cluster
+        Rows of one number are near in time, and may be correlated.
+    time_s
+        Mid time of the window.
+    acceleration_rad_s2, speed_rad_s
+        Window means of angular acceleration and of signed speed.
+    q_current_a, warm_current_k_a, product_a2
+        Window means of i_q, of i_q (T_m − 25 degC), and of i_d i_q.
+    load_nm
+        Window mean of the shaft torque.
+    sense
+        Window mean of the sign of the speed.
+    columns
+        What a nuisance adds to the acceleration, per unit of its coefficient.
+    fastest_rad_s
+        Highest speed of any capture.
+    dropped
+        Windows that were left out.
+
     """
 
     captures: tuple[Capture, ...]
@@ -58,7 +80,19 @@ class ShaftRows:
         return int(self.sense.size)
 
     def disjoint(self, kind: int) -> int:
-        """How many windows of a kind share no sample with another: those that count as one each."""
+        """How many windows of a kind share no sample with another.
+
+        Parameters
+        ----------
+        kind
+            `DRIVE` or `COAST`.
+
+        Returns
+        -------
+        int
+            Number of windows that count as independent.
+
+        """
         return math.ceil(np.count_nonzero(self.kind == kind) * (1.0 - policy().shaft_rows.overlap))
 
 

@@ -17,9 +17,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Slope:
-    """Torque per q ampere at small current [N·m/A], its scatter and the doubt of its form.
+    """Torque per q ampere at small current.
 
-    `dof` are the degrees of freedom of the scatter: operating points less fitted columns.
+    Attributes
+    ----------
+    kt_nm_a
+        The slope [N·m/A].
+    u_nm_a
+        Its standard uncertainty from scatter [N·m/A].
+    dof
+        Operating points less fitted columns.
+    form_nm_a
+        Doubt of the form of saturation [N·m/A].
+
     """
 
     kt_nm_a: float
@@ -28,7 +38,14 @@ class Slope:
     form_nm_a: float
 
     def times(self, factor: float) -> Slope:
-        """Value, scatter and doubt scaled."""
+        """The slope in another unit or convention.
+
+        Parameters
+        ----------
+        factor
+            Of value, scatter and doubt alike; the uncertainties stay positive.
+
+        """
         return replace(
             self,
             kt_nm_a=factor * self.kt_nm_a,

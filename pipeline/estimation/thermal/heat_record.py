@@ -30,13 +30,30 @@ REFERENCE = ("r_phase_ohm", "r_a_ohm", "r_b_ohm", "r_c_ohm", "angle_offset_elec_
 
 @dataclass(frozen=True, slots=True)
 class HeatRecord:
-    """Block means [n] of one heat run while the current flows.
+    """Block means of one heat run while the current flows.
 
-    `r_phase_ohm` is voltage along the current over current, per wye-equivalent phase; `square_a2`
-    is the mean of i_d² + i_q², so that copper loss is 1.5 R times it. Temperatures other than the
-    winding's are None where not measured. `turning` says that back-EMF was taken off.
-    `shares` are the weights of phases a, b, c in the resistance seen, None where the current's
-    place in the stator is not known.
+    Attributes
+    ----------
+    capture
+        The capture.
+    t_s
+        Mean time of each block [n, s].
+    r_phase_ohm
+        Voltage along the current over current, per wye-equivalent phase [n, ohm].
+    current_a
+        Amplitude of the current [n, A].
+    square_a2
+        Mean of i_d² + i_q² [n, A²]; the copper loss is 1.5 R times it.
+    temp_winding_degc
+        Winding [n, degC].
+    temp_second_degc, temp_ambient_degc
+        Case or magnet, and ambient [n, degC]; None where not recorded.
+    turning
+        Whether back-EMF was subtracted.
+    shares
+        Weights of phases a, b and c in `r_phase_ohm`; None where the position of the current in the
+        stator is not known.
+
     """
 
     capture: Capture
@@ -264,7 +281,19 @@ def _bridged(data: dict[str, Array], name: str) -> bool:
 
 
 def ambient_degc(record: HeatRecord) -> float | None:
-    """Ambient temperature: measured, else as stated; None where neither is there."""
+    """Ambient temperature of a heat run.
+
+    Parameters
+    ----------
+    record
+        The heat run.
+
+    Returns
+    -------
+    float or None
+        Mean of the measured one [degC], else what the metadata state; None where neither is there.
+
+    """
     if record.temp_ambient_degc is not None:
         return float(np.nanmean(record.temp_ambient_degc))
     stated = record.capture.meta.ambient_degc

@@ -22,33 +22,80 @@ Shift = Mapping[str, float]
 
 
 def station(meta: CaptureMeta) -> str:
-    """The bench's name, `unknown` where the capture does not say."""
+    """The name of the bench, `unknown` where the capture does not state it.
+
+    Parameters
+    ----------
+    meta
+        Metadata of a capture.
+
+    """
     return meta.station or "unknown"
 
 
 def voltage_source(meta: CaptureMeta) -> str:
-    """The source of a voltage reading's gain error; a commanded voltage is another instrument."""
+    """The source of the gain error of a voltage reading.
+
+    Parameters
+    ----------
+    meta
+        Metadata of a capture.
+
+    Returns
+    -------
+    str
+        A commanded voltage is another instrument than a measured one.
+
+    """
     kind = "voltage" if meta.voltage_kind == "measured" else "voltage_commanded"
     return f"{kind}@{station(meta)}"
 
 
 def current_source(meta: CaptureMeta) -> str:
-    """The source of a current reading's gain error."""
+    """The source of the gain error of a current reading.
+
+    Parameters
+    ----------
+    meta
+        Metadata of a capture.
+
+    """
     return f"current@{station(meta)}"
 
 
 def torque_source(meta: CaptureMeta) -> str:
-    """The source of a torque transducer's gain error."""
+    """The source of the gain error of a torque transducer.
+
+    Parameters
+    ----------
+    meta
+        Metadata of a capture.
+
+    """
     return f"torque@{station(meta)}"
 
 
 def temperature_source(meta: CaptureMeta) -> str:
-    """The source of a thermometer's offset."""
+    """The source of the offset of a thermometer.
+
+    Parameters
+    ----------
+    meta
+        Metadata of a capture.
+
+    """
     return f"temperature@{station(meta)}"
 
 
 def clock_source(meta: CaptureMeta) -> str:
-    """The source of a time base's error."""
+    """The source of the error of a time base.
+
+    Parameters
+    ----------
+    meta
+        Metadata of a capture.
+
+    """
     return f"clock@{station(meta)}"
 
 
@@ -98,7 +145,21 @@ def instrument_uncertainties(
 def unstated_note(
     captures: Iterable[Capture], kinds: Iterable[str] = ("voltage", "current", "temperature")
 ) -> str:
-    """Which `u_*` keys no capture states, or states as 0, in words, or an empty string."""
+    """Which `u_*` keys no capture states, or states as 0, in words.
+
+    Parameters
+    ----------
+    captures
+        Captures of one fit.
+    kinds
+        Keys of `SOURCES`: the instruments that the fit uses.
+
+    Returns
+    -------
+    str
+        Empty where every instrument's uncertainty is stated and above 0.
+
+    """
     metas = [capture.meta for capture in captures]
     words = []
     for key in (SOURCES[kind][1] for kind in kinds):
@@ -170,5 +231,21 @@ def with_clock(estimate: Estimate, power: int, captures: Iterable[Capture]) -> E
 
 
 def budget_of(parts: Iterable[Contribution]) -> Budget:
-    """One part a source, parts of equal sources added with their signs (`propagate`), none of 0."""
+    """One part a source, parts of equal sources added with their signs (`propagate`), none of 0.
+
+    Parameters
+    ----------
+    parts
+        Contributions [unit of the estimate], in any order.
+
+    Attributes
+    ----------
+    budget with one part a source.
+
+    Returns
+    -------
+    Budget
+        Parts of equal sources added with their signs; parts that come to 0 left out.
+
+    """
     return tuple(part for part in propagate([(1.0, tuple(parts))]) if part.u != 0.0)

@@ -6,10 +6,24 @@ from collections.abc import Sequence
 
 
 def allowed_for(terms: Sequence[str]) -> str:
-    """The nuisance terms of a fit in words, or an empty string.
+    """The nuisance terms of a fit, in words that report no effect.
 
-    They soak up what would else bend the constants, whatever it comes from, and one stands for
-    another. Which effects a motor shows is for `diagnose` to find, which fits all tests at once.
+    Parameters
+    ----------
+    terms
+        Names of the terms.
+
+    Returns
+    -------
+    str
+        Empty where there are none.
+
+    Notes
+    -----
+    Nuisance terms absorb what would otherwise bias the constants, whatever it comes from, and one
+    stands for another. Which effects a motor shows is for `diagnose` to find, which fits all tests
+    at once.
+
     """
     if not terms:
         return ""

@@ -26,7 +26,18 @@ Labels = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Partition:
-    """Regimes of the rows: `labels` [n] number the `names`; -1 is a row of none of them."""
+    """Regimes of the rows of a regression.
+
+    Attributes
+    ----------
+    name
+        What the rows are parted by.
+    labels
+        Number of each row's regime [n]; −1 for a row of none.
+    names
+        Names of the regimes.
+
+    """
 
     name: str
     labels: Labels
@@ -35,7 +46,20 @@ class Partition:
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """y [n] = design [n, k] times coefficients, noise `sigma` [n], rows correlated in `cluster`."""
+    """y = design times coefficients plus noise.
+
+    Attributes
+    ----------
+    design
+        Columns [n, k].
+    y
+        Observations [n].
+    sigma
+        Standard deviation of the noise [n, unit of y].
+    cluster
+        Rows of one number may be correlated [n].
+
+    """
 
     design: Array
     y: Array
@@ -45,18 +69,51 @@ class Regression:
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """A partition whose regimes differ beyond chance: relative values [k] and their scatter."""
+    """A partition whose regimes differ beyond chance: relative values [k] and their scatter.
+
+    Attributes
+    ----------
+    partition whose regimes differ beyond chance in one coefficient.
+    partition
+        The regimes that were compared.
+    relative
+        Coefficient of each regime over the common one [k].
+    found
+        The test of their agreement.
+
+    """
 
     partition: Partition
     relative: Array
     found: Between
 
     def part(self, source: str, value: float) -> Contribution:
-        """The contribution of the regimes to the uncertainty of a constant of this value."""
+        """The contribution of the regimes to the uncertainty of a constant.
+
+        Parameters
+        ----------
+        source
+            Name of the constant, for the name of the contribution.
+        value
+            The constant [its unit].
+
+        Returns
+        -------
+        Contribution
+            Type A, with the degrees of freedom of the scatter between regimes.
+
+        """
         return Contribution(f"{BETWEEN}{source}", self.found.sd * value, "A", self.found.dof)
 
     def words(self, what: str) -> str:
-        """Which regimes differ by how much."""
+        """Which regimes differ, and by how much.
+
+        Parameters
+        ----------
+        what
+            Name of the constant in the sentence.
+
+        """
         each = ", ".join(
             f"{100.0 * (r - 1.0):+.2g} % {n}"
             for r, n in zip(self.relative, self.partition.names, strict=True)
@@ -117,19 +174,23 @@ def signs(name: str, values: Array, low: str, high: str, among: NDArray[np.bool_
 
 
 def information(regression: Regression, column: int) -> Array:
-    """What each row [n] determines of one coefficient beside the others: its share of 1/variance.
+    """What each row determines of one coefficient beside the others.
 
     Parameters
     ----------
     regression
-        Rows with their noise.
+        The regression.
     column
-        The coefficient, by its place in the design.
+        Index of the coefficient.
 
     Returns
     -------
     array [n]
-        Sums to 1.
+        Share of each row in 1/variance of the coefficient; the sum is 1.
+
+    Notes
+    -----
+    The column's residual on the other columns, over sigma, squared (Frisch and Waugh).
 
     """
     others = np.delete(regression.design, column, axis=1)
